@@ -1,0 +1,44 @@
+# tsdfpp_compile_options(<target>): the warnings and floating-point rules that every target of the project shares.
+function(tsdfpp_compile_options target)
+  target_compile_options(
+    ${target}
+    PRIVATE -Wall
+            -Wextra
+            -Wpedantic
+            -Wshadow
+            -Werror
+            # One result for all compilers and instruction sets: no fused multiply-add behind our back.
+            -ffp-contract=off)
+  if(TSDFPP_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${TSDFPP_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(${target} PRIVATE -fsanitize=${TSDFPP_SANITIZE})
+  endif()
+endfunction()
+
+# tsdfpp_room(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...]): the library tsdfpp_<name>, alias tsdfpp::<name>.
+function(tsdfpp_room name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(tsdfpp_${name} STATIC ${ARG_SOURCES})
+  add_library(tsdfpp::${name} ALIAS tsdfpp_${name})
+  target_include_directories(tsdfpp_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(
+    tsdfpp_${name}
+    PUBLIC ${ARG_PUBLIC}
+    PRIVATE ${ARG_PRIVATE})
+  tsdfpp_compile_options(tsdfpp_${name})
+endfunction()
+
+# tsdfpp_test(<name> SOURCES ... LINK ...): one GoogleTest binary, its tests discovered by CTest.
+function(tsdfpp_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest GTest::gtest_main)
+  target_compile_definitions(
+    ${name} PRIVATE TSDFPP_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                    TSDFPP_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared"
+                    TSDFPP_COMMAND="${PROJECT_BINARY_DIR}/tsdfpp")
+  tsdfpp_compile_options(${name})
+  include(GoogleTest)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 600)
+endfunction()

@@ -1,0 +1,89 @@
+#include "core/files.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+using test::TempFolder;
+
+TEST(Files, ReadsWhatWasWritten) {
+  const TempFolder folder;
+  // Longer than any buffer, with every byte value.
+  std::string bytes;
+  for (int i = 0; i < 300000; ++i) bytes.push_back(static_cast<char>(i * 7 % 256));
+  ASSERT_TRUE(WriteFile(folder / "a/b/c.bin", bytes).has_value());
+  EXPECT_EQ(ReadFile(folder / "a/b/c.bin").value(), bytes);
+}
+
+TEST(Files, EmptyFileIsReadable) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "empty", "").has_value());
+  const auto bytes = ReadFile(folder / "empty");
+  ASSERT_TRUE(bytes.has_value()) << bytes.error().message;
+  EXPECT_EQ(*bytes, "");
+}
+
+TEST(Files, WriteReplacesAndLeavesNothingBeside) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "x", "a long first version").has_value());
+  ASSERT_TRUE(WriteFile(folder / "x", "short").has_value());
+  EXPECT_EQ(ReadFile(folder / "x").value(), "short");
+  EXPECT_EQ(folder.Entries(), 1);
+}
+
+TEST(Files, FailedWriteLeavesTheOldAndNothingBeside) {
+  const TempFolder folder;
+  // A folder that is not empty cannot be replaced by a file.
+  ASSERT_TRUE(WriteFile(folder / "taken/inside", "kept").has_value());
+  const auto result = WriteFile(folder / "taken", "new");
+  ASSERT_FALSE(result.has_value());
+  EXPECT_EQ(result.error().kind, ErrorKind::kEnvironment);
+  EXPECT_TRUE(
+      result.error().message.starts_with((folder / "taken").string() + ": cannot be written ("))
+      << result.error().message;
+  EXPECT_EQ(ReadFile(folder / "taken/inside").value(), "kept");
+  EXPECT_EQ(folder.Entries(), 1);
+}
+
+TEST(Files, MissingFileAndFolderAreNamed) {
+  const TempFolder folder;
+  const auto missing = ReadFile(folder / "none");
+  ASSERT_FALSE(missing.has_value());
+  EXPECT_EQ(missing.error().kind, ErrorKind::kData);
+  EXPECT_EQ(missing.error().message, (folder / "none").string() + ": no such file");
+  const auto is_folder = ReadFile(folder.path());
+  ASSERT_FALSE(is_folder.has_value());
+  EXPECT_EQ(is_folder.error().message, folder.path().string() + ": is a folder, not a file");
+}
+
+TEST(Files, UnwritablePlaceIsTheEnvironmentsFault) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "file", "").has_value());
+  // Nobody, not even root, can make a folder below a file.
+  const auto write = WriteFile(folder / "file/sub/x", "");
+  ASSERT_FALSE(write.has_value());
+  EXPECT_EQ(write.error().kind, ErrorKind::kEnvironment);
+  EXPECT_NE(write.error().message.find("file/sub: the folder cannot be made ("), std::string::npos)
+      << write.error().message;
+  const auto make = MakeWritableFolder(folder / "file/sub");
+  ASSERT_FALSE(make.has_value());
+  EXPECT_EQ(make.error().kind, ErrorKind::kEnvironment);
+  // /proc can be entered but not written to.
+  const auto probe = MakeWritableFolder("/proc");
+  ASSERT_FALSE(probe.has_value());
+  EXPECT_EQ(probe.error().message, "/proc: the folder cannot be written to");
+}
+
+TEST(Files, WritableFolderIsMadeAndLeftEmpty) {
+  const TempFolder folder;
+  ASSERT_TRUE(MakeWritableFolder(folder / "p/q").has_value());
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "p/q"));
+}
+
+}  // namespace
+}  // namespace tsdfpp
