@@ -1,0 +1,70 @@
+#include "sequence/exr_header.h"
+
+#include <cstdint>
+#include <cstring>
+#include <optional>
+
+namespace tsdfpp {
+namespace {
+
+// Takes pieces off the front of the bytes; nothing where they run out.
+class Cursor {
+ public:
+  explicit Cursor(std::string_view bytes) : rest_(bytes) {}
+
+  std::optional<std::string_view> Take(std::size_t size) {
+    if (size > rest_.size()) return std::nullopt;
+    const std::string_view taken = rest_.substr(0, size);
+    rest_.remove_prefix(size);
+    return taken;
+  }
+
+  std::optional<std::string_view> TakeText() {
+    const auto text = Take(rest_.find('\0'));
+    if (text) rest_.remove_prefix(1);
+    return text;
+  }
+
+  std::optional<std::uint32_t> TakeInt() {
+    const auto bytes = Take(sizeof(std::uint32_t));
+    if (!bytes) return std::nullopt;
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes->data(), sizeof(value));
+    return value;
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+std::vector<ExrChannel> ChannelsOf(std::string_view list) {
+  // Linearity, three reserved bytes and two sampling rates follow the type.
+  constexpr std::size_t kRestOfAChannel = 12;
+  std::vector<ExrChannel> channels;
+  Cursor cursor(list);
+  while (true) {
+    const auto name = cursor.TakeText();
+    if (!name || name->empty()) return channels;
+    const auto type = cursor.TakeInt();
+    if (!type || *type > 2 || !cursor.Take(kRestOfAChannel)) return {};
+    channels.push_back({std::string(*name), static_cast<ExrType>(*type)});
+  }
+}
+
+}  // namespace
+
+std::vector<ExrChannel> ExrChannels(std::string_view bytes) {
+  constexpr std::uint32_t kMagic = 20000630;
+  Cursor cursor(bytes);
+  if (cursor.TakeInt() != kMagic || !cursor.TakeInt()) return {};
+  while (true) {
+    const auto name = cursor.TakeText();
+    if (!name || name->empty() || !cursor.TakeText()) return {};
+    const auto size = cursor.TakeInt();
+    const auto value = size ? cursor.Take(*size) : std::nullopt;
+    if (!value) return {};
+    if (*name == "channels") return ChannelsOf(*value);
+  }
+}
+
+}  // namespace tsdfpp

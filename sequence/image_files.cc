@@ -1,0 +1,233 @@
+#include "sequence/image_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <vector>
+
+#include "core/files.h"
+#include "core/types.h"
+#include "sequence/exr_header.h"
+
+namespace tsdfpp {
+namespace fs = std::filesystem;
+namespace {
+
+// OpenCV looks at this variable when it first meets an EXR file, and refuses the file without it.
+void EnableExr() {
+  static std::once_flag once;
+  std::call_once(once, [] { setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1); });
+}
+
+std::string TypeName(const cv::Mat& image) {
+  static constexpr const char* kDepths[] = {"8-bit unsigned", "8-bit signed",   "16-bit unsigned",
+                                            "16-bit signed",  "32-bit integer", "32-bit float",
+                                            "64-bit float",   "16-bit float"};
+  return fmt::format("{} with {} channel{}", kDepths[image.depth()], image.channels(),
+                     image.channels() == 1 ? "" : "s");
+}
+
+Expected<std::string> Encode(const char* extension, const cv::Mat& image,
+                             const std::vector<int>& settings, const std::string& file) {
+  std::vector<unsigned char> bytes;
+  std::string why = "the codec refused it";
+  try {
+    if (cv::imencode(extension, image, bytes, settings)) {
+      return std::string(bytes.begin(), bytes.end());
+    }
+  } catch (const cv::Exception& exception) {
+    why = exception.err;
+  }
+  return EnvironmentError("{}: cannot be encoded ({})", file, why);
+}
+
+Expected<cv::Mat> Decode(const fs::path& path, cv::Size expected) {
+  std::error_code code;
+  if (!fs::exists(path, code)) return DataError("{}: no such image", path.string());
+  cv::Mat image;
+  try {
+    image = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) return DataError("{}: cannot be decoded as an image", path.string());
+  if (!expected.empty() && image.size() != expected) {
+    return DataError("{}: the image is {}x{}, expected {}x{} (calibration.txt)", path.string(),
+                     image.cols, image.rows, expected.width, expected.height);
+  }
+  return image;
+}
+
+cv::Mat SwapRedAndBlue(const cv::Mat& image) {
+  cv::Mat swapped(image.size(), CV_8UC3);
+  const int pairs[] = {0, 2, 1, 1, 2, 0};
+  cv::mixChannels(&image, 1, &swapped, 1, pairs, 3);
+  return swapped;
+}
+
+// The first channel, if the first three agree bit for bit.
+template <typename T>
+bool TakeEqualChannel(const cv::Mat& image, cv::Mat& channel) {
+  const int channels = image.channels();
+  channel.create(image.size(), CV_MAKETYPE(image.depth(), 1));
+  for (int y = 0; y < image.rows; ++y) {
+    const T* pixel = image.ptr<T>(y);
+    for (int x = 0; x < image.cols; ++x, pixel += channels) {
+      if (std::memcmp(pixel, pixel + 1, sizeof(T)) != 0 ||
+          std::memcmp(pixel, pixel + 2, sizeof(T)) != 0) {
+        return false;
+      }
+      channel.at<T>(y, x) = pixel[0];
+    }
+  }
+  return true;
+}
+
+// The median of the positive finite depths where most of them are too far to be metres and just
+// right for millimetres; 0 otherwise.
+float MillimetreMedian(const cv::Mat& depth) {
+  constexpr float kFarthestIndoors_mm = 20000.0F;
+  std::size_t positive = 0;
+  std::size_t far = 0;
+  for (int y = 0; y < depth.rows; ++y) {
+    for (const float z : cv::Mat_<float>(depth.row(y))) {
+      if (!std::isfinite(z) || z <= 0) continue;
+      ++positive;
+      if (z > kMaxValidDepth_m) ++far;
+    }
+  }
+  if (2 * far <= positive) return 0;
+  std::vector<float> depths;
+  for (const float z : cv::Mat_<float>(depth)) {
+    if (std::isfinite(z) && z > 0) depths.push_back(z);
+  }
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle <= kFarthestIndoors_mm ? *middle : 0;
+}
+
+// Depth must be one floating-point channel, Y, or three, R, G and B.
+Expected<void> CheckDepthChannels(const fs::path& path) {
+  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
+  std::set<std::string> names;
+  for (const ExrChannel& channel : ExrChannels(bytes)) {
+    names.insert(channel.name);
+    if (channel.type == ExrType::kInteger) {
+      return DataError("{}: depth of an integer type (channel {}), expected 32-bit float metres",
+                       path.string(), channel.name);
+    }
+  }
+  if (names.empty()) return {};  // not an EXR file: the decoder says what it is
+  const bool colours = names.contains("R") && names.contains("G") && names.contains("B");
+  if (!colours && names != std::set<std::string>{"Y"}) {
+    return DataError("{}: depth in channels {}, expected Y, or R, G and B", path.string(),
+                     fmt::join(names, " "));
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<std::string> EncodeColour(const cv::Mat& colour, const std::string& file) {
+  if (colour.type() != CV_8UC3) {
+    return DataError("{}: the colour image is {}, expected 8-bit RGB", file, TypeName(colour));
+  }
+  return Encode(".png", SwapRedAndBlue(colour), {}, file);
+}
+
+Expected<std::string> EncodeDepth(const cv::Mat& depth, const std::string& file) {
+  if (depth.type() != CV_32FC1) {
+    return DataError("{}: the depth image is {}, expected 32-bit float with 1 channel", file,
+                     TypeName(depth));
+  }
+  EnableExr();
+  return Encode(".exr", depth,
+                {cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT, cv::IMWRITE_EXR_COMPRESSION,
+                 cv::IMWRITE_EXR_COMPRESSION_ZIP},
+                file);
+}
+
+Expected<std::string> EncodeMask(const cv::Mat& mask, const std::string& file) {
+  if (mask.type() != CV_16UC1) {
+    return DataError("{}: the mask is {}, expected 16-bit unsigned with 1 channel", file,
+                     TypeName(mask));
+  }
+  double largest = 0;
+  cv::minMaxLoc(mask, nullptr, &largest);
+  if (largest > 255) {
+    return DataError("{}: the mask holds id {}, a Co-Fusion mask holds 0 to 255", file, largest);
+  }
+  cv::Mat bytes;
+  mask.convertTo(bytes, CV_8U);
+  return Encode(".png", bytes, {}, file);
+}
+
+Expected<cv::Mat> ReadColour(const fs::path& path, cv::Size expected) {
+  TSDFPP_ASSIGN(const cv::Mat image, Decode(path, expected));
+  if (image.type() != CV_8UC3 && image.type() != CV_8UC4) {
+    return DataError("{}: the image is {}, expected 8-bit RGB", path.string(), TypeName(image));
+  }
+  return SwapRedAndBlue(image);
+}
+
+Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
+  EnableExr();
+  std::error_code code;
+  if (!fs::exists(path, code)) {
+    for (const char* extension : {".png", ".pgm", ".tiff", ".tif"}) {
+      const fs::path other = fs::path(path).replace_extension(extension);
+      if (fs::exists(other, code)) {
+        return DataError("{}: depth of an integer type, expected {} in 32-bit float metres",
+                         other.string(), path.filename().string());
+      }
+    }
+  }
+  if (fs::exists(path, code)) TSDFPP_RETURN_IF_ERROR(CheckDepthChannels(path));
+  TSDFPP_ASSIGN(cv::Mat depth, Decode(path, expected));
+  if (depth.depth() != CV_32F) {
+    return DataError("{}: depth is {}, expected 32-bit float metres", path.string(),
+                     TypeName(depth));
+  }
+  if (depth.channels() >= 3) {
+    cv::Mat channel;
+    if (!TakeEqualChannel<float>(depth, channel)) {
+      return DataError("{}: depth has {} channels that differ, expected one or three equal ones",
+                       path.string(), depth.channels());
+    }
+    depth = channel;
+  } else if (depth.channels() != 1) {
+    return DataError("{}: depth has {} channels, expected one or three equal ones", path.string(),
+                     depth.channels());
+  }
+  if (const float median = MillimetreMedian(depth); median > 0) {
+    return DataError(
+        "{}: the median depth is {:.0f}, which looks like millimetres, expected metres",
+        path.string(), median);
+  }
+  return depth;
+}
+
+Expected<cv::Mat> ReadMask(const fs::path& path, cv::Size expected) {
+  TSDFPP_ASSIGN(cv::Mat mask, Decode(path, expected));
+  if (mask.depth() != CV_8U || mask.channels() == 2) {
+    return DataError("{}: the mask is {}, expected 8-bit grey ids", path.string(), TypeName(mask));
+  }
+  if (mask.channels() >= 3) {
+    cv::Mat channel;
+    if (!TakeEqualChannel<std::uint8_t>(mask, channel)) {
+      return DataError(
+          "{}: the mask is coloured, expected ids as 8-bit grey or as RGB with equal channels",
+          path.string());
+    }
+    mask = channel;
+  }
+  cv::Mat ids;
+  mask.convertTo(ids, CV_16U);
+  return ids;
+}
+
+}  // namespace tsdfpp

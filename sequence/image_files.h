@@ -1,0 +1,31 @@
+// The three images of a frame as files: 8-bit RGB PNG, 32-bit float EXR, 8-bit grey PNG. What is
+// encoded and decoded again has the same bytes.
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "core/error.h"
+
+namespace tsdfpp {
+
+// The bytes of the file. `file` is named in errors. Errors: kData where the image has another type
+// than its Frame field (core/types.h) or a mask holds an id over 255, kEnvironment where the codec
+// fails.
+Expected<std::string> EncodeColour(const cv::Mat& colour, const std::string& file);
+Expected<std::string> EncodeDepth(const cv::Mat& depth, const std::string& file);  // lossless
+Expected<std::string> EncodeMask(const cv::Mat& mask, const std::string& file);
+
+// Errors of the readers, all kData, naming the file: missing, cannot be decoded, of another size
+// than `expected` (an empty size accepts any), of another type.
+
+// CV_8UC3, red-green-blue; an alpha channel is dropped.
+Expected<cv::Mat> ReadColour(const std::filesystem::path& path, cv::Size expected);
+// CV_32FC1, metres; of three equal channels one is taken. Also an error where the median of the
+// positive depths says that the unit is the millimetre.
+Expected<cv::Mat> ReadDepth(const std::filesystem::path& path, cv::Size expected);
+// CV_16UC1 ids from 8-bit grey, or from 8-bit RGB whose channels are equal.
+Expected<cv::Mat> ReadMask(const std::filesystem::path& path, cv::Size expected);
+
+}  // namespace tsdfpp

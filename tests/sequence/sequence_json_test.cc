@@ -1,0 +1,80 @@
+#include "sequence/sequence_json.h"
+
+#include <gtest/gtest.h>
+
+#include "core/files.h"
+#include "tests/core/temp_folder.h"
+#include "tests/sequence/memory_source.h"
+
+namespace tsdfpp {
+namespace {
+
+using test::MemorySource;
+using test::SomeGenerator;
+using test::TempFolder;
+
+SequenceRecord SomeRecord() {
+  return {MemorySource().info(), SomeGenerator(), {{"colour/Color0001.png", "00000000000000ff"}}};
+}
+
+// The values published with the algorithm (isthe.com/chongo/tech/comp/fnv, test vectors).
+TEST(SequenceJson, HashesAreFnv1a64) {
+  EXPECT_EQ(HashText(""), "cbf29ce484222325");
+  EXPECT_EQ(HashText("a"), "af63dc4c8601ec8c");
+  EXPECT_EQ(HashText("foobar"), "85944171f73967e8");
+}
+
+TEST(SequenceJson, RoundTripKeepsEverything) {
+  const TempFolder folder;
+  for (const bool sparse : {false, true}) {
+    SequenceRecord record = SomeRecord();
+    if (sparse) {
+      record.info.reveal.reset();
+      record.generator.seed.reset();
+      record.hashes.clear();
+    }
+    ASSERT_TRUE(WriteFile(folder / "s.json", SequenceToJson(record)).has_value());
+    const auto read = ReadSequenceJson(folder / "s.json");
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    test::ExpectSame(read->info, record.info);
+    EXPECT_EQ(read->generator, record.generator);
+    EXPECT_EQ(read->hashes, record.hashes);
+  }
+}
+
+// Replaces the first `from` in our own file by `to` and returns what the reader says.
+std::string SentenceAfter(const std::string& from, const std::string& to) {
+  const TempFolder folder;
+  std::string text = SequenceToJson(SomeRecord());
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+  EXPECT_TRUE(WriteFile(folder / "s.json", text).has_value());
+  const auto read = ReadSequenceJson(folder / "s.json");
+  if (read) return "";
+  EXPECT_EQ(read.error().kind, ErrorKind::kData);
+  const std::string file = (folder / "s.json").string() + ": ";
+  EXPECT_TRUE(read.error().message.starts_with(file)) << read.error().message;
+  return read.error().message.substr(file.size());
+}
+
+TEST(SequenceJson, BadFilesAreNamed) {
+  EXPECT_EQ(SentenceAfter("{", "["), "not a JSON object");
+  EXPECT_EQ(SentenceAfter("\"generator\": \"tsdfpp\"", "\"generator\": \"other\""),
+            "'generator' is not \"tsdfpp\"");
+  EXPECT_EQ(SentenceAfter("\"schema_version\": 1", "\"schema_version\": 2"),
+            "'schema_version' is not 1, the one that this program reads");
+  EXPECT_EQ(SentenceAfter("\"frame_count\": 4", "\"frame_count\": 0"),
+            "expected rate_hz and frame_count over 0 and first_index 0 or more");
+  for (const auto& [from, to, word] : {std::tuple("\"rate_hz\"", "\"rate\"", "rate_hz"),
+                                       {"\"id\": 1", "\"id\": 70001", "70001"},
+                                       {"\"name\": \"car\"", "\"name\": 3", "string"},
+                                       {"\"fnv1a64\"", "\"md5\"", "fnv1a64"}}) {
+    const std::string sentence = SentenceAfter(from, to);
+    EXPECT_TRUE(sentence.starts_with("a field is missing or of another type (")) << sentence;
+    EXPECT_NE(sentence.find(word), std::string::npos) << sentence;
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp
