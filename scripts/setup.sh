@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# Installs what tsdfpp needs on a Debian 12: packages, and MuJoCo into .deps/. Idempotent; quick the second time.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+
+as_root() {
+  if [ "$(id -u)" = 0 ]; then
+    "$@"
+  elif command -v sudo >/dev/null; then
+    sudo "$@"
+  else
+    say "packages are missing and neither root nor sudo is at hand; as root, run: $*"
+    exit 3
+  fi
+}
+
+if [ "$(. /etc/os-release && echo "$ID ${VERSION_ID:-}")" != "debian 12" ]; then
+  say "this is not Debian 12; the package names and versions below may not fit"
+fi
+
+mapfile -t wanted < <(grep -vE '^(#|$)' scripts/debian-packages.txt)
+missing=()
+for package in "${wanted[@]}"; do
+  state=$(dpkg-query -W -f '${db:Status-Status}' "${package%%=*}" 2>/dev/null || true)
+  [ "$state" = installed ] || missing+=("$package")
+done
+if [ ${#missing[@]} -gt 0 ]; then
+  say "installing ${#missing[@]} Debian packages: ${missing[*]%%=*}"
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get update -qq
+  # libpcl-dev alone reaches VTK and Qt; without recommends it is still some 2 GB.
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+fi
+
+mujoco_version=$(sed -n 's/^mujoco==\([0-9.]*\).*/\1/p' scripts/mujoco-requirements.txt)
+if [ -n "${MUJOCO_ROOT:-}" ]; then
+  say "MuJoCo: MUJOCO_ROOT is set, nothing is fetched"
+elif [ ! -f ".deps/mujoco/lib/libmujoco.so.$mujoco_version" ]; then
+  say "fetching MuJoCo $mujoco_version"
+  scratch=$(mktemp -d)
+  trap 'rm -rf "$scratch"' EXIT
+  python3 -m pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: --require-hashes \
+    --python-version 3.11 --implementation cp --platform "manylinux_2_28_$(uname -m)" \
+    --platform "manylinux_2_27_$(uname -m)" --dest "$scratch" -r scripts/mujoco-requirements.txt
+  python3 -m zipfile -e "$scratch"/mujoco-*.whl "$scratch/wheel"
+  mkdir -p "$scratch/mujoco/lib"
+  cp -r "$scratch/wheel/mujoco/include" "$scratch/mujoco/include"
+  cp "$scratch/wheel/mujoco/libmujoco.so.$mujoco_version" "$scratch/mujoco/lib/"
+  ln -s "libmujoco.so.$mujoco_version" "$scratch/mujoco/lib/libmujoco.so"
+  cp "$scratch"/wheel/mujoco-*.dist-info/licenses/LICENSE "$scratch/mujoco/"
+  rm -rf .deps/mujoco
+  mkdir -p .deps
+  mv "$scratch/mujoco" .deps/mujoco
+fi

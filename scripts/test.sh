@@ -1,0 +1,7 @@
+#!/usr/bin/env bash
+# From a bare Debian 12 to all tests passed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bash scripts/setup.sh
+bash scripts/build.sh
+ctest --test-dir build/release --output-on-failure -j "$(nproc)"
