@@ -1,0 +1,44 @@
+// Method `tsdf++/anchored`: an object's volume stays in its own frame, the global index alone moves
+// (docs/map.md, "The index of tsdf++/anchored").
+#pragma once
+
+#include "mapper/layered_map.h"
+
+namespace tsdfpp {
+
+class AnchoredMap final : public LayeredMap {
+ public:
+  AnchoredMap(const MapConfig& config, int layers);
+
+  void SetObjectPose(InstanceId id, const Pose& T_WO) override;
+  void Fuse(const Frame& frame, const cv::Mat& labels) override;
+  void Remove(InstanceId id) override;
+  std::unique_ptr<MapRepresentation> Clone() const override;
+  std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
+  std::vector<Eigen::Vector3i> ListedVoxels() const override;
+  MapMemory Memory() const override;
+  TriangleMesh SceneMesh() const override;
+
+ protected:
+  InstanceId ActiveAt(const Index3& voxel) const override;
+
+ private:
+  // K ids for each voxel, active first, kNoInstance where unused.
+  using IndexBlock = std::vector<InstanceId>;
+  struct Participants;
+
+  // Recomputes the index where `dirty_` says that its inputs changed. Logically const: the index is
+  // a function of volumes and poses.
+  void RefreshIndex() const;
+  void AddReach(InstanceId id) const;
+  IndexBlock ComputeBlock(const Index3& index, const Participants& participants) const;
+
+  int layers_;
+  mutable BlockGrid<IndexBlock> index_;
+  mutable std::map<InstanceId, std::vector<Index3>>
+      reach_;  // global blocks that a moved object can list
+  mutable std::vector<Index3> dirty_;
+  mutable std::vector<InstanceId> moved_;  // objects whose whole reach is dirty
+};
+
+}  // namespace tsdfpp

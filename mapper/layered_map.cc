@@ -1,0 +1,152 @@
+#include "mapper/layered_map.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "mapper/marching_cubes.h"
+#include "mapper/mesh_tools.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kTrianglesPerTask = 4096;
+
+}  // namespace
+
+std::vector<Eigen::Vector3i> SortedVoxels(std::vector<Index3> voxels) {
+  std::sort(voxels.begin(), voxels.end());
+  std::vector<Eigen::Vector3i> sorted;
+  sorted.reserve(voxels.size());
+  for (const Index3& v : voxels) sorted.emplace_back(v.x, v.y, v.z);
+  return sorted;
+}
+
+std::vector<Eigen::Vector3i> ObservedVoxelsOf(const TsdfGrid& grid) {
+  std::vector<Index3> voxels;
+  for (const auto& entry : grid.entries()) {
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      if (Bit(entry.block->observed, place)) voxels.push_back(VoxelAt(entry.index, place));
+    }
+  }
+  return SortedVoxels(std::move(voxels));
+}
+
+std::optional<VoxelValue> ValueOf(const TsdfGrid& grid, const Index3& voxel) {
+  const TsdfBlock* block = grid.Find(BlockOf(voxel));
+  const int place = PlaceInBlock(voxel);
+  const auto i = static_cast<std::size_t>(place);
+  if (block == nullptr || block->weight[i] <= 0) return std::nullopt;
+  return VoxelValue{block->distance[i], block->weight[i], block->ColourAt(place)};
+}
+
+std::vector<InstanceId> LayeredMap::Objects() const {
+  std::vector<InstanceId> ids;
+  for (const auto& [id, volume] : volumes_) {
+    if (!volume.grid.empty()) ids.push_back(id);
+  }
+  return ids;
+}
+
+Pose LayeredMap::ObjectLattice(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  return volume == volumes_.end() ? Pose::Identity() : volume->second.T_WL;
+}
+
+TriangleMesh LayeredMap::ObjectMesh(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  if (volume == volumes_.end()) return {};
+  TriangleMesh mesh = ExtractMesh(volume->second.grid, config_.voxel());
+  if (!volume->second.lattice_is_world) Transform(mesh, volume->second.T_WL);
+  return mesh;
+}
+
+TriangleMesh LayeredMap::SceneMesh() const {
+  struct Reader {
+    VoxelReader reader;
+    Pose T_LW;
+    bool lattice_is_world;
+  };
+  std::map<InstanceId, Reader> readers;
+  for (const auto& [id, volume] : volumes_) {
+    readers.emplace(
+        id, Reader{VoxelReader(volume.grid), volume.T_WL.inverse(), volume.lattice_is_world});
+  }
+  const auto distance_at = [&](InstanceId id, const Index3& v) {
+    const Reader& of = readers.at(id);
+    const Eigen::Vector3d voxel(v.x, v.y, v.z);
+    const Eigen::Vector3d q =
+        of.lattice_is_world
+            ? voxel
+            : Eigen::Vector3d(of.T_LW * (voxel * config_.voxel_m) / config_.voxel_m);
+    return DistanceAt(FindCorners(of.reader, q));
+  };
+  const float voxel = config_.voxel();
+  TriangleMesh scene;
+  for (const InstanceId id : Objects()) {
+    const TriangleMesh mesh = ObjectMesh(id);
+    std::vector<std::uint8_t> keep(mesh.triangles.size(), 1);
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, keep.size(), kTrianglesPerTask),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const auto& t = mesh.triangles[i];
+            const Eigen::Vector3f& a = mesh.vertices[t[0]];
+            const Eigen::Vector3f& b = mesh.vertices[t[1]];
+            const Eigen::Vector3f& c = mesh.vertices[t[2]];
+            const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
+            const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
+            const Index3 v = NearestVoxel(outwards, voxel);
+            const InstanceId active = ActiveAt(v);
+            if (active == kNoInstance || active == id) continue;
+            const auto distance = distance_at(active, v);
+            if (distance && *distance < -voxel) keep[i] = 0;
+          }
+        },
+        tbb::simple_partitioner());
+    Append(scene, KeepFaces(mesh, keep), id);
+  }
+  return scene;
+}
+
+std::optional<VoxelValue> LayeredMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {
+  const auto volume = volumes_.find(id);
+  if (volume == volumes_.end()) return std::nullopt;
+  return ValueOf(volume->second.grid, ToIndex3(voxel));
+}
+
+std::vector<Eigen::Vector3i> LayeredMap::ObservedVoxels(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  if (volume == volumes_.end()) return {};
+  return ObservedVoxelsOf(volume->second.grid);
+}
+
+std::vector<Index3> LayeredMap::WithNeighbours(const TsdfGrid& grid, std::vector<Index3> blocks) {
+  std::vector<std::uint64_t> keys;
+  keys.reserve(blocks.size() * 27);
+  for (const Index3& block : blocks) {
+    for (int z = -1; z <= 1; ++z) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x) {
+          const Index3 at = block + Index3{x, y, z};
+          if (grid.Find(at) != nullptr) keys.push_back(PackIndex(at));
+        }
+      }
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  blocks.clear();
+  for (const std::uint64_t key : keys) blocks.push_back(UnpackIndex(key));
+  return blocks;
+}
+
+MapMemory LayeredMap::VolumeMemory() const {
+  MapMemory memory;
+  for (const auto& [id, volume] : volumes_) {
+    memory.blocks += volume.grid.size();
+    memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
+  }
+  return memory;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,52 @@
+// Method `tsdf++/literal`: the paper's sentences word for word (docs/map.md). Reported, never
+// gated.
+#pragma once
+
+#include "mapper/map_representation.h"
+#include "mapper/volume_fusion.h"
+
+namespace tsdfpp {
+
+class LiteralMap final : public MapRepresentation {
+ public:
+  explicit LiteralMap(const MapConfig& config) : config_(config) {}
+
+  void SetObjectPose(InstanceId id, const Pose& T_WO) override;
+  void Fuse(const Frame& frame, const cv::Mat& labels) override;
+  void Remove(InstanceId id) override;
+  std::unique_ptr<MapRepresentation> Clone() const override;
+  std::vector<InstanceId> Objects() const override;
+  Pose ObjectLattice(InstanceId id) const override;
+  TriangleMesh ObjectMesh(InstanceId id) const override;
+  TriangleMesh SceneMesh() const override;
+  std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
+  std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
+  std::vector<Eigen::Vector3i> ListedVoxels() const override;
+  MapMemory Memory() const override;
+
+ private:
+  struct Entry {
+    InstanceId id = kNoInstance;
+    std::int16_t confidence = 0;
+  };
+  struct ListBlock {
+    std::array<Entry, kBlockVoxels> active{};
+    std::array<Entry, kBlockVoxels> inactive{};
+  };
+  struct Task {
+    Index3 index;
+    ListBlock* lists = nullptr;
+    std::vector<InstanceId> targets;  // objects that take an observation here, increasing
+  };
+
+  void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
+  void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
+  void Unlist(InstanceId id);
+
+  MapConfig config_;
+  ObjectVolumes volumes_;
+  BlockGrid<ListBlock> lists_;
+};
+
+}  // namespace tsdfpp

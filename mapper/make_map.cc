@@ -1,0 +1,28 @@
+#include <cstdlib>
+
+#include "mapper/anchored_map.h"
+#include "mapper/literal_map.h"
+#include "mapper/map_representation.h"
+#include "mapper/single_field_map.h"
+#include "mapper/tsdfpp_map.h"
+
+namespace tsdfpp {
+
+std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& config) {
+  if (!config.Validate()) std::abort();
+  switch (method) {
+    case Method::kTsdf:
+      return std::make_unique<SingleFieldMap>(config, MoveRule::kOverwrite);
+    case Method::kTsdfMin:
+      return std::make_unique<SingleFieldMap>(config, MoveRule::kKeepNearer);
+    case Method::kTsdfpp:
+      return std::make_unique<TsdfppMap>(config, LayersOf(method, config));
+    case Method::kTsdfppLiteral:
+      return std::make_unique<LiteralMap>(config);
+    case Method::kTsdfppAnchored:
+      return std::make_unique<AnchoredMap>(config, LayersOf(method, config));
+  }
+  std::abort();
+}
+
+}  // namespace tsdfpp

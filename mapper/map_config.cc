@@ -1,0 +1,118 @@
+#include "mapper/map_config.h"
+
+#include <array>
+#include <cmath>
+
+#include "mapper/voxel_list.h"
+
+namespace tsdfpp {
+namespace {
+
+struct Named {
+  Method method;
+  std::string_view name;
+};
+constexpr std::array<Named, 5> kMethods{{{Method::kTsdf, "tsdf"},
+                                         {Method::kTsdfMin, "tsdf/min"},
+                                         {Method::kTsdfpp, "tsdf++"},
+                                         {Method::kTsdfppLiteral, "tsdf++/literal"},
+                                         {Method::kTsdfppAnchored, "tsdf++/anchored"}}};
+
+Expected<void> InRange(std::string_view field, double value, double lowest, double highest) {
+  if (std::isfinite(value) && value >= lowest && value <= highest) return {};
+  return UsageError("map setting '{}' is {}, expected {} to {}", field, value, lowest, highest);
+}
+
+}  // namespace
+
+std::string_view MethodName(Method method) {
+  for (const Named& named : kMethods) {
+    if (named.method == method) return named.name;
+  }
+  std::abort();
+}
+
+std::vector<Method> AllMethods() {
+  std::vector<Method> methods;
+  for (const Named& named : kMethods) methods.push_back(named.method);
+  return methods;
+}
+
+Expected<Method> MethodFromName(std::string_view name) {
+  std::string known;
+  for (const Named& named : kMethods) {
+    if (named.name == name || (!name.empty() && named.name == fmt::format("tsdf++/{}", name))) {
+      return named.method;
+    }
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", named.name);
+  }
+  return UsageError("method '{}' is unknown, expected one of {}", name, known);
+}
+
+Expected<void> MapConfig::Validate() const {
+  TSDFPP_RETURN_IF_ERROR(InRange("voxel_m", voxel_m, 0.0005, 1.0));
+  TSDFPP_RETURN_IF_ERROR(InRange("trunc_front_voxels", trunc_front_voxels, 1, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("trunc_back_voxels", trunc_back_voxels, 1, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("layers", layers, 0, kMaxLayers));
+  TSDFPP_RETURN_IF_ERROR(InRange("weight_cap", weight_cap, 1, 60000));
+  TSDFPP_RETURN_IF_ERROR(InRange("confidence_cap", confidence_cap, 1, 10000));
+  TSDFPP_RETURN_IF_ERROR(InRange("moved_confidence", moved_confidence, 1, 10000));
+  return {};
+}
+
+Expected<void> MapConfig::SetProfile(std::string_view profile) {
+  if (profile != "paper" && profile != "close") {
+    return UsageError("profile '{}' is unknown, expected paper or close", profile);
+  }
+  trunc_front_voxels = 10;
+  trunc_back_voxels = profile == "paper" ? 10 : 3;
+  return {};
+}
+
+Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::string& where) {
+  MapConfig config;
+  TomlReader reader(table, where);
+  reader.Get("voxel_m", config.voxel_m)
+      .Get("trunc_front_voxels", config.trunc_front_voxels)
+      .Get("trunc_back_voxels", config.trunc_back_voxels)
+      .Get("layers", config.layers)
+      .Get("weight_cap", config.weight_cap)
+      .Get("confidence_cap", config.confidence_cap)
+      .Get("moved_confidence", config.moved_confidence)
+      .Get("contradiction", config.contradiction)
+      .Get("relist_on_removal", config.relist_on_removal);
+  TSDFPP_RETURN_IF_ERROR(reader.Finish());
+  if (auto valid = config.Validate(); !valid) {
+    return UsageError("{}: {}", where, valid.error().message);
+  }
+  return config;
+}
+
+toml::table MapConfig::ToToml() const {
+  return toml::table{{"voxel_m", voxel_m},
+                     {"trunc_front_voxels", trunc_front_voxels},
+                     {"trunc_back_voxels", trunc_back_voxels},
+                     {"layers", layers},
+                     {"weight_cap", weight_cap},
+                     {"confidence_cap", confidence_cap},
+                     {"moved_confidence", moved_confidence},
+                     {"contradiction", contradiction},
+                     {"relist_on_removal", relist_on_removal}};
+}
+
+int LayersOf(Method method, const MapConfig& config) {
+  switch (method) {
+    case Method::kTsdf:
+    case Method::kTsdfMin:
+      return 1;
+    case Method::kTsdfppLiteral:
+      return 2;
+    case Method::kTsdfpp:
+      return config.layers == 0 ? 2 : config.layers;
+    case Method::kTsdfppAnchored:
+      return config.layers == 0 ? 4 : config.layers;
+  }
+  std::abort();
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,49 @@
+// The settings of a map, shared by all methods. docs/map.md defines each rule they steer.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "core/toml_reader.h"
+
+namespace tsdfpp {
+
+enum class Method { kTsdf, kTsdfMin, kTsdfpp, kTsdfppLiteral, kTsdfppAnchored };
+
+// "tsdf", "tsdf/min", "tsdf++", "tsdf++/literal", "tsdf++/anchored".
+std::string_view MethodName(Method method);
+std::vector<Method> AllMethods();
+// Errors: kUsage, naming the methods there are. "anchored" and "literal" are understood as well.
+Expected<Method> MethodFromName(std::string_view name);
+
+struct MapConfig {
+  double voxel_m = 0.01;
+  double trunc_front_voxels = 10;  // F / h
+  double trunc_back_voxels = 3;    // B / h
+  int layers = 0;                  // K; 0 is the method's own default (LayersOf)
+  int weight_cap = 200;            // observations after which a voxel forgets
+  int confidence_cap = 10;         // votes at which a listing saturates
+  int moved_confidence = 1;        // of an object in a voxel that it was moved to
+  bool contradiction = true;  // tsdf++ and anchored: pixels of others clear what o wrongly claims
+  bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped
+
+  float voxel() const { return static_cast<float>(voxel_m); }
+  float front() const { return static_cast<float>(trunc_front_voxels * voxel_m); }
+  float back() const { return static_cast<float>(trunc_back_voxels * voxel_m); }
+
+  // Errors: kUsage, naming the field, what was found and what was expected.
+  Expected<void> Validate() const;
+  // Sets "paper" (10 in front, 10 behind) or "close" (10, 3). Errors: kUsage.
+  Expected<void> SetProfile(std::string_view profile);
+  // `where` names the file in errors.
+  static Expected<MapConfig> FromToml(const toml::table& table, const std::string& where);
+  toml::table ToToml() const;
+  bool operator==(const MapConfig&) const = default;
+};
+
+// K for this method: 2 for tsdf++ and literal (the paper's), 4 for anchored, 1 for one field.
+int LayersOf(Method method, const MapConfig& config);
+
+}  // namespace tsdfpp

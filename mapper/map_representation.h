@@ -1,0 +1,83 @@
+// The one interface behind which the maps differ (paper III-A, III-E, III-F); the pipeline around
+// it is shared, so a comparison isolates the map. The rules are in docs/map.md.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/types.h"
+#include "mapper/map_config.h"
+
+namespace tsdfpp {
+
+// What a map holds about one object (or, for one field, about all) at one voxel.
+struct VoxelValue {
+  float distance_m = 0;  // signed, positive in front of the surface
+  float weight = 0;      // observations, above 0
+  Colour colour{};
+};
+
+// One entry of a voxel's list; the first entry is the active object.
+struct Listing {
+  InstanceId id = kNoInstance;
+  int confidence = 0;  // 0 where the method keeps none
+  bool operator==(const Listing&) const = default;
+};
+
+struct MapMemory {
+  std::size_t blocks = 0;  // of voxel data and of lists
+  std::size_t bytes = 0;   // of those blocks and their tables
+};
+
+class MapRepresentation {
+ public:
+  virtual ~MapRepresentation() = default;
+
+  // Paper III-E. The first pose given to an object is its pose at birth and moves nothing; nor does
+  // one whose numbers equal the last. Objects must be given in increasing id within a frame.
+  virtual void SetObjectPose(InstanceId id, const Pose& T_WO) = 0;
+
+  // Paper III-F. Fuses depth, colour and labels (CV_16UC1, object ids as associated with the map;
+  // pixels kNoInstance are left out) of a frame, whose own mask is not read.
+  virtual void Fuse(const Frame& frame, const cv::Mat& labels) = 0;
+
+  // Takes the object out of the map; unknown ids change nothing.
+  virtual void Remove(InstanceId id) = 0;
+
+  // A deep copy.
+  virtual std::unique_ptr<MapRepresentation> Clone() const = 0;
+
+  // Objects in the map, increasing ids, those that Remove() took out excluded.
+  virtual std::vector<InstanceId> Objects() const = 0;
+
+  // T_WL, where an object's lattice is now in the world; the identity for methods that move values.
+  virtual Pose ObjectLattice(InstanceId id) const = 0;
+
+  // The whole surface of one object, hidden parts included, in the world at its current pose,
+  // coloured. One-field methods give the triangles labelled so.
+  virtual TriangleMesh ObjectMesh(InstanceId id) const = 0;
+
+  // The visible scene: coloured, with face_ids.
+  virtual TriangleMesh SceneMesh() const = 0;
+
+  // The object's voxel at an index of its lattice; nothing where it is unobserved. One field: the
+  // voxel if it is labelled so.
+  virtual std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const = 0;
+
+  // The objects listed at a global voxel, the active one first.
+  virtual std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const = 0;
+
+  // Every voxel of the lattice frame that is observed for this object, sorted by (z, y, x).
+  virtual std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const = 0;
+
+  // Every global voxel with a non-empty list, sorted by (z, y, x).
+  virtual std::vector<Eigen::Vector3i> ListedVoxels() const = 0;
+
+  virtual MapMemory Memory() const = 0;
+};
+
+// The config must be valid (MapConfig::Validate).
+std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& config);
+
+}  // namespace tsdfpp

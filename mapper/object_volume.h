@@ -1,0 +1,91 @@
+// The TSDF of one object in its own lattice (paper III-A, "object volume").
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mapper/tsdf_block.h"
+
+namespace tsdfpp {
+
+struct ObjectVolume {
+  TsdfGrid grid;
+  std::optional<Pose> T_WO_birth;  // the first pose that the object was given
+  std::optional<Pose> T_WO;        // the last
+  Pose T_WL = Pose::Identity();    // where the lattice is; moves only for anchored volumes
+  bool lattice_is_world = true;    // T_WL is exactly the identity
+};
+
+// Whether the numbers of two poses are the same.
+inline bool SameNumbers(const Pose& a, const Pose& b) { return a.matrix() == b.matrix(); }
+
+// Reads voxels of a grid by index through a dense table of block pointers over the grid's bounding
+// box: for many reads of one object. The grid must not change meanwhile.
+class VoxelReader {
+ public:
+  explicit VoxelReader(const TsdfGrid& grid);
+
+  // The block, or nullptr.
+  const TsdfBlock* BlockAt(const Index3& block) const {
+    const Index3 at{block.x - low_.x, block.y - low_.y, block.z - low_.z};
+    if (at.x < 0 || at.y < 0 || at.z < 0 || at.x >= size_.x || at.y >= size_.y || at.z >= size_.z) {
+      return nullptr;
+    }
+    if (blocks_.empty()) return grid_->Find(block);
+    return blocks_[(static_cast<std::size_t>(at.z) * static_cast<std::size_t>(size_.y) +
+                    static_cast<std::size_t>(at.y)) *
+                       static_cast<std::size_t>(size_.x) +
+                   static_cast<std::size_t>(at.x)];
+  }
+  bool empty() const { return grid_->empty(); }
+  // Lowest and highest block index, both included.
+  Index3 low() const { return low_; }
+  Index3 high() const { return {low_.x + size_.x - 1, low_.y + size_.y - 1, low_.z + size_.z - 1}; }
+
+ private:
+  const TsdfGrid* grid_;
+  Index3 low_;
+  Index3 size_;
+  std::vector<const TsdfBlock*> blocks_;  // empty where the box is too large for a table
+};
+
+// The eight corners around a point, and where it lies between them.
+struct Corners {
+  std::array<const TsdfBlock*, 8> block{};  // corner x + 2 y + 4 z; nullptr where there is none
+  std::array<int, 8> place{};
+  std::array<float, 3> fraction{};
+  Index3 base;
+};
+
+// Corners of the point q, in voxels of the lattice.
+Corners FindCorners(const VoxelReader& reader, const Eigen::Vector3d& q);
+
+// The order of operations of docs/map.md, "Trilinear interpolation".
+float Trilinear(const std::array<float, 8>& corner, const std::array<float, 3>& fraction);
+
+// The distance at a point, from the corners with a non-zero coefficient; nothing where one of these
+// is unobserved.
+std::optional<float> DistanceAt(const Corners& corners);
+
+// docs/map.md, "Cover". `back` in metres; `distance` is set where it is defined.
+bool Covers(const VoxelReader& reader, const Corners& corners, float back,
+            std::optional<float>& distance);
+
+// The voxel resampled at a point, nothing unless all eight neighbours are observed (paper III-E).
+struct Resampled {
+  float distance = 0;
+  float weight = 0;
+  std::array<std::uint16_t, 3> colour{};
+  std::uint16_t colour_count = 0;
+};
+std::optional<Resampled> ResampleAt(const Corners& corners);
+
+// Moves the values of a volume by T_rel (paper III-E): the new grid, masks up to date but for
+// `cover`.
+TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back);
+
+// Blocks (in Index3's order) whose voxels T * (voxels of the reader's blocks) can touch: the box of
+// the transformed blocks' corners, one voxel larger on all sides.
+std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, double voxel_m);
+
+}  // namespace tsdfpp

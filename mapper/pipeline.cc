@@ -1,0 +1,93 @@
+#include "mapper/pipeline.h"
+
+#include <chrono>
+
+namespace tsdfpp {
+namespace {
+
+class StopWatch {
+ public:
+  // Seconds since the last call or the start.
+  double Lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+std::set<InstanceId> LabelsIn(const cv::Mat& labels) {
+  std::set<InstanceId> ids;
+  InstanceId last = kNoInstance;
+  for (int v = 0; v < labels.rows; ++v) {
+    const auto* row = labels.ptr<InstanceId>(v);
+    for (int u = 0; u < labels.cols; ++u) {
+      if (row[u] != last) ids.insert(last = row[u]);
+    }
+  }
+  ids.erase(kNoInstance);
+  return ids;
+}
+
+}  // namespace
+
+Expected<PoseSource> PoseSourceFromName(std::string_view name) {
+  if (name == "gt") return PoseSource::kGiven;
+  if (name == "icp") return PoseSource::kIcp;
+  return UsageError("pose source '{}' is unknown, expected gt or icp", name);
+}
+
+std::string_view PoseSourceName(PoseSource source) {
+  return source == PoseSource::kGiven ? "gt" : "icp";
+}
+
+Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
+    : config_(config), map_(MakeMap(config.method, config.map)) {
+  for (const ObjectInfo& object : objects) {
+    if (object.id != kBackground && !object.semantic_class.empty()) tracked_.insert(object.id);
+  }
+}
+
+std::map<InstanceId, Pose> Pipeline::Track(const Frame& frame) const {
+  std::map<InstanceId, Pose> motions;
+  for (const InstanceId id : LabelsIn(frame.mask)) {
+    if (!tracked_.contains(id)) continue;
+    if (!T_WO_.contains(id)) {
+      // First seen: its frame is its lattice, where it is.
+      motions.emplace(id, Pose::Identity());
+      continue;
+    }
+    const TriangleMesh model_W = map_->ObjectMesh(id);
+    const TrackResult result = TrackObject(SegmentPoints(frame, frame.mask, id, config_.icp),
+                                           model_W, config_.map.voxel_m, config_.icp);
+    motions.emplace(id, result.T_O);
+  }
+  return motions;
+}
+
+StepTimes Pipeline::Process(const Frame& frame) {
+  StepTimes times;
+  StopWatch watch;
+  if (config_.poses == PoseSource::kIcp) {
+    for (const auto& [id, T_O] : Track(frame)) {
+      const auto known = T_WO_.find(id);
+      T_WO_[id] = known == T_WO_.end() ? T_O : Pose(T_O * known->second);
+    }
+  } else {
+    for (const auto& [id, T_WO] : frame.T_WO) T_WO_[id] = T_WO;
+  }
+  times.track_s = watch.Lap();
+  for (const auto& [id, T_WO] : T_WO_) {
+    map_->SetObjectPose(id, T_WO);
+    trajectories_[id][frame.index] = T_WO;
+  }
+  times.update_poses_s = watch.Lap();
+  map_->Fuse(frame, frame.mask);
+  times.fuse_s = watch.Lap();
+  return times;
+}
+
+}  // namespace tsdfpp

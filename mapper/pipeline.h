@@ -1,0 +1,66 @@
+// The mapping pipeline, a frame at a time (paper section III): segment, associate, track, update
+// poses, fuse. With ground-truth masks the first two are the identity: the mask's ids are the map's
+// objects.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string_view>
+#include <vector>
+
+#include "mapper/icp_tracker.h"
+#include "mapper/map_representation.h"
+
+namespace tsdfpp {
+
+enum class PoseSource {
+  kGiven,  // Frame::T_WO
+  kIcp,    // tracked; Frame::T_WO is not read
+};
+
+// "gt" or "icp". Errors: kUsage.
+Expected<PoseSource> PoseSourceFromName(std::string_view name);
+std::string_view PoseSourceName(PoseSource source);
+
+struct PipelineConfig {
+  Method method = Method::kTsdfpp;
+  MapConfig map;
+  PoseSource poses = PoseSource::kGiven;
+  IcpConfig icp;
+};
+
+// Wall-clock seconds of the steps of one frame.
+struct StepTimes {
+  double track_s = 0;         // segments, object meshes, ICP; 0 with given poses
+  double update_poses_s = 0;  // paper III-E
+  double fuse_s = 0;          // paper III-F
+};
+
+class Pipeline {
+ public:
+  // `objects` are those of the sequence; only those with a semantic class are tracked (paper
+  // III-D). The config must be valid.
+  Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects);
+
+  // Maps one frame. The frame's mask must be there.
+  StepTimes Process(const Frame& frame);
+
+  const MapRepresentation& map() const { return *map_; }
+
+  // T_WO of each object as the map has it, by frame index. With ICP the object's frame O is its
+  // lattice: the identity where it was first seen.
+  const std::map<InstanceId, std::map<int, Pose>>& trajectories() const { return trajectories_; }
+
+ private:
+  // The relative motion of each tracked object that the frame shows, by id.
+  std::map<InstanceId, Pose> Track(const Frame& frame) const;
+
+  PipelineConfig config_;
+  std::set<InstanceId> tracked_;  // ids with a semantic class
+  std::unique_ptr<MapRepresentation> map_;
+  std::map<InstanceId, Pose> T_WO_;
+  std::map<InstanceId, std::map<int, Pose>> trajectories_;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,246 @@
+#include "mapper/single_field_map.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <set>
+
+#include "mapper/allocation.h"
+#include "mapper/layered_map.h"
+#include "mapper/marching_cubes.h"
+#include "mapper/mesh_tools.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kBlocksPerTask = 16;
+
+std::size_t At(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+SingleFieldMap::SingleFieldMap(const MapConfig& config, MoveRule rule)
+    : config_(config), rule_(rule) {}
+
+std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
+  return std::make_unique<SingleFieldMap>(*this);
+}
+
+void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  const FrameView view(frame, labels);
+  const auto world = [](InstanceId) { return Pose::Identity(); };
+  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world)) {
+    for (const Index3& index : indices) {
+      field_.FindOrAdd(index);
+      labels_.FindOrAdd(index);
+    }
+  }
+  const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
+  const auto& blocks = field_.entries();
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, blocks.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        BlockObservation observation;
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const Index3& index = blocks[i].index;
+          if (!ObserveBlock(view, T_CW, index, config_.voxel(), config_.back(), observation)) {
+            continue;
+          }
+          FuseBlock(view, observation, *blocks[i].block, *labels_.Find(index));
+          blocks[i].block->UpdateMasks(config_.back());
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
+                               TsdfBlock& block, LabelBlock& labels) const {
+  const float front = config_.front();
+  const auto weight_cap = static_cast<float>(config_.weight_cap);
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    const std::int32_t pixel = observation.pixel[i];
+    if (pixel < 0) continue;
+    const float s = observation.distance[i];
+    if (s > front) {
+      FuseVoxel(block, i, front, nullptr, weight_cap);
+      continue;
+    }
+    FuseVoxel(block, i, s, frame.colour + 3 * pixel, weight_cap);
+    const InstanceId observed = frame.label[pixel];
+    std::int16_t& confidence = labels.confidence[i];
+    if (labels.id[i] == observed) {
+      if (confidence < config_.confidence_cap) ++confidence;
+      continue;
+    }
+    if (labels.id[i] != kNoInstance && --confidence > 0) continue;
+    labels.id[i] = observed;
+    confidence = 1;
+    labels.ever |= EverBit(observed);
+  }
+}
+
+void SingleFieldMap::Vacate(InstanceId id) {
+  for (const auto& entry : labels_.entries()) {
+    LabelBlock& labels = *entry.block;
+    if ((labels.ever & EverBit(id)) == 0) continue;
+    TsdfBlock& block = *field_.Find(entry.index);
+    bool changed = false;
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      if (!IsObjectsVoxel(block, labels, i, id)) continue;
+      block.Clear(static_cast<int>(i));
+      labels.id[i] = kNoInstance;
+      labels.confidence[i] = 0;
+      changed = true;
+    }
+    if (changed) block.UpdateMasks(config_.back());
+  }
+}
+
+void SingleFieldMap::Remove(InstanceId id) {
+  Vacate(id);
+  T_WO_.erase(id);
+}
+
+void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
+  const auto [known, first] = T_WO_.emplace(id, T_WO);
+  if (first || SameNumbers(known->second, T_WO)) return;
+  const Pose T_rel = T_WO * std::exchange(known->second, T_WO).inverse();
+
+  // The sources: all that is observed and labelled so, free space included; and their labels.
+  TsdfGrid source;
+  BlockGrid<LabelBlock> source_labels;
+  for (const auto* entry : labels_.Sorted()) {
+    if ((entry->block->ever & EverBit(id)) == 0) continue;
+    auto block = std::make_unique<TsdfBlock>(*field_.Find(entry->index));
+    bool any = false;
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      if (entry->block->id[i] != id) block->weight[i] = 0;
+      any = any || block->weight[i] > 0;
+    }
+    if (!any) continue;
+    source.Add(entry->index, std::move(block));
+    source_labels.FindOrAdd(entry->index) = *entry->block;
+  }
+  Vacate(id);
+
+  const VoxelReader reader(source);
+  const Pose T_inverse = T_rel.inverse();
+  for (const Index3& index : BlocksTouchedBy(reader, T_rel, config_.voxel_m)) {
+    TsdfBlock* block = field_.Find(index);
+    LabelBlock* labels = labels_.Find(index);
+    bool changed = false;
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      const Index3 v = VoxelAt(index, place);
+      const Eigen::Vector3d q =
+          T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
+      const auto voxel = ResampleAt(FindCorners(reader, q));
+      if (!voxel || voxel->distance > config_.voxel()) continue;
+      if (block == nullptr) {
+        block = &field_.FindOrAdd(index);
+        labels = &labels_.FindOrAdd(index);
+      }
+      const std::size_t i = At(place);
+      if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
+          std::abs(block->distance[i]) <= std::abs(voxel->distance)) {
+        continue;
+      }
+      block->distance[i] = voxel->distance;
+      block->weight[i] = voxel->weight;
+      block->colour[i] = voxel->colour;
+      block->colour_count[i] = voxel->colour_count;
+      const Index3 nearest{static_cast<int>(std::floor(q.x() + 0.5)),
+                           static_cast<int>(std::floor(q.y() + 0.5)),
+                           static_cast<int>(std::floor(q.z() + 0.5))};
+      labels->id[i] = id;
+      labels->confidence[i] =
+          source_labels.Find(BlockOf(nearest))->confidence[At(PlaceInBlock(nearest))];
+      labels->ever |= EverBit(id);
+      changed = true;
+    }
+    if (changed) block->UpdateMasks(config_.back());
+  }
+}
+
+template <typename Function>
+void SingleFieldMap::ForEachVoxel(const Function& function) const {
+  for (const auto& entry : labels_.entries()) {
+    const TsdfBlock& block = *field_.Find(entry.index);
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      function(VoxelAt(entry.index, place), block.weight[At(place)] > 0,
+               entry.block->id[At(place)]);
+    }
+  }
+}
+
+std::vector<InstanceId> SingleFieldMap::Objects() const {
+  std::set<InstanceId> ids;
+  ForEachVoxel([&](const Index3&, bool observed, InstanceId id) {
+    if (observed && id != kNoInstance) ids.insert(id);
+  });
+  return {ids.begin(), ids.end()};
+}
+
+Pose SingleFieldMap::ObjectLattice(InstanceId) const { return Pose::Identity(); }
+
+TriangleMesh SingleFieldMap::SceneMesh() const {
+  TriangleMesh mesh = ExtractMesh(field_, config_.voxel());
+  mesh.face_ids.reserve(mesh.triangles.size());
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3f centroid =
+        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F;
+    const Index3 v = NearestVoxel(centroid, config_.voxel());
+    const LabelBlock* labels = labels_.Find(BlockOf(v));
+    const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
+    mesh.face_ids.push_back(id == kNoInstance ? kBackground : id);
+  }
+  return mesh;
+}
+
+TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {
+  const TriangleMesh scene = SceneMesh();
+  std::vector<std::uint8_t> keep(scene.triangles.size());
+  for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = scene.face_ids[i] == id ? 1 : 0;
+  TriangleMesh mesh = KeepFaces(scene, keep);
+  mesh.face_ids.clear();
+  return mesh;
+}
+
+std::optional<VoxelValue> SingleFieldMap::ValueAt(InstanceId id,
+                                                  const Eigen::Vector3i& voxel) const {
+  const LabelBlock* labels = labels_.Find(BlockOf(ToIndex3(voxel)));
+  if (labels == nullptr || labels->id[At(PlaceInBlock(ToIndex3(voxel)))] != id) {
+    return std::nullopt;
+  }
+  return ValueOf(field_, ToIndex3(voxel));
+}
+
+std::vector<Listing> SingleFieldMap::ListAt(const Eigen::Vector3i& voxel) const {
+  const LabelBlock* labels = labels_.Find(BlockOf(ToIndex3(voxel)));
+  const std::size_t i = At(PlaceInBlock(ToIndex3(voxel)));
+  if (labels == nullptr || labels->id[i] == kNoInstance) return {};
+  return {{labels->id[i], labels->confidence[i]}};
+}
+
+std::vector<Eigen::Vector3i> SingleFieldMap::ObservedVoxels(InstanceId id) const {
+  std::vector<Index3> voxels;
+  ForEachVoxel([&](const Index3& v, bool observed, InstanceId label) {
+    if (observed && label == id) voxels.push_back(v);
+  });
+  return SortedVoxels(std::move(voxels));
+}
+
+std::vector<Eigen::Vector3i> SingleFieldMap::ListedVoxels() const {
+  std::vector<Index3> voxels;
+  ForEachVoxel([&](const Index3& v, bool, InstanceId label) {
+    if (label != kNoInstance) voxels.push_back(v);
+  });
+  return SortedVoxels(std::move(voxels));
+}
+
+MapMemory SingleFieldMap::Memory() const {
+  return {field_.size(), field_.size() * (sizeof(TsdfBlock) + sizeof(LabelBlock)) +
+                             field_.TableBytes() + labels_.TableBytes()};
+}
+
+}  // namespace tsdfpp

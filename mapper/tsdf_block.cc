@@ -1,0 +1,113 @@
+#include "mapper/tsdf_block.h"
+
+namespace tsdfpp {
+namespace {
+
+// Rows of 10 bits, x = -1 ... 8, for y, z = -1 ... 8.
+using Rows = std::array<std::array<std::uint16_t, 10>, 10>;
+
+std::uint16_t RowOf(const BlockMask* mask, int y, int z) {
+  if (mask == nullptr) return 0;
+  return static_cast<std::uint16_t>(
+      ((*mask)[static_cast<std::size_t>(z)] >> static_cast<unsigned>(8 * y)) & 0xFFU);
+}
+
+using Neighbours = std::array<const TsdfBlock*, 27>;
+
+Neighbours FindNeighbours(const TsdfGrid& grid, const Index3& block) {
+  Neighbours neighbours{};
+  std::size_t i = 0;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) neighbours[i++] = grid.Find(block + Index3{x, y, z});
+    }
+  }
+  return neighbours;
+}
+
+Rows GatherRows(const Neighbours& neighbours, BlockMask TsdfBlock::*mask) {
+  Rows rows{};
+  for (int z = -1; z <= 8; ++z) {
+    const int bz = z < 0 ? 0 : (z > 7 ? 2 : 1);
+    for (int y = -1; y <= 8; ++y) {
+      const int by = y < 0 ? 0 : (y > 7 ? 2 : 1);
+      const auto* of = &neighbours[static_cast<std::size_t>(9 * bz + 3 * by)];
+      const auto row = [&](int bx) {
+        return RowOf(of[bx] == nullptr ? nullptr : &(of[bx]->*mask), y & 7, z & 7);
+      };
+      rows[static_cast<std::size_t>(z + 1)][static_cast<std::size_t>(y + 1)] =
+          static_cast<std::uint16_t>((row(0) >> 7U) | (row(1) << 1U) | ((row(2) & 1U) << 9U));
+    }
+  }
+  return rows;
+}
+
+CrossedCubes CrossedOf(const Rows& observed, const Rows& negative) {
+  CrossedCubes crossed{};
+  for (std::size_t z = 0; z < 9; ++z) {
+    for (std::size_t y = 0; y < 9; ++y) {
+      std::uint32_t all = 0x3FF;
+      std::uint32_t any_negative = 0;
+      std::uint32_t any_positive = 0;
+      for (std::size_t corner = 0; corner < 4; ++corner) {
+        const std::size_t cz = z + (corner >> 1U);
+        const std::size_t cy = y + (corner & 1U);
+        all &= observed[cz][cy];
+        any_negative |= negative[cz][cy];
+        any_positive |= static_cast<std::uint32_t>(observed[cz][cy] & ~negative[cz][cy]);
+      }
+      all &= all >> 1U;
+      any_negative |= any_negative >> 1U;
+      any_positive |= any_positive >> 1U;
+      crossed[z][y] = static_cast<std::uint16_t>(all & any_negative & any_positive & 0x1FFU);
+    }
+  }
+  return crossed;
+}
+
+}  // namespace
+
+void TsdfBlock::UpdateMasks(float back) {
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    std::uint64_t o = 0;
+    std::uint64_t n = 0;
+    std::uint64_t b = 0;
+    for (std::size_t i = 0; i < 64; ++i) {
+      const float d = distance[64 * z + i];
+      const std::uint64_t is_observed = weight[64 * z + i] > 0 ? 1 : 0;
+      const std::uint64_t is_negative = d < 0 ? is_observed : 0;
+      const std::uint64_t is_band = d >= -back ? is_negative : 0;
+      o |= is_observed << i;
+      n |= is_negative << i;
+      b |= is_band << i;
+    }
+    observed[z] = o;
+    negative[z] = n;
+    band[z] = b;
+  }
+}
+
+CrossedCubes FindCrossedCubes(const TsdfGrid& grid, const Index3& block) {
+  const Neighbours neighbours = FindNeighbours(grid, block);
+  return CrossedOf(GatherRows(neighbours, &TsdfBlock::observed),
+                   GatherRows(neighbours, &TsdfBlock::negative));
+}
+
+BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
+  const Neighbours neighbours = FindNeighbours(grid, block);
+  const CrossedCubes crossed = CrossedOf(GatherRows(neighbours, &TsdfBlock::observed),
+                                         GatherRows(neighbours, &TsdfBlock::negative));
+  BlockMask cover = neighbours[13] == nullptr ? BlockMask{} : neighbours[13]->band;
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    for (std::size_t y = 0; y < kBlockSide; ++y) {
+      // A voxel is a corner of the cubes named one lower, and its own, along each axis.
+      std::uint32_t row = crossed[z][y] | crossed[z][y + 1] | crossed[z + 1][y] |
+                          static_cast<std::uint32_t>(crossed[z + 1][y + 1]);
+      row = (row | (row >> 1U)) & 0xFFU;
+      cover[z] |= static_cast<std::uint64_t>(row) << (8 * y);
+    }
+  }
+  return cover;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,62 @@
+// A block of signed distances, weights and colours, and the bit masks derived from them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/types.h"
+#include "mapper/block_grid.h"
+
+namespace tsdfpp {
+
+// One bit a voxel: slice z holds bit 8 y + x.
+using BlockMask = std::array<std::uint64_t, kBlockSide>;
+
+inline bool Bit(const BlockMask& mask, int place) {
+  return ((mask[static_cast<std::size_t>(place >> 6)] >> static_cast<unsigned>(place & 63)) & 1U) !=
+         0;
+}
+inline void SetBit(BlockMask& mask, int place) {
+  mask[static_cast<std::size_t>(place >> 6)] |= 1ULL << static_cast<unsigned>(place & 63);
+}
+
+struct TsdfBlock {
+  std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
+  std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
+  std::array<std::array<std::uint16_t, 3>, kBlockVoxels> colour{};  // 8.8 fixed point
+  std::array<std::uint16_t, kBlockVoxels> colour_count{};
+
+  BlockMask observed{};  // weight > 0
+  BlockMask negative{};  // observed and distance < 0
+  BlockMask band{};      // observed and distance in [-back, 0)
+  BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see UpdateCover
+
+  // Brings observed, negative and band in line with the values. `back` in metres.
+  void UpdateMasks(float back);
+  void Clear(int place) {
+    const auto i = static_cast<std::size_t>(place);
+    distance[i] = 0;
+    weight[i] = 0;
+    colour[i] = {};
+    colour_count[i] = 0;
+  }
+  Colour ColourAt(int place) const {
+    const auto& c = colour[static_cast<std::size_t>(place)];
+    return {Level(c[0]), Level(c[1]), Level(c[2])};
+  }
+  static std::uint8_t Level(std::uint16_t fixed) {
+    return static_cast<std::uint8_t>(std::min(255, (fixed + 128) >> 8));
+  }
+};
+
+using TsdfGrid = BlockGrid<TsdfBlock>;
+
+// Bit (9 z + y) row, bit x: the cube whose lowest corner is voxel (x-1, y-1, z-1) of the block is
+// crossed (all corners observed, zero between them). Reads the masks of the 27 blocks around.
+using CrossedCubes = std::array<std::array<std::uint16_t, 9>, 9>;
+CrossedCubes FindCrossedCubes(const TsdfGrid& grid, const Index3& block);
+
+// The cover mask at the lattice points of this block: band, or corner of a crossed cube.
+BlockMask FindCover(const TsdfGrid& grid, const Index3& block);
+
+}  // namespace tsdfpp

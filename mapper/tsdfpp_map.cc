@@ -1,0 +1,224 @@
+#include "mapper/tsdfpp_map.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <bit>
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kBlocksPerTask = 16;
+
+template <typename Function>
+void ForEachBit(std::uint64_t bits, int slice, const Function& function) {
+  for (; bits != 0; bits &= bits - 1) function(64 * slice + std::countr_zero(bits));
+}
+
+}  // namespace
+
+// What a frame did to one object's block.
+struct TsdfppMap::Change {
+  Index3 index;
+  InstanceId id = kNoInstance;
+  TsdfBlock* block = nullptr;
+  BlockMask votes{};
+  BlockMask old_cover{};
+  ListBlock* lists = nullptr;
+};
+
+TsdfppMap::TsdfppMap(const MapConfig& config, int layers) : LayeredMap(config), layers_(layers) {}
+
+std::unique_ptr<MapRepresentation> TsdfppMap::Clone() const {
+  return std::make_unique<TsdfppMap>(*this);
+}
+
+TsdfppMap::ListBlock& TsdfppMap::ListsOf(const Index3& block) {
+  ListBlock& lists = index_.FindOrAdd(block);
+  if (lists.empty()) lists.resize(static_cast<std::size_t>(kBlockVoxels * layers_));
+  return lists;
+}
+
+VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) const {
+  return {&lists[static_cast<std::size_t>(place * layers_)], layers_};
+}
+
+void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
+  ObjectVolume& volume = volumes_[id];
+  const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
+  if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
+  Deactivate(id);
+  volume.grid =
+      ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
+  Activate(id);
+}
+
+void TsdfppMap::Deactivate(InstanceId id) {
+  for (const auto& entry : volumes_.at(id).grid.entries()) {
+    ListBlock* lists = index_.Find(entry.index);
+    if (lists == nullptr) continue;
+    for (int z = 0; z < kBlockSide; ++z) {
+      // Overflow may have dropped the object from some of these; Remove() knows.
+      ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z,
+                 [&](int place) { ListOf(*lists, place).Remove(id); });
+    }
+  }
+}
+
+void TsdfppMap::Activate(InstanceId id) {
+  const TsdfGrid& grid = volumes_.at(id).grid;
+  for (const auto& entry : grid.entries()) {
+    entry.block->cover = FindCover(grid, entry.index);
+    ListBlock& lists = ListsOf(entry.index);
+    for (int z = 0; z < kBlockSide; ++z) {
+      ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z,
+                 [&](int place) { ListOf(lists, place).PushFront(id, config_.moved_confidence); });
+    }
+  }
+}
+
+void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  const FrameView view(frame, labels);
+  UpdateIndex(FuseIntoVolumes(view, config_, volumes_));
+}
+
+void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
+  std::vector<Change> changes;
+  auto next = fused.begin();
+  for (auto& [id, volume] : volumes_) {
+    std::vector<Index3> indices;
+    const auto first = next;
+    for (; next != fused.end() && next->id == id; ++next) indices.push_back(next->index);
+    auto vote = first;
+    for (const Index3& index : WithNeighbours(volume.grid, std::move(indices))) {
+      Change change;
+      change.index = index;
+      change.id = id;
+      change.block = volume.grid.Find(index);
+      change.old_cover = change.block->cover;
+      change.lists = &ListsOf(index);
+      if (vote != next && vote->index == index) change.votes = (vote++)->votes;
+      changes.push_back(change);
+    }
+  }
+  // Covers read the neighbours' values, which no longer change.
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, changes.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          changes[i].block->cover = FindCover(volumes_.at(changes[i].id).grid, changes[i].index);
+        }
+      },
+      tbb::simple_partitioner());
+  std::stable_sort(changes.begin(), changes.end(),
+                   [](const Change& a, const Change& b) { return a.index < b.index; });
+  std::vector<std::size_t> starts;
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    if (i == 0 || changes[i - 1].index != changes[i].index) starts.push_back(i);
+  }
+  starts.push_back(changes.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, starts.size() - 1, kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          ApplyChanges(changes.data() + starts[i], changes.data() + starts[i + 1]);
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+void TsdfppMap::ApplyChanges(const Change* begin, const Change* end) {
+  ListBlock& lists = *begin->lists;
+  for (int z = 0; z < kBlockSide; ++z) {
+    const auto slice = static_cast<std::size_t>(z);
+    for (const Change* change = begin; change != end; ++change) {
+      const std::uint64_t lost = change->old_cover[slice] & ~change->block->cover[slice];
+      ForEachBit(lost, z, [&](int place) { ListOf(lists, place).Remove(change->id); });
+    }
+    for (const Change* change = begin; change != end; ++change) {
+      const std::uint64_t votes = change->votes[slice] & change->block->cover[slice];
+      ForEachBit(votes, z,
+                 [&](int place) { ListOf(lists, place).Vote(change->id, config_.confidence_cap); });
+    }
+    for (const Change* change = begin; change != end; ++change) {
+      const std::uint64_t gained = change->block->cover[slice] & ~change->old_cover[slice];
+      ForEachBit(gained, z, [&](int place) {
+        VoxelList list = ListOf(lists, place);
+        if (!list.Lists(change->id)) list.Append(change->id, 1);
+      });
+    }
+  }
+}
+
+void TsdfppMap::Remove(InstanceId id) {
+  const auto removed = volumes_.find(id);
+  if (removed == volumes_.end()) return;
+  struct Vacated {
+    Index3 block;
+    int place;
+  };
+  std::vector<Vacated> vacated;
+  for (const auto& entry : removed->second.grid.entries()) {
+    ListBlock* lists = index_.Find(entry.index);
+    if (lists == nullptr) continue;
+    for (int z = 0; z < kBlockSide; ++z) {
+      ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z, [&](int place) {
+        VoxelList list = ListOf(*lists, place);
+        if (!list.Lists(id)) return;
+        list.Remove(id);
+        vacated.push_back({entry.index, place});
+      });
+    }
+  }
+  volumes_.erase(removed);
+  if (!config_.relist_on_removal) return;
+  for (const Vacated& voxel : vacated) {
+    VoxelList list = ListOf(*index_.Find(voxel.block), voxel.place);
+    for (const auto& [other, volume] : volumes_) {
+      const TsdfBlock* block = volume.grid.Find(voxel.block);
+      if (block == nullptr || !Bit(block->cover, voxel.place) || list.Lists(other)) continue;
+      list.Append(other, 1);
+    }
+  }
+}
+
+InstanceId TsdfppMap::ActiveAt(const Index3& voxel) const {
+  const ListBlock* lists = index_.Find(BlockOf(voxel));
+  if (lists == nullptr || lists->empty()) return kNoInstance;
+  return (*lists)[static_cast<std::size_t>(PlaceInBlock(voxel) * layers_)].id;
+}
+
+std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
+  std::vector<Listing> listings;
+  const ListBlock* lists = index_.Find(BlockOf(ToIndex3(voxel)));
+  if (lists == nullptr || lists->empty()) return listings;
+  const int first = PlaceInBlock(ToIndex3(voxel)) * layers_;
+  for (int i = 0; i < layers_; ++i) {
+    const ListEntry& entry = (*lists)[static_cast<std::size_t>(first + i)];
+    if (entry.id == kNoInstance) break;
+    listings.push_back({entry.id, entry.confidence});
+  }
+  return listings;
+}
+
+std::vector<Eigen::Vector3i> TsdfppMap::ListedVoxels() const {
+  std::vector<Index3> voxels;
+  for (const auto& entry : index_.entries()) {
+    for (int place = 0; place < kBlockVoxels && !entry.block->empty(); ++place) {
+      const ListEntry& active = (*entry.block)[static_cast<std::size_t>(place * layers_)];
+      if (active.id != kNoInstance) voxels.push_back(VoxelAt(entry.index, place));
+    }
+  }
+  return SortedVoxels(std::move(voxels));
+}
+
+MapMemory TsdfppMap::Memory() const {
+  MapMemory memory = VolumeMemory();
+  memory.blocks += index_.size();
+  memory.bytes +=
+      index_.size() * sizeof(ListEntry) * static_cast<std::size_t>(kBlockVoxels * layers_) +
+      index_.TableBytes();
+  return memory;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,40 @@
+// Method `tsdf++`: the paper's map as a careful engineer would build it (docs/map.md).
+#pragma once
+
+#include "mapper/layered_map.h"
+#include "mapper/voxel_list.h"
+
+namespace tsdfpp {
+
+class TsdfppMap final : public LayeredMap {
+ public:
+  TsdfppMap(const MapConfig& config, int layers);
+
+  void SetObjectPose(InstanceId id, const Pose& T_WO) override;
+  void Fuse(const Frame& frame, const cv::Mat& labels) override;
+  void Remove(InstanceId id) override;
+  std::unique_ptr<MapRepresentation> Clone() const override;
+  std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
+  std::vector<Eigen::Vector3i> ListedVoxels() const override;
+  MapMemory Memory() const override;
+
+ protected:
+  InstanceId ActiveAt(const Index3& voxel) const override;
+
+ private:
+  // kBlockVoxels lists of K entries.
+  using ListBlock = std::vector<ListEntry>;
+  struct Change;
+
+  ListBlock& ListsOf(const Index3& block);
+  VoxelList ListOf(ListBlock& lists, int place) const;
+  void Deactivate(InstanceId id);
+  void Activate(InstanceId id);
+  void UpdateIndex(const std::vector<FusedBlock>& fused);
+  void ApplyChanges(const Change* begin, const Change* end);
+
+  int layers_;
+  BlockGrid<ListBlock> index_;
+};
+
+}  // namespace tsdfpp
