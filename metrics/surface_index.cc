@@ -1,0 +1,97 @@
+// The only file that includes Open3D. Of its RaycastingScene as Debian builds it, only the distance
+// queries are right (facts/peers.md), so nothing else of it is used.
+#include "metrics/surface_index.h"
+
+#include <open3d/core/Tensor.h>
+#include <open3d/t/geometry/RaycastingScene.h>
+
+#include <cstring>
+
+#include "metrics/mesh_tools.h"
+
+namespace tsdfpp {
+
+using open3d::core::Tensor;
+
+namespace {
+
+// A triangle thinner than this share of its longest edge is left out of the index: Open3D's closest
+// point divides by its area in single precision, and Debian's build aborts on the NaN. What is left
+// out lies within that share of an edge from its neighbours.
+constexpr double kThinnest = 1e-3;
+
+bool IsThin(const TriangleMesh& mesh, std::size_t triangle) {
+  double longest = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3f edge = Corner(mesh, triangle, (i + 1) % 3) - Corner(mesh, triangle, i);
+    longest = std::max(longest, edge.cast<double>().squaredNorm());
+  }
+  return 2 * AreaVector(mesh, triangle).norm() <= kThinnest * longest;
+}
+
+}  // namespace
+
+struct SurfaceIndex::Impl {
+  std::vector<std::uint32_t> indexed;  // the mesh's triangle of each that is in the scene
+  // Embree's queries do not change the scene, though Open3D does not declare them const.
+  mutable open3d::t::geometry::RaycastingScene scene;
+};
+
+SurfaceIndex::SurfaceIndex(TriangleMesh mesh) : mesh_(std::move(mesh)) {
+  if (mesh_.triangles.empty()) return;
+  normals_.reserve(mesh_.triangles.size());
+  for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+    const Eigen::Vector3d area = AreaVector(mesh_, t);
+    const double length = area.norm();
+    normals_.push_back(length > 0 ? Eigen::Vector3f((area / length).cast<float>())
+                                  : Eigen::Vector3f(Eigen::Vector3f::Zero()));
+  }
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  Tensor vertices({static_cast<std::int64_t>(mesh_.vertices.size()), 3}, open3d::core::Float32);
+  std::memcpy(vertices.GetDataPtr(), mesh_.vertices.data(),
+              mesh_.vertices.size() * sizeof(Eigen::Vector3f));
+  auto impl = std::make_unique<Impl>();
+  std::vector<std::array<std::uint32_t, 3>> kept;
+  for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+    if (IsThin(mesh_, t)) continue;
+    kept.push_back(mesh_.triangles[t]);
+    impl->indexed.push_back(static_cast<std::uint32_t>(t));
+  }
+  if (kept.empty()) return;
+  Tensor triangles({static_cast<std::int64_t>(kept.size()), 3}, open3d::core::UInt32);
+  std::memcpy(triangles.GetDataPtr(), kept.data(), kept.size() * sizeof(kept[0]));
+  impl_ = std::move(impl);
+  impl_->scene.AddTriangles(vertices, triangles);
+  // Open3D builds the tree at the first query: ask one now, so that later ones only read.
+  impl_->scene.ComputeClosestPoints(Tensor::Zeros({1, 3}, open3d::core::Float32));
+}
+
+SurfaceIndex::~SurfaceIndex() = default;
+SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;
+SurfaceIndex& SurfaceIndex::operator=(SurfaceIndex&&) noexcept = default;
+
+NearestSurface SurfaceIndex::Nearest(std::span<const Eigen::Vector3f> points) const {
+  NearestSurface out;
+  out.distance_m.assign(points.size(), std::numeric_limits<float>::infinity());
+  out.triangle.assign(points.size(), NearestSurface::kNone);
+  out.normal.assign(points.size(), Eigen::Vector3f::Zero());
+  out.position.assign(points.size(), Eigen::Vector3f::Zero());
+  if (impl_ == nullptr || points.empty()) return out;
+
+  Tensor queries({static_cast<std::int64_t>(points.size()), 3}, open3d::core::Float32);
+  std::memcpy(queries.GetDataPtr(), points.data(), points.size_bytes());
+  auto answers = impl_->scene.ComputeClosestPoints(queries);
+  const Tensor positions = answers.at("points").Contiguous();
+  const Tensor ids = answers.at("primitive_ids").Contiguous();
+  const auto* position = static_cast<const float*>(positions.GetDataPtr());
+  const auto* id = static_cast<const std::uint32_t*>(ids.GetDataPtr());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    out.position[i] = Eigen::Vector3f(position + 3 * i);
+    out.distance_m[i] = (points[i] - out.position[i]).norm();
+    out.triangle[i] = impl_->indexed[id[i]];
+    out.normal[i] = normals_[out.triangle[i]];
+  }
+  return out;
+}
+
+}  // namespace tsdfpp

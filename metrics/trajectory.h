@@ -1,0 +1,92 @@
+// Trajectory and pose errors. Translations in metres, rotations in radians unless named _deg.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/types.h"
+#include "metrics/measured.h"
+
+namespace tsdfpp {
+
+using Trajectory = std::map<int, Pose>;  // T_world_object (or camera), by frame number
+
+// The frames that both have, in order.
+struct PosePairs {
+  std::vector<int> frames;
+  std::vector<Pose> estimate;
+  std::vector<Pose> truth;
+  std::size_t size() const { return frames.size(); }
+};
+PosePairs PairByFrame(const Trajectory& estimate, const Trajectory& truth);
+
+struct ErrorSummary {
+  double rmse = 0;
+  double mean = 0;
+  double median = 0;  // mean of the two middle values where their number is even
+  double standard_deviation = 0;
+  double smallest = 0;
+  double largest = 0;
+};
+// Nothing where there are no errors to summarise.
+std::optional<ErrorSummary> SummariseErrors(std::span<const double> errors);
+
+// Pairs with each estimate moved by T * estimate * C; the truth stays.
+PosePairs Moved(const PosePairs& pairs, const Pose& T_left, const Pose& C_right);
+
+// Absolute errors a pair, in one common world: |t_est - t_gt|, and the angle of R_est^T R_gt.
+std::vector<double> TranslationErrors_m(const PosePairs& pairs);
+std::vector<double> RotationErrors_rad(const PosePairs& pairs);
+
+// Least-squares truth ~ scale R estimate + t over the translations (Horn 1987, Umeyama 1991); scale
+// 1 unless asked for. Needs three pairs; fewer, or translations on one point, give nothing.
+struct Alignment {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+  double scale = 1;
+};
+std::optional<Alignment> AlignHorn(const PosePairs& pairs, bool with_scale = false);
+PosePairs Aligned(const PosePairs& pairs, const Alignment& alignment);
+
+// Relative pose errors between pairs i and i + delta: E = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), Q the
+// truth. `overlapping`: every i, otherwise i = 0, delta, 2 delta ...
+struct RelativeErrors {
+  std::vector<double> translation_m;
+  std::vector<double> rotation_rad;
+};
+RelativeErrors RelativePoseErrors(const PosePairs& pairs, std::size_t delta,
+                                  bool overlapping = false);
+
+// A mapper chooses an object's frame, so its trajectory is anchored once, at the first common frame
+// t0: T_est(t) T_est(t0)^-1 T_gt(t0) (facts/metrics.md). No alignment follows.
+PosePairs AnchoredAtFirst(const PosePairs& pairs);
+// The Co-Fusion protocol's anchor C = T_WO_est^-1 T_WC_est T_WC_gt^-1 T_WO_gt at the first common
+// frame, with the camera's poses there.
+PosePairs AnchoredCoFusion(const PosePairs& pairs, const Pose& T_WC_estimate,
+                           const Pose& T_WC_truth);
+
+struct ObjectTrajectoryScores {
+  std::size_t frames = 0;
+  Measured ate_rmse_m;         // anchored at the first frame, not aligned
+  Measured rotation_rmse_deg;  // of the same
+  Measured cofusion_rmse_m;    // Co-Fusion protocol: its anchor, Horn alignment, translation RMSE
+  Measured rpe_rmse_m;         // from one tracked frame to the next
+  Measured rpe_rmse_deg;
+};
+// Camera poses are those at the first common frame.
+ObjectTrajectoryScores ScoreObjectTrajectory(const Trajectory& T_WO_estimate,
+                                             const Trajectory& T_WO_truth,
+                                             const Pose& T_WC_estimate, const Pose& T_WC_truth);
+
+// ADD (Hinterstoisser 2012): mean distance between the model's points at both poses. Undefined
+// without points.
+Measured AddError_m(std::span<const Eigen::Vector3f> points_O, const Pose& T_WO_estimate,
+                    const Pose& T_WO_truth);
+// ADD-S, also ADI: mean distance from each point at the true pose to the nearest one at the
+// estimated pose. Quadratic in the points (4 million pairs take some 5 ms): subsample the model.
+Measured AddSymmetricError_m(std::span<const Eigen::Vector3f> points_O, const Pose& T_WO_estimate,
+                             const Pose& T_WO_truth);
+
+}  // namespace tsdfpp

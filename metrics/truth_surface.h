@@ -1,0 +1,53 @@
+// The true surfaces of a scene, indexed once each in its own frame and placed by poses.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/types.h"
+#include "metrics/solid.h"
+#include "metrics/surface_index.h"
+
+namespace tsdfpp {
+
+// One object's true surface. Neither copied nor moved, for its parts refer to each other.
+class TruthSurface {
+ public:
+  explicit TruthSurface(TrueModel model);
+  TruthSurface(const TruthSurface&) = delete;
+  TruthSurface& operator=(const TruthSurface&) = delete;
+
+  InstanceId id() const { return model_.info.id; }
+  const TrueModel& model() const { return model_; }
+  const SurfaceIndex& index_O() const { return index_O_; }
+  const Solid& solid_O() const { return solid_O_; }
+  const Eigen::AlignedBox3f& bounds_O() const { return bounds_O_; }
+
+ private:
+  TrueModel model_;
+  SurfaceIndex index_O_;
+  Solid solid_O_;
+  Eigen::AlignedBox3f bounds_O_;
+};
+
+// A true surface at its current pose.
+struct PlacedTruth {
+  const TruthSurface* surface = nullptr;
+  Pose T_WO = Pose::Identity();
+};
+
+// For each point (world frame) the distance to the nearest of the true surfaces, metres, and its
+// object; infinite and kNoInstance where there is none. At equal distance the first in `truths`.
+struct NearestTruth {
+  std::vector<float> distance_m;
+  std::vector<InstanceId> object;
+};
+NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,
+                              std::span<const PlacedTruth> truths);
+
+// 1 for each point (world frame) that lies inside one of the true solids.
+std::vector<std::uint8_t> InsideTruth(std::span<const Eigen::Vector3f> points_W,
+                                      std::span<const PlacedTruth> truths);
+
+}  // namespace tsdfpp
