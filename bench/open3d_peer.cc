@@ -1,0 +1,41 @@
+#include "bench/open3d_peer.h"
+
+#include <omp.h>
+#include <open3d/geometry/RGBDImage.h>
+#include <open3d/pipelines/integration/ScalableTSDFVolume.h>
+
+#include <chrono>
+#include <cstring>
+
+namespace tsdfpp {
+
+struct Open3dVolume::Impl {
+  open3d::pipelines::integration::ScalableTSDFVolume volume;
+};
+
+Open3dVolume::Open3dVolume(double voxel_m, double truncation_m)
+    : impl_(new Impl{
+          {voxel_m, truncation_m, open3d::pipelines::integration::TSDFVolumeColorType::RGB8}}) {}
+
+Open3dVolume::~Open3dVolume() = default;
+
+double Open3dVolume::Integrate(const Frame& frame) {
+  const Intrinsics& k = frame.intrinsics;
+  open3d::geometry::Image colour;
+  colour.Prepare(k.width, k.height, 3, 1);
+  std::memcpy(colour.data_.data(), frame.colour.data, colour.data_.size());
+  open3d::geometry::Image depth;
+  depth.Prepare(k.width, k.height, 1, 4);
+  std::memcpy(depth.data_.data(), frame.depth.data, depth.data_.size());
+  const auto image = open3d::geometry::RGBDImage::CreateFromColorAndDepth(colour, depth, 1.0,
+                                                                          kMaxValidDepth_m, false);
+  const open3d::camera::PinholeCameraIntrinsic intrinsic(k.width, k.height, k.fx, k.fy, k.cx, k.cy);
+  const Eigen::Matrix4d T_CW = frame.T_WC.inverse().matrix();
+  const auto start = std::chrono::steady_clock::now();
+  impl_->volume.Integrate(*image, intrinsic, T_CW);
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void SetOpen3dThreads(int threads) { omp_set_num_threads(threads); }
+
+}  // namespace tsdfpp

@@ -1,0 +1,27 @@
+// What a user would pick instead: Open3D's ScalableTSDFVolume with colour, in a file of its own.
+#pragma once
+
+#include <memory>
+
+#include "core/types.h"
+
+namespace tsdfpp {
+
+class Open3dVolume {
+ public:
+  // Lengths in metres; Open3D has one truncation for both sides.
+  Open3dVolume(double voxel_m, double truncation_m);
+  ~Open3dVolume();
+
+  // Converts the frame, which is not timed, then integrates it; returns the seconds of the latter.
+  double Integrate(const Frame& frame);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Threads of Open3D's OpenMP loops.
+void SetOpen3dThreads(int threads);
+
+}  // namespace tsdfpp

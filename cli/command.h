@@ -1,0 +1,51 @@
+// What the subcommands of `tsdfpp` share.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace tsdfpp {
+
+// Options that every subcommand has.
+struct CommonOptions {
+  bool json = false;  // the result as JSON on stdout; the log goes to stderr always
+  int threads = 0;    // 0 is all cores
+};
+
+// A subcommand's result: what --json prints, and the text printed without it.
+struct CommandResult {
+  nlohmann::json json;
+  std::string text;
+};
+
+// Registers the subcommand's options on `app`; returns what to run once they are parsed.
+using Run = std::function<Expected<CommandResult>()>;
+Run AddDoctor(CLI::App& app, const CommonOptions& common);
+Run AddGenerate(CLI::App& app, const CommonOptions& common);
+Run AddMap(CLI::App& app, const CommonOptions& common);
+Run AddCompare(CLI::App& app, const CommonOptions& common);
+
+// A progress bar on stderr where that is a terminal; silent elsewhere.
+class ProgressBar {
+ public:
+  explicit ProgressBar(std::string title);
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+  void Show(int done, int total);
+
+ private:
+  std::string title_;
+  bool terminal_;
+  bool shown_ = false;
+};
+
+// The words between commas. Empty text gives none.
+std::vector<std::string> SplitList(const std::string& text);
+
+}  // namespace tsdfpp

@@ -1,0 +1,65 @@
+// The command `tsdfpp`. Exit codes: core/error.h; 0 where all went well.
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+
+#include <cstdio>
+#include <map>
+#include <memory>
+
+#include "cli/command.h"
+
+namespace {
+
+using tsdfpp::CommonOptions;
+using tsdfpp::ErrorKind;
+
+int RunCommand(int argc, char** argv) {
+  CLI::App app("tsdfpp: measures what maps keep of surfaces that they can no longer see", "tsdfpp");
+  app.set_version_flag("--version", TSDFPP_VERSION);
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "Help of all subcommands");
+  CommonOptions common;
+  std::map<CLI::App*, tsdfpp::Run> runs;
+  const auto add = [&](const char* name, const char* help, const auto& function) {
+    CLI::App* command = app.add_subcommand(name, help);
+    command->add_flag("--json", common.json, "Print the result as JSON on stdout");
+    command->add_option("--threads", common.threads, "Worker threads; all cores by default")
+        ->check(CLI::Range(1, 1024));
+    runs[command] = function(*command, common);
+  };
+  add("doctor", "Say what this machine has and what is missing", tsdfpp::AddDoctor);
+  add("generate", "Render a scene to a sequence on disk", tsdfpp::AddGenerate);
+  add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
+  add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "tsdfpp: %s (see tsdfpp --help)\n", error.what());
+    return static_cast<int>(ErrorKind::kUsage);
+  }
+  std::unique_ptr<tbb::global_control> limit;
+  if (common.threads > 0) {
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(common.threads));
+  }
+  const auto result = runs.at(app.get_subcommands().front())();
+  if (!result) {
+    std::fprintf(stderr, "tsdfpp: %s\n", result.error().message.c_str());
+    return static_cast<int>(result.error().kind);
+  }
+  const std::string text = common.json ? result->json.dump(2) + "\n" : result->text;
+  std::fputs(text.c_str(), stdout);
+  return std::fflush(stdout) == 0 ? 0 : static_cast<int>(ErrorKind::kEnvironment);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("tsdfpp"));
+  spdlog::set_pattern("%^%l%$: %v");
+  return RunCommand(argc, argv);
+}

@@ -1,0 +1,148 @@
+#include "eval/compare.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <fstream>
+
+#include "core/files.h"
+#include "eval/compare_report.h"
+#include "eval/pictures.h"
+
+namespace tsdfpp {
+namespace {
+
+std::int64_t ResidentBytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::int64_t size = 0;
+  std::int64_t resident = 0;
+  statm >> size >> resident;
+  return resident * sysconf(_SC_PAGESIZE);
+}
+
+Expected<int> LastFrame(const SequenceInfo& info, const std::string& until) {
+  const int last = info.first_index + info.frame_count - 1;
+  if (until == "end") return last;
+  if (until == "reveal") return info.reveal ? info.reveal->frame : last;
+  int frame = 0;
+  const auto [rest, status] = std::from_chars(until.data(), until.data() + until.size(), frame);
+  if (status != std::errc() || rest != until.data() + until.size()) {
+    return UsageError("--until is '{}', expected reveal, end or a frame's number", until);
+  }
+  if (frame < info.first_index || frame > last) {
+    return UsageError("--until {} is out of range: {} has frames {} to {}", frame, info.name,
+                      info.first_index, last);
+  }
+  return frame;
+}
+
+Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig& config,
+                                                            const SequenceInfo& info,
+                                                            const SceneTruth& truth) {
+  std::vector<std::unique_ptr<CompareRun>> runs;
+  for (const PoseSource poses : config.poses) {
+    for (const std::string& profile : config.profiles) {
+      for (const Method method : config.methods) {
+        PipelineConfig pipeline{method, config.map, poses, config.icp};
+        TSDFPP_RETURN_IF_ERROR(pipeline.map.SetProfile(profile));
+        TSDFPP_RETURN_IF_ERROR(pipeline.map.Validate());
+        runs.push_back(std::make_unique<CompareRun>(pipeline, profile, info.objects, truth));
+      }
+    }
+  }
+  return runs;
+}
+
+}  // namespace
+
+CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profile_name,
+                       const std::vector<ObjectInfo>& objects, const SceneTruth& truth)
+    : config(pipeline_config),
+      profile(std::move(profile_name)),
+      pipeline(config, objects),
+      last_seen(MakeLastSeenStores(truth)) {}
+
+std::string CompareRun::Title() const {
+  return fmt::format("{}, {}, {}", MethodName(config.method), profile,
+                     config.poses == PoseSource::kGiven ? "given poses" : "ICP");
+}
+
+std::string CompareRun::FolderName() const {
+  std::string name =
+      fmt::format("{}_{}_{}", MethodName(config.method), profile, PoseSourceName(config.poses));
+  std::replace(name.begin(), name.end(), '/', '-');
+  return name;
+}
+
+Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
+                                   const std::filesystem::path& out, const std::string& command,
+                                   const CompareProgress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto since = [](std::chrono::steady_clock::time_point t) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
+  };
+  CompareResult result;
+  result.info = source.info();
+  result.config = config;
+  TSDFPP_ASSIGN(result.last_frame, LastFrame(result.info, config.until));
+  if (config.every < 1) return UsageError("--every is {}, expected 1 or more", config.every);
+  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(out));
+  TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source));
+  result.truth = std::make_unique<SceneTruth>(std::move(truth));
+  std::vector<ObjectInfo> names;
+  for (std::size_t i = 0; i < result.truth->trackers().size(); ++i) {
+    names.push_back(result.truth->surface(i).model().info);
+  }
+  if (result.info.reveal) {
+    result.movers = {result.info.reveal->removed.begin(), result.info.reveal->removed.end()};
+    if (result.info.reveal->frame <= result.last_frame) {
+      result.reveal_frame = result.info.reveal->frame;
+    }
+  }
+  TSDFPP_ASSIGN(result.runs, MakeRuns(config, result.info, *result.truth));
+
+  const int first = result.info.first_index;
+  const int total = result.last_frame - first + 1;
+  PictureMaker pictures(result, out);
+  for (int index = first; index <= result.last_frame; ++index) {
+    const auto read_start = std::chrono::steady_clock::now();
+    TSDFPP_ASSIGN(const Frame frame, source.Read(index));
+    result.read_s += since(read_start);
+    if (frame.mask.empty()) return DataError("{}: frame {} has no mask", result.info.name, index);
+    TSDFPP_RETURN_IF_ERROR(result.truth->Observe(frame));
+    const bool reveal = index == result.reveal_frame;
+    const bool evaluate =
+        (index - first + 1) % config.every == 0 || index == result.last_frame || reveal;
+    for (const auto& run : result.runs) {
+      const std::int64_t before = ResidentBytes();
+      run->times.Add(run->pipeline.Process(frame));
+      run->process_growth_bytes += ResidentBytes() - before;
+      if (!evaluate) continue;
+      run->evaluations.push_back(Evaluate(run->pipeline.map(), *result.truth, names, result.movers,
+                                          run->config.map.voxel_m, run->last_seen));
+      Evaluation& evaluation = run->evaluations.back();
+      run->times.mesh_s.push_back(evaluation.mesh_s);
+      TSDFPP_RETURN_IF_ERROR(pictures.Take(*run, evaluation, frame));
+      const bool examined = reveal || (!result.reveal_frame && index == result.last_frame);
+      if (examined) {
+        const std::filesystem::path folder = out / run->FolderName();
+        auto copy = run->pipeline.map().Clone();
+        for (const InstanceId id : result.movers) copy->Remove(id);
+        TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run->pipeline, result.info, folder));
+      }
+      evaluation.scene = {};
+      evaluation.revealed = {};
+      evaluation.table_reconstructed = {};
+    }
+    if (progress) progress(index - first + 1, total);
+  }
+  TSDFPP_RETURN_IF_ERROR(pictures.Finish());
+  result.total_s = since(start);
+  TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
+  TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));
+  return result;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,67 @@
+// The paper's experiment (section IV): several maps of the same frames, evaluated on the way and
+// after a removal.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "eval/evaluation.h"
+#include "eval/map_output.h"
+#include "mapper/pipeline.h"
+
+namespace tsdfpp {
+
+struct CompareConfig {
+  std::vector<Method> methods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored};
+  std::vector<std::string> profiles{"paper", "close"};
+  std::vector<PoseSource> poses{PoseSource::kGiven};
+  MapConfig map;  // truncation is the profile's
+  IcpConfig icp;
+  int every = 10;  // frames between evaluations; the reveal and the last frame are always evaluated
+  // "reveal" stops at the reveal frame (the last one where the sequence has none), "end" goes on to
+  // the last frame without removal, a number stops there.
+  std::string until = "reveal";
+};
+
+// One map of the comparison.
+struct CompareRun {
+  CompareRun(const PipelineConfig& config, std::string profile_name,
+             const std::vector<ObjectInfo>& objects, const SceneTruth& truth);
+
+  PipelineConfig config;
+  std::string profile;
+  Pipeline pipeline;
+  LastSeenStores last_seen;
+  RunTimes times;
+  std::int64_t process_growth_bytes = 0;  // of resident memory while this map worked
+  std::vector<Evaluation> evaluations;    // meshes kept only where pictures need them
+
+  // "tsdf++/anchored, close, given poses", and as a folder's name.
+  std::string Title() const;
+  std::string FolderName() const;
+};
+
+struct CompareResult {
+  SequenceInfo info;
+  CompareConfig config;
+  int last_frame = 0;
+  std::optional<int> reveal_frame;
+  std::set<InstanceId> movers;
+  std::unique_ptr<SceneTruth> truth;  // as at the last frame
+  std::vector<std::unique_ptr<CompareRun>> runs;
+  double read_s = 0;  // rendering or reading
+  double total_s = 0;
+};
+
+// Called after each frame.
+using CompareProgress = std::function<void(int done, int total)>;
+
+// Errors: those of the source; kUsage where `until` is no frame of it or the config is wrong; kData
+// where a frame has no mask; kEnvironment where `out` cannot be written. Writes meshes and pictures
+// below `out` on the way (docs/formats.md), then summary.json, frames.csv and report.html.
+Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
+                                   const std::filesystem::path& out, const std::string& command,
+                                   const CompareProgress& progress);
+
+}  // namespace tsdfpp

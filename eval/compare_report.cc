@@ -1,0 +1,381 @@
+#include "eval/compare_report.h"
+
+#include <functional>
+#include <thread>
+
+#include "core/files.h"
+#include "metrics/trajectory.h"
+
+namespace tsdfpp {
+namespace {
+
+const Evaluation& Examined(const CompareResult& result, const CompareRun& run) {
+  for (const Evaluation& evaluation : run.evaluations) {
+    if (evaluation.frame == result.reveal_frame) return evaluation;
+  }
+  return run.evaluations.back();
+}
+
+// Mean, over the moving objects, of their completion.
+Measured MoversCompletion(const CompareResult& result, const Evaluation& evaluation) {
+  double sum = 0;
+  int count = 0;
+  for (const ObjectScores& object : evaluation.objects) {
+    if (!result.movers.contains(object.info.id) || !object.preserved.completion.value) continue;
+    sum += *object.preserved.completion.value;
+    ++count;
+  }
+  return count == 0 ? Measured::Undefined("no moving object was seen") : Measured::Of(sum / count);
+}
+
+// The least share of right pixels of the whole image and of any object.
+Measured LeastSanity(const Evaluation& evaluation) {
+  Measured least = evaluation.sanity.all;
+  for (const auto& [id, share] : evaluation.sanity.by_object) {
+    if (share.value && (!least.value || *share.value < *least.value)) least = share;
+  }
+  return least;
+}
+
+struct Column {
+  std::string title;
+  std::string csv;
+  std::function<Measured(const CompareResult&, const Evaluation&)> value;
+  int decimals;
+};
+
+// The figures of the table and of frames.csv, in one place.
+const std::vector<Column>& Columns() {
+  static const std::vector<Column> columns{
+      {"kept", "table_preservation_behind_other",
+       [](const CompareResult&, const Evaluation& e) {
+         return e.objects.front().preserved.preservation_behind_other;
+       },
+       3},
+      {"retention", "table_retention_behind_other",
+       [](const CompareResult&, const Evaluation& e) {
+         return e.objects.front().preserved.retention_behind_other;
+       },
+       3},
+      {"hole cm2", "table_hole_area_cm2",
+       [](const CompareResult&, const Evaluation& e) {
+         return e.objects.front().preserved.hole_area_cm2;
+       },
+       0},
+      {"visible", "visible_completion",
+       [](const CompareResult&, const Evaluation& e) { return e.visible_completion; }, 3},
+      {"table", "table_visible_completion",
+       [](const CompareResult&, const Evaluation& e) {
+         return e.objects.front().visible_completion;
+       },
+       3},
+      {"movers", "movers_completion", MoversCompletion, 3},
+      {"ghost cm2", "ghost_area_cm2",
+       [](const CompareResult&, const Evaluation& e) {
+         return Measured::Of(1e4 * e.ghost_area_m2);
+       },
+       0},
+      {"ghost after", "revealed_ghost_area_cm2",
+       [](const CompareResult&, const Evaluation& e) {
+         return Measured::Of(1e4 * e.revealed_ghost_area_m2);
+       },
+       0},
+      {"sane", "sanity_all", [](const CompareResult&, const Evaluation& e) { return e.sanity.all; },
+       3},
+      {"sane least", "sanity_least",
+       [](const CompareResult&, const Evaluation& e) { return LeastSanity(e); }, 3},
+  };
+  return columns;
+}
+
+std::string Text(const Measured& measured, int decimals) {
+  return measured.value ? fmt::format("{:.{}f}", *measured.value, decimals) : "-";
+}
+
+double MedianMs(const nlohmann::json& spread) {
+  return spread.is_null() ? 0 : spread["median_ms"].get<double>();
+}
+
+// Rows of the table, titles first.
+std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
+  std::vector<std::vector<std::string>> rows(1);
+  rows[0] = {"map"};
+  for (const Column& column : Columns()) rows[0].push_back(column.title);
+  rows[0].insert(rows[0].end(), {"move ms", "fuse ms", "MB"});
+  for (const auto& run : result.runs) {
+    const Evaluation& evaluation = Examined(result, *run);
+    std::vector<std::string> row{run->Title()};
+    for (const Column& column : Columns()) {
+      row.push_back(Text(column.value(result, evaluation), column.decimals));
+    }
+    const nlohmann::json times = run->times.ToJson();
+    row.push_back(fmt::format("{:.1f}", MedianMs(times["update_poses"])));
+    row.push_back(fmt::format("{:.1f}", MedianMs(times["fuse"])));
+    row.push_back(
+        fmt::format("{:.0f}", static_cast<double>(run->pipeline.map().Memory().bytes) / 1e6));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+// The run of the baseline on the same frames and settings.
+const CompareRun* BaselineOf(const CompareResult& result, const CompareRun& run) {
+  for (const auto& other : result.runs) {
+    if (other->config.method == Method::kTsdf && other->profile == run.profile &&
+        other->config.poses == run.config.poses && other.get() != &run) {
+      return other.get();
+    }
+  }
+  return nullptr;
+}
+
+// Differences to the baseline on identical frames, of each column: at the examined frame, and the
+// mean over the frames at which both are defined.
+nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& run) {
+  const CompareRun* baseline = BaselineOf(result, run);
+  if (baseline == nullptr) return nullptr;
+  nlohmann::json differences;
+  for (const Column& column : Columns()) {
+    double sum = 0;
+    int count = 0;
+    for (std::size_t i = 0; i < run.evaluations.size(); ++i) {
+      const Measured ours = column.value(result, run.evaluations[i]);
+      const Measured theirs = column.value(result, baseline->evaluations[i]);
+      if (!ours.value || !theirs.value) continue;
+      sum += *ours.value - *theirs.value;
+      ++count;
+    }
+    const Measured ours = column.value(result, Examined(result, run));
+    const Measured theirs = column.value(result, Examined(result, *baseline));
+    nlohmann::json& entry = differences[column.csv];
+    entry["frames"] = count;
+    entry["mean"] = count == 0 ? nlohmann::json(nullptr) : nlohmann::json(sum / count);
+    entry["examined"] = ours.value && theirs.value ? nlohmann::json(*ours.value - *theirs.value)
+                                                   : nlohmann::json(nullptr);
+  }
+  return differences;
+}
+
+nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run) {
+  nlohmann::json trajectories;
+  for (const InstanceId id : result.movers) {
+    const auto estimate = run.pipeline.trajectories().find(id);
+    const auto truth = result.truth->trajectories().find(id);
+    if (estimate == run.pipeline.trajectories().end() ||
+        truth == result.truth->trajectories().end()) {
+      continue;
+    }
+    // The camera is given, so both camera poses of the Co-Fusion protocol are the true one and
+    // cancel.
+    const ObjectTrajectoryScores scores =
+        ScoreObjectTrajectory(estimate->second, truth->second, Pose::Identity(), Pose::Identity());
+    trajectories[std::to_string(id)] = {{"frames", scores.frames},
+                                        {"ate_rmse_m", ToJson(scores.ate_rmse_m)},
+                                        {"rotation_rmse_deg", ToJson(scores.rotation_rmse_deg)},
+                                        {"cofusion_rmse_m", ToJson(scores.cofusion_rmse_m)},
+                                        {"rpe_rmse_m", ToJson(scores.rpe_rmse_m)},
+                                        {"rpe_rmse_deg", ToJson(scores.rpe_rmse_deg)}};
+  }
+  return trajectories;
+}
+
+nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
+  const MapConfig& map = run.config.map;
+  const MapMemory memory = run.pipeline.map().Memory();
+  nlohmann::json evaluations = nlohmann::json::array();
+  for (const Evaluation& evaluation : run.evaluations) evaluations.push_back(ToJson(evaluation));
+  return {{"title", run.Title()},
+          {"folder", run.FolderName()},
+          {"method", MethodName(run.config.method)},
+          {"profile", run.profile},
+          {"poses", PoseSourceName(run.config.poses)},
+          {"settings",
+           {{"voxel_m", map.voxel_m},
+            {"trunc_front_voxels", map.trunc_front_voxels},
+            {"trunc_back_voxels", map.trunc_back_voxels},
+            {"layers", LayersOf(run.config.method, map)},
+            {"weight_cap", map.weight_cap},
+            {"confidence_cap", map.confidence_cap},
+            {"moved_confidence", map.moved_confidence},
+            {"contradiction", map.contradiction},
+            {"relist_on_removal", map.relist_on_removal}}},
+          {"examined", ToJson(Examined(result, run))},
+          {"difference_to_tsdf", PairedDifferences(result, run)},
+          {"trajectories", TrajectoryJson(result, run)},
+          {"times", run.times.ToJson()},
+          {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
+          {"process_growth_bytes", run.process_growth_bytes},
+          {"evaluations", evaluations}};
+}
+
+std::string Csv(const CompareResult& result) {
+  std::string csv = "frame,method,profile,poses";
+  for (const Column& column : Columns()) csv += "," + column.csv;
+  csv += ",mesh_s,evaluate_s\n";
+  for (const auto& run : result.runs) {
+    for (const Evaluation& evaluation : run->evaluations) {
+      csv += fmt::format("{},{},{},{}", evaluation.frame, MethodName(run->config.method),
+                         run->profile, PoseSourceName(run->config.poses));
+      for (const Column& column : Columns()) {
+        const Measured value = column.value(result, evaluation);
+        csv += value.value ? fmt::format(",{:.6g}", *value.value) : ",";
+      }
+      csv += fmt::format(",{:.4f},{:.4f}\n", evaluation.mesh_s, evaluation.evaluate_s);
+    }
+  }
+  return csv;
+}
+
+std::string Escaped(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '&') {
+      escaped += "&amp;";
+    } else if (c == '<') {
+      escaped += "&lt;";
+    } else if (c == '>') {
+      escaped += "&gt;";
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string Base64(const std::string& bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      bits = bits << 8U | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += i + k <= bytes.size() ? kDigits[(bits >> (18 - 6 * k)) & 63U] : '=';
+    }
+  }
+  return text;
+}
+
+std::string Headline(const CompareResult& result) {
+  const int frame = result.reveal_frame.value_or(result.last_frame);
+  std::string text;
+  for (const auto& run : result.runs) {
+    const ObjectScores& table = Examined(result, *run).objects.front();
+    const auto& preserved = table.preserved;
+    if (!preserved.preservation_behind_other.value) continue;
+    text += fmt::format(
+        "<li><b>{}</b> keeps {:.1f} % of the {:.0f} cm² of table that it had seen "
+        "and that the moving objects hide at frame {}: a hole of {:.0f} cm².</li>\n",
+        run->Title(), 100 * *preserved.preservation_behind_other.value,
+        preserved.behind_other_area_cm2, frame, *preserved.hole_area_cm2.value);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string SummaryTable(const CompareResult& result) {
+  const auto rows = TableRows(result);
+  std::vector<std::size_t> width(rows[0].size(), 0);
+  for (const auto& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
+  }
+  std::string text = fmt::format(
+      "{} at frame {}, the table after removing {} moving objects; threshold one voxel\n",
+      result.info.name, result.reveal_frame.value_or(result.last_frame), result.movers.size());
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t c = 0; c < rows[r].size(); ++c) {
+      text += c == 0 ? fmt::format("{:<{}}", rows[r][c], width[c])
+                     : fmt::format("  {:>{}}", rows[r][c], width[c]);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+nlohmann::json SummaryJson(const CompareResult& result, const std::string& command) {
+  nlohmann::json runs = nlohmann::json::array();
+  for (const auto& run : result.runs) runs.push_back(RunJson(result, *run));
+  nlohmann::json summary{{"schema", 1},
+                         {"generator", "tsdfpp"},
+                         {"version", TSDFPP_VERSION},
+                         {"command", command},
+                         {"sequence", result.info.name},
+                         {"first_frame", result.info.first_index},
+                         {"last_frame", result.last_frame},
+                         {"every", result.config.every},
+                         {"removed", result.movers},
+                         {"cores", std::thread::hardware_concurrency()},
+                         {"read_s", result.read_s},
+                         {"total_s", result.total_s},
+                         {"runs", runs}};
+  summary["reveal_frame"] =
+      result.reveal_frame ? nlohmann::json(*result.reveal_frame) : nlohmann::json(nullptr);
+  return summary;
+}
+
+Expected<void> WriteSummary(const CompareResult& result, const std::string& command,
+                            const std::filesystem::path& out) {
+  TSDFPP_RETURN_IF_ERROR(
+      WriteFile(out / "summary.json", SummaryJson(result, command).dump(1) + "\n"));
+  return WriteFile(out / "frames.csv", Csv(result));
+}
+
+Expected<void> WriteReport(const CompareResult& result, const std::vector<PictureFile>& pictures,
+                           const std::string& command, const std::filesystem::path& out) {
+  std::string html = fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>tsdfpp: "
+      "{0}</title>\n"
+      "<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 "
+      "1em;color:#222}}"
+      "table{{border-collapse:collapse;font-size:14px}}th,td{{padding:.25em .6em;text-align:right;"
+      "border-bottom:1px solid #ddd}}th:first-child,td:first-child{{text-align:left}}"
+      "img{{max-width:100%}}figure{{margin:2em 0}}figcaption{{color:#555;font-size:14px}}"
+      "code{{background:#f3f3f3;padding:.1em "
+      ".3em}}.scroll{{overflow-x:auto}}</style></head><body>\n"
+      "<h1>What the map keeps of what it can no longer see</h1>\n"
+      "<p>Sequence <b>{0}</b>, frames {1} to {2}, evaluated every {3} frames. {4} moving objects "
+      "are removed from a copy "
+      "of each map, not from the world; every score is taken on the visible scene "
+      "mesh.</p>\n<ul>\n{5}</ul>\n",
+      Escaped(result.info.name), result.info.first_index, result.last_frame, result.config.every,
+      result.movers.size(), Headline(result));
+  html += "<div class=\"scroll\"><table>\n";
+  const auto rows = TableRows(result);
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    html += "<tr>";
+    for (const std::string& cell : rows[r]) {
+      html += fmt::format("<{0}>{1}</{0}>", r == 0 ? "th" : "td", Escaped(cell));
+    }
+    html += "</tr>\n";
+  }
+  html +=
+      "</table></div>\n<p>kept: share of the table that was seen before, is hidden by a moving "
+      "object now, and is "
+      "within one voxel of the map's table after the removal. retention: the same, over what the "
+      "map had of it "
+      "when it was last visible. visible: share of all that is seen now that the visible scene "
+      "has. table: the same of the "
+      "table. movers: mean completion of the moving objects. ghost: reconstructed area where there "
+      "is nothing, before "
+      "and after the removal. sane: share of mapped pixels whose depth and id the visible scene "
+      "shows, over "
+      "all and of the worst object. Times are medians a frame on this machine.</p>\n";
+  for (const PictureFile& picture : pictures) {
+    TSDFPP_ASSIGN(const std::string bytes, ReadFile(out / picture.file));
+    html += fmt::format(
+        "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption>"
+        "</figure>\n",
+        Escaped(picture.caption), Base64(bytes));
+  }
+  html += fmt::format(
+      "<p>Made by <code>{}</code>, tsdfpp {}. All figures: <code>summary.json</code>, "
+      "<code>frames.csv</code>.</p>\n</body></html>\n",
+      Escaped(command), TSDFPP_VERSION);
+  return WriteFile(out / "report.html", html);
+}
+
+}  // namespace tsdfpp

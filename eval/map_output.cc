@@ -1,0 +1,59 @@
+#include "eval/map_output.h"
+
+#include <algorithm>
+
+#include "core/files.h"
+#include "core/ply.h"
+#include "core/pose_text.h"
+#include "eval/open_source.h"
+
+namespace tsdfpp {
+namespace {
+
+nlohmann::json Spread(std::vector<double> seconds) {
+  if (seconds.empty()) return nullptr;
+  std::sort(seconds.begin(), seconds.end());
+  // The smallest value that a share p of all do not exceed.
+  const auto quantile = [&](double p) {
+    const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(seconds.size())));
+    return 1e3 * seconds[std::max<std::size_t>(rank, 1) - 1];
+  };
+  return {{"median_ms", quantile(0.5)}, {"p99_ms", quantile(0.99)}, {"worst_ms", quantile(1.0)}};
+}
+
+}  // namespace
+
+void RunTimes::Add(const StepTimes& step) {
+  track_s.push_back(step.track_s);
+  update_poses_s.push_back(step.update_poses_s);
+  fuse_s.push_back(step.fuse_s);
+}
+
+nlohmann::json RunTimes::ToJson() const {
+  return {{"track", Spread(track_s)},
+          {"update_poses", Spread(update_poses_s)},
+          {"fuse", Spread(fuse_s)},
+          {"mesh_scene", Spread(mesh_s)}};
+}
+
+Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
+                        const SequenceInfo& info, const std::filesystem::path& out) {
+  const std::vector<InstanceId> mapped = map.Objects();
+  for (const ObjectInfo& object : info.objects) {
+    if (std::find(mapped.begin(), mapped.end(), object.id) != mapped.end()) {
+      TriangleMesh mesh = map.ObjectMesh(object.id);
+      mesh.face_ids.assign(mesh.triangles.size(), object.id);
+      TSDFPP_RETURN_IF_ERROR(WritePly(out / "mesh" / (FileStem(object) + ".ply"), mesh));
+    }
+    const auto trajectory = pipeline.trajectories().find(object.id);
+    if (trajectory == pipeline.trajectories().end()) continue;
+    std::string text = "# frame tx ty tz qx qy qz qw (T_world_object, metres)\n";
+    for (const auto& [frame, T_WO] : trajectory->second) {
+      text += fmt::format("{} {}\n", frame, PoseToText(T_WO));
+    }
+    TSDFPP_RETURN_IF_ERROR(WriteFile(out / "trajectories" / (FileStem(object) + ".txt"), text));
+  }
+  return WritePly(out / "mesh" / "scene.ply", map.SceneMesh());
+}
+
+}  // namespace tsdfpp

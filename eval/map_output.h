@@ -1,0 +1,30 @@
+// What a mapping run leaves on disk: meshes, trajectories, statistics (docs/formats.md).
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/frame_source.h"
+#include "mapper/pipeline.h"
+
+namespace tsdfpp {
+
+// Times of the steps over the frames of a run, for its statistics.
+struct RunTimes {
+  std::vector<double> track_s;
+  std::vector<double> update_poses_s;
+  std::vector<double> fuse_s;
+  std::vector<double> mesh_s;  // of the visible scene, at the frames that were meshed
+
+  void Add(const StepTimes& step);
+  // Median, p99 and worst of each step in milliseconds.
+  nlohmann::json ToJson() const;
+};
+
+// mesh/<name>-<id>.ply for each object, mesh/scene.ply, trajectories/<name>-<id>.txt below `out`.
+// `map` is the map after removals, `pipeline` the run that it comes from.
+// Errors: kEnvironment where the disk refuses.
+Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
+                        const SequenceInfo& info, const std::filesystem::path& out);
+
+}  // namespace tsdfpp

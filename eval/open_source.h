@@ -1,0 +1,22 @@
+// Frames from a scene file or a sequence on disk, whichever the path names.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "core/frame_source.h"
+
+namespace tsdfpp {
+
+// A .toml file is a scene and is rendered; a folder is a sequence. Errors: kUsage where there is
+// neither, else those of OpenScene and OpenSequence.
+Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& scene_or_sequence);
+
+// The ids that a list of ids or names stands for. Errors: kUsage, naming the objects there are.
+Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,
+                                              const std::vector<std::string>& names_or_ids);
+
+// "truck-1", as files are named after objects.
+std::string FileStem(const ObjectInfo& object);
+
+}  // namespace tsdfpp

@@ -1,0 +1,57 @@
+// The pictures of a comparison: the paper's figure made of our meshes, and the table seen from
+// above.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "eval/compare.h"
+
+namespace tsdfpp {
+
+struct PictureFile {
+  std::string file;  // name in the output folder
+  std::string caption;
+};
+
+class PictureMaker {
+ public:
+  // `result` must outlive it and have its runs.
+  PictureMaker(const CompareResult& result, std::filesystem::path out);
+
+  // Takes what the pictures need of one evaluation. Errors: kEnvironment where a picture cannot be
+  // written.
+  Expected<void> Take(const CompareRun& run, const Evaluation& evaluation, const Frame& frame);
+  // Writes figure-<profile>-<poses>.png (a row a method; columns frames and after the removal) and
+  // table-<profile>-<poses>.png (the table from above after the removal, holes in red).
+  Expected<void> Finish();
+
+  const std::vector<PictureFile>& files() const { return files_; }
+
+ private:
+  // The frames shown as columns: at most four, evenly spread, the last one the examined frame.
+  std::vector<int> Columns() const;
+  int ExaminedFrame() const;
+
+  const CompareResult& result_;
+  std::filesystem::path out_;
+  std::vector<PictureFile> files_;
+  std::map<const CompareRun*, std::map<int, cv::Mat>> cells_;  // by frame
+  std::map<const CompareRun*, cv::Mat> after_removal_;
+  std::map<const CompareRun*, cv::Mat> tables_;
+  std::map<int, cv::Mat> camera_;  // colour images of the columns
+};
+
+// A mesh with face ids as the frame's camera sees it, `scale` times smaller: one colour an object,
+// shaded; white where there is nothing. CV_8UC3, red-green-blue.
+cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, const Pose& T_WC,
+                  double scale);
+
+// The table's samples from above: grey where not seen yet, light where visible and mapped, blue
+// where hidden and kept, red where hidden behind an object and missing, orange where visible and
+// missing. CV_8UC3, red-green-blue.
+cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, double pixel_m);
+
+}  // namespace tsdfpp

@@ -1,0 +1,133 @@
+#include "eval/scene_sanity.h"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "eval/rasteriser.h"
+
+namespace tsdfpp {
+namespace {
+
+// 255 where the pixel differs from its right or lower neighbour in id, or in depth by more than two
+// voxels after the slope that the neighbour on the other side shows.
+cv::Mat EdgePixels(const Frame& frame, double voxel_m) {
+  cv::Mat edges(frame.depth.size(), CV_8UC1, cv::Scalar(0));
+  const auto depth = [&](int v, int u) { return frame.depth.at<float>(v, u); };
+  const auto id = [&](int v, int u) { return frame.mask.at<std::uint16_t>(v, u); };
+  const auto jump = static_cast<float>(2 * voxel_m);
+  for (int v = 0; v < frame.depth.rows; ++v) {
+    for (int u = 0; u < frame.depth.cols; ++u) {
+      const auto compare = [&](int dv, int du) {
+        const int v1 = v + dv;
+        const int u1 = u + du;
+        if (v1 >= frame.depth.rows || u1 >= frame.depth.cols) return;
+        bool edge = id(v, u) != id(v1, u1);
+        if (!edge) {
+          float step = std::abs(depth(v1, u1) - depth(v, u));
+          if (v - dv >= 0 && u - du >= 0) {
+            step = std::abs(depth(v1, u1) - 2 * depth(v, u) + depth(v - dv, u - du));
+          }
+          edge = step > jump;
+        }
+        if (edge) edges.at<std::uint8_t>(v, u) = edges.at<std::uint8_t>(v1, u1) = 255;
+      };
+      compare(0, 1);
+      compare(1, 0);
+    }
+  }
+  return edges;
+}
+
+// Clears `mapped` around every edge, by as many pixels as 1.5 voxels take there.
+void LeaveOutEdges(const Frame& frame, double voxel_m, cv::Mat& mapped) {
+  const cv::Mat edges = EdgePixels(frame, voxel_m);
+  for (int v = 0; v < edges.rows; ++v) {
+    for (int u = 0; u < edges.cols; ++u) {
+      if (edges.at<std::uint8_t>(v, u) == 0) continue;
+      const float z = frame.depth.at<float>(v, u);
+      if (!IsValidDepth(z)) continue;
+      const int radius =
+          std::max(2, static_cast<int>(std::ceil(1.5 * frame.intrinsics.fx * voxel_m / z)));
+      cv::rectangle(mapped, {u - radius, v - radius}, {u + radius, v + radius}, cv::Scalar(0),
+                    cv::FILLED);
+    }
+  }
+}
+
+bool SawPoint(const Frame& before, const Eigen::Vector3d& p_W, InstanceId id, double voxel_m) {
+  const Intrinsics& k = before.intrinsics;
+  const Eigen::Vector3d p_C = before.T_WC.inverse() * p_W;
+  if (p_C.z() <= 0) return false;
+  const int u = static_cast<int>(std::lround(k.fx * p_C.x() / p_C.z() + k.cx));
+  const int v = static_cast<int>(std::lround(k.fy * p_C.y() / p_C.z() + k.cy));
+  if (u < 0 || v < 0 || u >= k.width || v >= k.height) return false;
+  return before.mask.at<std::uint16_t>(v, u) == id &&
+         std::abs(before.depth.at<float>(v, u) - p_C.z()) <= voxel_m;
+}
+
+}  // namespace
+
+cv::Mat MappedPixels(const std::deque<Frame>& recent, double voxel_m) {
+  const Frame& now = recent.back();
+  const Intrinsics& k = now.intrinsics;
+  cv::Mat mapped(now.depth.size(), CV_8UC1, cv::Scalar(0));
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      const float z = now.depth.at<float>(v, u);
+      if (!IsValidDepth(z)) continue;
+      const InstanceId id = now.mask.at<std::uint16_t>(v, u);
+      const Eigen::Vector3d p_W =
+          now.T_WC * Eigen::Vector3d((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
+      bool seen = true;
+      for (std::size_t i = 0; i + 1 < recent.size() && seen; ++i) {
+        Eigen::Vector3d before_W = p_W;
+        const auto now_WO = now.T_WO.find(id);
+        const auto before_WO = recent[i].T_WO.find(id);
+        if (now_WO != now.T_WO.end() && before_WO != recent[i].T_WO.end()) {
+          before_W = before_WO->second * (now_WO->second.inverse() * p_W);
+        }
+        seen = SawPoint(recent[i], before_W, id, voxel_m);
+      }
+      if (seen) mapped.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  LeaveOutEdges(now, voxel_m, mapped);
+  return mapped;
+}
+
+SanityScores ScoreSanity(const TriangleMesh& scene_W, const std::deque<Frame>& recent,
+                         double voxel_m) {
+  const Frame& now = recent.back();
+  const cv::Mat mapped = MappedPixels(recent, voxel_m);
+  const Raster raster = Rasterise(scene_W, now.intrinsics, now.T_WC);
+  struct Count {
+    int mapped = 0;
+    int right = 0;
+  };
+  std::map<InstanceId, Count> counts;
+  Count all;
+  for (int v = 0; v < now.depth.rows; ++v) {
+    for (int u = 0; u < now.depth.cols; ++u) {
+      const InstanceId id = now.mask.at<std::uint16_t>(v, u);
+      Count& count = counts[id];
+      if (mapped.at<std::uint8_t>(v, u) == 0) continue;
+      const int face = raster.face.at<int>(v, u);
+      const bool right =
+          face >= 0 && scene_W.face_ids[static_cast<std::size_t>(face)] == id &&
+          std::abs(raster.depth.at<float>(v, u) - now.depth.at<float>(v, u)) <= voxel_m;
+      for (Count* of : {&count, &all}) {
+        ++of->mapped;
+        of->right += right ? 1 : 0;
+      }
+    }
+  }
+  const auto share = [](const Count& count) {
+    return count.mapped == 0 ? Measured::Undefined("no mapped pixel away from edges")
+                             : Measured::Of(static_cast<double>(count.right) / count.mapped);
+  };
+  SanityScores scores{share(all), {}};
+  for (const auto& [id, count] : counts) scores.by_object[id] = share(count);
+  return scores;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,46 @@
+#include "eval/scene_truth.h"
+
+namespace tsdfpp {
+
+Expected<SceneTruth> SceneTruth::Create(FrameSource& source) {
+  TSDFPP_ASSIGN(std::vector<TrueModel> models, source.Truth());
+  std::sort(models.begin(), models.end(),
+            [](const TrueModel& a, const TrueModel& b) { return a.info.id < b.info.id; });
+  SceneTruth truth;
+  for (TrueModel& model : models) {
+    const InstanceId id = model.info.id;
+    truth.trackers_.emplace_back(SampleModel(model, SampleConfig{}), id);
+    truth.surfaces_.push_back(std::make_unique<TruthSurface>(std::move(model)));
+    truth.T_WO_.push_back(Pose::Identity());
+  }
+  return truth;
+}
+
+Expected<void> SceneTruth::Observe(const Frame& frame) {
+  for (std::size_t i = 0; i < trackers_.size(); ++i) {
+    const InstanceId id = trackers_[i].id();
+    if (const auto given = frame.T_WO.find(id); given != frame.T_WO.end()) {
+      auto& trajectory = trajectories_[id];
+      if (!trajectory.empty() && trajectory.rbegin()->second.matrix() != given->second.matrix()) {
+        moved_.insert(id);
+      }
+      trajectory[frame.index] = given->second;
+      T_WO_[i] = given->second;
+    }
+    TSDFPP_RETURN_IF_ERROR(trackers_[i].Observe(frame, T_WO_[i]));
+  }
+  free_space_.Observe(frame);
+  recent_.push_back(frame);
+  if (recent_.size() > kRecentFrames) recent_.pop_front();
+  return {};
+}
+
+std::vector<PlacedTruth> SceneTruth::PlacedWithout(const std::set<InstanceId>& removed) const {
+  std::vector<PlacedTruth> placed;
+  for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+    if (!removed.contains(surfaces_[i]->id())) placed.push_back({surfaces_[i].get(), T_WO_[i]});
+  }
+  return placed;
+}
+
+}  // namespace tsdfpp
