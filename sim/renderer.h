@@ -1,0 +1,54 @@
+// Renders colour, depth and instance ids of one state of a compiled scene, off-screen.
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+#include "core/types.h"
+#include "sim/gl_context.h"
+#include "sim/scene_builder.h"
+
+namespace tsdfpp {
+
+struct RenderedImages {
+  cv::Mat colour;  // CV_8UC3, red-green-blue; empty where it was not asked for
+  cv::Mat depth;   // CV_32FC1, metres along the optical axis; 0 where nothing was hit
+  cv::Mat mask;    // CV_16UC1, instance ids; 0 also where nothing was hit
+};
+
+// Pixel centres are integers: pixel (u, v) shows the ray ((u - cx) / fx, (v - cy) / fy, 1).
+// Depth and ids come from one pass without multisampling, which alone gives true depth; colour has
+// a pass of its own with four samples a pixel and shadows (facts/rendering.md).
+class Renderer {
+ public:
+  // Errors: those of GlContext::Create; kEnvironment where GL gives no off-screen buffer of the
+  // image's size.
+  static Expected<std::unique_ptr<Renderer>> Create(CompiledScene& scene,
+                                                    const Intrinsics& intrinsics);
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  // Renders the scene's present state (CompiledScene::SetPoses) seen from T_WC.
+  // Errors: kEnvironment where MuJoCo or GL fails.
+  Expected<RenderedImages> Render(const Pose& T_WC, bool with_colour);
+
+  const GlInfo& gl_info() const { return gl_->info(); }
+
+ private:
+  Renderer(CompiledScene& scene, const Intrinsics& intrinsics, std::unique_ptr<GlContext> gl);
+  Expected<void> MakeBuffers();
+  Expected<void> MakeBuffer(mjrContext& context, int samples, int shadow_size);
+  Expected<void> UpdateScene(const Pose& T_WC);
+  Expected<void> Draw(mjrContext& context, bool ids, unsigned char* rgb, float* depth);
+
+  CompiledScene& scene_;
+  Intrinsics intrinsics_;
+  std::unique_ptr<GlContext> gl_;
+  mjvScene visible_{};
+  mjrContext id_context_{};
+  mjrContext colour_context_{};
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,55 @@
+// A scene file as a stream of frames, rendered when they are read.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "core/frame_source.h"
+#include "sim/gl_context.h"
+#include "sim/renderer.h"
+#include "sim/scene_builder.h"
+#include "sim/scene_config.h"
+#include "sim/scene_motion.h"
+
+namespace tsdfpp {
+
+struct SimOptions {
+  // Without it frames have an empty colour image and come several times as fast.
+  bool render_colour = true;
+};
+
+class SimulatedSource final : public FrameSource {
+ public:
+  // Errors: those of CompiledScene::Compile and Renderer::Create.
+  static Expected<std::unique_ptr<SimulatedSource>> Open(const SceneConfig& config,
+                                                         const SimOptions& options);
+
+  const SequenceInfo& info() const override { return info_; }
+  // Poses are taken through text (core/pose_text.h) and the images are rendered at the poses so
+  // rounded: a frame depends on its number alone. T_WO holds every object, those at rest included.
+  Expected<Frame> Read(int index) override;
+  // The compiled meshes: exactly what is rendered.
+  Expected<std::vector<TrueModel>> Truth() override { return scene_.TrueModels(); }
+
+  const SceneConfig& config() const { return config_; }
+  const GlInfo& gl_info() const { return renderer_->gl_info(); }
+  // The compiled model and the state of the frame read last.
+  CompiledScene& scene() { return scene_; }
+
+ private:
+  SimulatedSource(const SceneConfig& config, const SimOptions& options, CompiledScene scene);
+
+  SceneConfig config_;
+  SimOptions options_;
+  SceneMotion motion_;
+  CompiledScene scene_;
+  std::unique_ptr<Renderer> renderer_;
+  SequenceInfo info_;
+};
+
+// Opens scenes/<name>.toml. Errors: kUsage where the file is missing or wrong (scene_config.h),
+// kEnvironment where the machine cannot render (gl_context.h).
+Expected<std::unique_ptr<FrameSource>> OpenScene(const std::filesystem::path& toml,
+                                                 const SimOptions& options = {});
+
+}  // namespace tsdfpp

@@ -1,0 +1,33 @@
+// The toys: each is composed of several closed meshes. No part is thinner than 2.5 cm, so that a
+// map of 1 cm voxels can hold it.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/types.h"
+#include "sim/mesh_shapes.h"
+
+namespace tsdfpp {
+
+// One coloured solid of a model. `material` is one of textures.h's, or empty for plain paint.
+struct ModelPart {
+  std::string name;
+  Shape shape;  // in the model's frame: +x front, +z up, origin on the ground below the middle
+  Colour colour{};
+  std::string material;
+  std::string region;
+};
+
+// How far the lowest point of every toy floats above the ground, so that no face lies in the
+// table's.
+inline constexpr double kToyClearance_m = 0.0007;
+
+// The names that MakeToy knows, in a fixed order.
+const std::vector<std::string>& ToyModelNames();
+
+// The parts of a toy; `name` must be one of ToyModelNames(). Each part's region is the toy's name.
+std::vector<ModelPart> MakeToy(std::string_view name);
+
+}  // namespace tsdfpp
