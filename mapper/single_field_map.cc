@@ -175,9 +175,13 @@ void SingleFieldMap::ForEachVoxel(const Function& function) const {
 
 std::vector<InstanceId> SingleFieldMap::Objects() const {
   std::set<InstanceId> ids;
-  ForEachVoxel([&](const Index3&, bool observed, InstanceId id) {
-    if (observed && id != kNoInstance) ids.insert(id);
-  });
+  for (const auto& entry : labels_.entries()) {
+    const TsdfBlock& block = *field_.Find(entry.index);
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      const InstanceId id = entry.block->id[i];
+      if (id != kNoInstance && IsObjectsVoxel(block, *entry.block, i, id)) ids.insert(id);
+    }
+  }
   return {ids.begin(), ids.end()};
 }
 

@@ -1,0 +1,303 @@
+// Every method against its dense reference, voxel by voxel, after each event.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <tuple>
+
+#include "tests/mapper/compare_maps.h"
+#include "tests/mapper/toy_scene.h"
+
+namespace tsdfpp {
+namespace {
+
+using reference::MakePose;
+using reference::Scene;
+
+std::string TestName(Method method) {
+  std::string name(MethodName(method));
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  }
+  return name;
+}
+
+class ReferenceTest : public ::testing::TestWithParam<std::tuple<Method, double>> {
+ protected:
+  Method method() const { return std::get<0>(GetParam()); }
+  MapConfig config() const { return ToyConfig(std::get<1>(GetParam())); }
+  SideBySide Begin() const { return Begin(config()); }
+  SideBySide Begin(const MapConfig& config) const {
+    return SideBySide(method(), config, ToyBox(), ToyIds());
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Methods, ReferenceTest,
+                         ::testing::Combine(::testing::ValuesIn(AllMethods()),
+                                            ::testing::Values(4.0, 2.0)),
+                         [](const auto& parameters) {
+                           return TestName(std::get<0>(parameters.param)) + "_back_" +
+                                  std::to_string(static_cast<int>(std::get<1>(parameters.param)));
+                         });
+
+TEST_P(ReferenceTest, StaticScene) {
+  const Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  for (int i = 0; i < 4; ++i) maps.SetPosesAndFuse(RenderToys(scene, 0.1 + 1.5 * i, i));
+  for (const InstanceId id : ToyIds()) {
+    EXPECT_GT(maps.map().ObservedVoxels(id).size(), 200U) << "the scene shows too little of " << id;
+  }
+  maps.CompareWholeBox();
+}
+
+TEST_P(ReferenceTest, WeightsAndConfidencesSaturate) {
+  const Scene scene = TableWithToys();
+  MapConfig capped = config();
+  capped.weight_cap = 2;
+  capped.confidence_cap = 2;
+  SideBySide maps = Begin(capped);
+  for (int i = 0; i < 4; ++i) maps.SetPosesAndFuse(RenderToys(scene, 0.1 + 0.05 * i, i));
+}
+
+// A brick drives and turns over the table while a ball rolls towards it and the tray stays.
+TEST_P(ReferenceTest, ObjectsDriveAndTurn) {
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  for (int i = 1; i <= 5; ++i) {
+    scene.T_WO[kBrick] = MakePose(0.3 + 0.25 * i, Eigen::Vector3d::UnitZ(),
+                                  {-0.14 + 0.04 * i, 0.03 - 0.01 * i, kTableTop_m + 0.045});
+    scene.T_WO[kBall] =
+        MakePose(0.3 * i, {0, 1, 0.2}, {0.12 - 0.015 * i, -0.08, kTableTop_m + 0.055});
+    maps.SetPosesAndFuse(RenderToys(scene, 0.2 + 0.3 * i, i));
+  }
+  maps.CompareWholeBox();
+}
+
+// Whole voxels and quarter turns put every source point on lattice points or beside them.
+TEST_P(ReferenceTest, MovesByWholeVoxels) {
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.T_WO[kBrick].translation() += Eigen::Vector3d(3 * kToyVoxel_m, 0, 0);
+  maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
+  scene.T_WO[kBall].translation() += Eigen::Vector3d(0, kToyVoxel_m, 2 * kToyVoxel_m);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.8));
+  maps.CompareWholeBox();
+}
+
+TEST_P(ReferenceTest, RemovalAndReturn) {
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.T_WO[kBrick].translation().x() += 0.09;
+  maps.SetPosesAndFuse(RenderToys(scene, 0.4));
+  maps.Remove(kBrick);
+  maps.Remove(17);                               // unknown: nothing
+  maps.SetPosesAndFuse(RenderToys(scene, 0.6));  // it is still in the world, so it comes back
+  scene.T_WO[kBrick].translation().y() += 0.05;
+  maps.SetPosesAndFuse(RenderToys(scene, 0.8));
+  maps.Remove(kBrick);
+  maps.Remove(kBall);
+  maps.CompareWholeBox();
+}
+
+// Removal forgets the poses: the next one is the first, and moves nothing.
+TEST_P(ReferenceTest, ReturnBeforeItsFirstPose) {
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  maps.Remove(kBrick);
+  scene.T_WO[kBrick].translation().x() += 0.09;
+  Frame frame = RenderToys(scene, 0.4);
+  frame.T_WO.erase(kBrick);
+  maps.SetPosesAndFuse(frame);
+  ASSERT_FALSE(maps.map().ObservedVoxels(kBrick).empty());
+  maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
+}
+
+TEST_P(ReferenceTest, RemovalListsAgain) {
+  MapConfig relisting = config();
+  relisting.relist_on_removal = true;
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin(relisting);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  // Both in the tray, so that lists of two overflow.
+  scene.T_WO[kBall].translation() = Eigen::Vector3d(0.08, 0.10, kTableTop_m + 0.04);
+  scene.T_WO[kBrick].translation() = Eigen::Vector3d(0.07, 0.08, kTableTop_m + 0.03);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.5));
+  maps.Remove(kBrick);
+  maps.Remove(kTray);
+}
+
+// What a move wrote into new blocks is there to be fused into: here the table is seen through it.
+TEST_P(ReferenceTest, MovesIntoTheAirAndIsSeenThrough) {
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.T_WO[kBrick].translation() += Eigen::Vector3d(0.02, 0, 0.21);
+  maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
+  const Pose from_above = reference::LookAt({-0.09, -0.03, 0.6}, {-0.1, 0.03, 0});
+  maps.SetPosesAndFuse(reference::Render(TableOnly(), from_above));
+  maps.CompareWholeBox();
+}
+
+// A brick is set over the ball on the tray on the table: four objects claim the same voxels.
+TEST_P(ReferenceTest, ThreeObjectsAtOnePlace) {
+  Scene scene = TableOnly();
+  AddTray(scene, 0.2, {0.03, 0.02, kTableTop_m + 0.016});
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(TableOnly(), 0.1));
+  maps.SetPosesAndFuse(RenderToys(scene, 0.3));
+  AddBall(scene, {0.03, 0.02, kTableTop_m + 0.04});
+  maps.SetPosesAndFuse(RenderToys(scene, 0.6));
+  AddBrick(scene, 0.7, {-0.15, -0.1, kTableTop_m + 0.045});
+  maps.SetPosesAndFuse(RenderToys(scene, 0.9));
+  scene.T_WO[kBrick] = MakePose(1.1, Eigen::Vector3d::UnitZ(), {0.035, 0.025, kTableTop_m + 0.03});
+  maps.SetPosesAndFuse(RenderToys(scene, 1.2));
+  std::size_t longest = 0;
+  for (const auto& v : maps.map().ListedVoxels()) {
+    longest = std::max(longest, maps.map().ListAt(v).size());
+  }
+  // A thin band does not reach from the brick's top through all that is below it.
+  const int together = std::get<1>(GetParam()) < 4 ? 3 : 4;
+  EXPECT_EQ(static_cast<int>(longest), std::min(LayersOf(method(), config()), together));
+  maps.Remove(kBrick);
+  maps.Remove(kBall);
+  maps.CompareWholeBox();
+}
+
+TEST_P(ReferenceTest, AbsentAndPoselessObjects) {
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  Frame frame = RenderToys(scene, 0.2);
+  frame.T_WO.erase(kTray);  // the tray never gets a pose
+  maps.SetPosesAndFuse(frame);
+  scene.T_WO[kBrick].translation().x() += 0.05;
+  frame = RenderToys(scene, 0.5);
+  frame.T_WO.erase(kTray);
+  frame.T_WO.erase(kBrick);  // seen, but its pose is not given: it stays where it was
+  maps.SetPosesAndFuse(frame);
+  Scene without = scene;
+  without.Erase(kBall);  // neither seen nor given
+  frame = RenderToys(without, 0.7);
+  frame.T_WO.erase(kTray);
+  maps.SetPosesAndFuse(frame);
+  maps.SetObjectPose(9, MakePose(1, Eigen::Vector3d::UnitZ(), {1, 2, 3}));  // never seen
+  maps.SetObjectPose(9, MakePose(2, Eigen::Vector3d::UnitZ(), {1, 2, 3}));
+}
+
+TEST_P(ReferenceTest, InvalidDepthAndNoLabel) {
+  const Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  Frame frame = RenderToys(scene, 0.2);
+  const std::array<float, 5> invalid = {0.0F, -1.0F, 101.0F,
+                                        std::numeric_limits<float>::quiet_NaN(),
+                                        std::numeric_limits<float>::infinity()};
+  for (int v = 20; v < 50; ++v) {
+    for (int u = 30; u < 60; ++u) {
+      if ((u + v) % 3 == 0) frame.depth.at<float>(v, u) = invalid[(u * 7 + v) % invalid.size()];
+    }
+  }
+  maps.SetPosesAndFuse(frame);
+  cv::Mat labels = frame.mask.clone();
+  labels(cv::Rect(40, 30, 25, 12)).setTo(kNoInstance);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.25), labels);
+  frame.depth.setTo(0);
+  maps.SetPosesAndFuse(frame);
+  maps.CompareWholeBox();
+}
+
+TEST_P(ReferenceTest, WithoutContradiction) {
+  MapConfig trusting = config();
+  trusting.contradiction = false;
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin(trusting);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.Erase(kBall);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.3));
+}
+
+// Frames, moves and removals in a random order, with wrong labels and holes in depth.
+class RandomSequenceTest : public ::testing::TestWithParam<std::tuple<Method, int>> {};
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomSequenceTest,
+                         ::testing::Combine(::testing::ValuesIn(AllMethods()),
+                                            ::testing::Range(0, 10)),
+                         [](const auto& parameters) {
+                           return TestName(std::get<0>(parameters.param)) + "_seed_" +
+                                  std::to_string(std::get<1>(parameters.param));
+                         });
+
+MapConfig RandomConfig(Method method, Dice& dice) {
+  MapConfig config = ToyConfig(dice.Whole(2) == 0 ? 4 : 2);
+  config.weight_cap = dice.Whole(2) == 0 ? 3 : 200;
+  config.confidence_cap = 2 + dice.Whole(9);
+  config.moved_confidence = 1 + dice.Whole(2);
+  config.contradiction = dice.Whole(4) != 0;
+  config.relist_on_removal = dice.Whole(2) == 0;
+  if (method == Method::kTsdfpp || method == Method::kTsdfppAnchored) {
+    config.layers = dice.Whole(4);  // 0 is the default
+  }
+  return config;
+}
+
+Pose RandomToyPose(Dice& dice) {
+  // Mostly on the table, where a turn leaves every height exactly as it was.
+  const Eigen::Vector3d axis = dice.Whole(3) == 0
+                                   ? Eigen::Vector3d(dice.Uniform(-1, 1), dice.Uniform(-1, 1), 0.5)
+                                   : Eigen::Vector3d::UnitZ();
+  return MakePose(dice.Uniform(-1.5, 1.5), axis,
+                  {dice.Uniform(-0.13, 0.13), dice.Uniform(-0.13, 0.13),
+                   kTableTop_m + dice.Uniform(0.03, 0.06)});
+}
+
+TEST_P(RandomSequenceTest, EveryEventLeavesTheSameVoxels) {
+  const auto [method, seed] = GetParam();
+  Dice dice(static_cast<std::uint64_t>(seed) + 1);
+  const MapConfig config = RandomConfig(method, dice);
+  SideBySide maps(method, config, ToyBox(), ToyIds());
+  Scene scene = TableWithToys();
+  const auto fuse = [&] {
+    Frame frame = RenderToys(scene, dice.Uniform(0, 6.28));
+    cv::Mat labels = frame.mask.clone();
+    if (dice.Whole(3) == 0) {  // a segmentation that takes one toy for another in half the image
+      const auto from = static_cast<InstanceId>(1 + dice.Whole(3));
+      const auto to = static_cast<InstanceId>(1 + dice.Whole(3));
+      cv::Mat half = labels(cv::Rect(0, 0, labels.cols, labels.rows / 2 + dice.Whole(20)));
+      half.setTo(to, half == from);
+    }
+    if (dice.Whole(3) == 0) {
+      const cv::Rect patch(dice.Whole(60), dice.Whole(50), 20, 12);
+      labels(patch).setTo(kNoInstance);
+    }
+    if (dice.Whole(3) == 0) {
+      frame.depth(cv::Rect(dice.Whole(60), dice.Whole(50), 15, 15)).setTo(0);
+    }
+    if (dice.Whole(3) == 0) frame.T_WO.erase(static_cast<InstanceId>(1 + dice.Whole(3)));
+    maps.SetPosesAndFuse(frame, labels);
+  };
+  fuse();
+  for (int event = 0; event < 7 && !HasFailure(); ++event) {
+    const auto id = static_cast<InstanceId>(1 + dice.Whole(3));
+    switch (dice.Whole(6)) {
+      case 0:
+        scene.T_WO[id] = RandomToyPose(dice);
+        maps.SetObjectPose(id, scene.T_WO[id]);
+        break;
+      case 1:
+        maps.Remove(id);
+        break;
+      case 2:
+        maps.SetObjectPose(id, scene.T_WO[id]);  // perhaps the same numbers again
+        break;
+      default:
+        scene.T_WO[id] = RandomToyPose(dice);
+        fuse();
+    }
+  }
+  maps.CompareWholeBox();
+}
+
+}  // namespace
+}  // namespace tsdfpp

@@ -1,0 +1,153 @@
+// docs/map.md, "`tsdf`: one field", and its variant `tsdf/min`.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tests/reference/dense_map.h"
+
+namespace tsdfpp::reference {
+namespace {
+
+struct Ownership {
+  InstanceId label = kNoInstance;
+  int confidence = 0;
+};
+
+class DenseTsdf : public DenseMap {
+ public:
+  DenseTsdf(const MapConfig& config, const Box& box, bool keep_minimum)
+      : config_(config), keep_minimum_(keep_minimum), field_(box), owners_(box) {}
+
+  void SetObjectPose(InstanceId id, const Pose& T_WO) override {
+    if (const auto T_rel = poses_.Update(id, T_WO)) Move(id, *T_rel);
+  }
+
+  void Fuse(const Frame& frame, const cv::Mat& labels) override {
+    const Pose T_WL = Pose::Identity();
+    Allocate(
+        frame, labels, T_WL, config_, [](InstanceId) { return true; }, field_.blocks);
+    const View view(frame, labels, T_WL, config_);
+    field_.blocks.ForEachVoxelOfBlocks([&](const Eigen::Vector3i& v) {
+      const std::optional<Seen> seen = view.Look(v);
+      if (!seen) return;
+      FuseSeen(*seen, config_, field_.grid.At(v));
+      if (InBand(seen->s, config_)) Vote(seen->label, owners_.At(v));
+    });
+  }
+
+  void Remove(InstanceId id) override {
+    for (const Eigen::Vector3i& v : ObjectVoxels(id)) Vacate(v);
+    poses_.Forget(id);
+  }
+
+  std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {
+    if (owners_(v).label != id) return std::nullopt;
+    return AsValue(field_.grid(v));
+  }
+
+  std::vector<Listing> ListAt(const Eigen::Vector3i& v) const override {
+    const Ownership& owner = owners_(v);
+    if (owner.label == kNoInstance) return {};
+    return {{owner.label, owner.confidence}};
+  }
+
+  std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override {
+    std::vector<Eigen::Vector3i> voxels;
+    ForEachVoxel(field_.grid.box(), [&](const Eigen::Vector3i& v) {
+      if (IsSource(id, v)) voxels.push_back(v);
+    });
+    return voxels;
+  }
+
+  std::vector<Eigen::Vector3i> ListedVoxels() const override {
+    std::vector<Eigen::Vector3i> voxels;
+    ForEachVoxel(field_.grid.box(), [&](const Eigen::Vector3i& v) {
+      if (owners_(v).label != kNoInstance) voxels.push_back(v);
+    });
+    return voxels;
+  }
+
+  std::vector<Eigen::Vector3i> CrossedCubesOf(InstanceId) const override {
+    return CrossedCubes(field_.grid);
+  }
+
+ private:
+  void Vote(InstanceId m, Ownership& owner) const {
+    if (owner.label == kNoInstance) {
+      owner = {m, 1};
+    } else if (owner.label == m) {
+      owner.confidence = std::min(owner.confidence + 1, config_.confidence_cap);
+    } else if (--owner.confidence <= 0) {
+      owner = {m, 1};
+    }
+  }
+
+  void Vacate(const Eigen::Vector3i& v) {
+    field_.grid.At(v) = DenseVoxel{};
+    owners_.At(v) = Ownership{};
+  }
+
+  bool IsSource(InstanceId id, const Eigen::Vector3i& v) const {
+    return owners_(v).label == id && field_.grid(v).observed();
+  }
+
+  std::vector<Eigen::Vector3i> ObjectVoxels(InstanceId id) const {
+    std::vector<Eigen::Vector3i> voxels;
+    for (const Eigen::Vector3i& v : ObservedVoxels(id)) {
+      if (field_.grid(v).distance <= config_.voxel()) voxels.push_back(v);
+    }
+    return voxels;
+  }
+
+  void Move(InstanceId id, const Pose& T_rel) {
+    struct Write {
+      Eigen::Vector3i voxel;
+      DenseVoxel value;
+      int confidence;
+    };
+    std::vector<Write> writes;
+    const Pose T_rel_inverse = T_rel.inverse();
+    ForEachVoxel(field_.grid.box(), [&](const Eigen::Vector3i& v) {
+      const Eigen::Vector3d q = SourcePoint(T_rel_inverse, v, config_.voxel_m);
+      const Neighbourhood place(q);
+      std::array<DenseVoxel, 8> corners;
+      for (int i = 0; i < 8; ++i) {
+        if (!IsSource(id, CubeCorner(place.base, i))) return;
+        corners[i] = field_.grid(CubeCorner(place.base, i));
+      }
+      const DenseVoxel value = InterpolateVoxel(place, corners);
+      if (value.distance > config_.voxel()) return;
+      const Eigen::Vector3d nearest = (q + Eigen::Vector3d::Constant(0.5)).array().floor();
+      writes.push_back({v, value, owners_(nearest.cast<int>()).confidence});
+    });
+    // Vacating first and writing then leaves the same as clearing the old voxels that were not
+    // written; `tsdf/min` has to look at the vacated field.
+    for (const Eigen::Vector3i& v : ObjectVoxels(id)) Vacate(v);
+    for (const Write& write : writes) {
+      const DenseVoxel& there = field_.grid(write.voxel);
+      if (keep_minimum_ && there.observed() && owners_(write.voxel).label != id &&
+          !(std::abs(there.distance) > std::abs(write.value.distance))) {
+        continue;
+      }
+      if (field_.grid.box().AtRim(write.voxel)) BoxTooSmall(write.voxel);
+      field_.grid.At(write.voxel) = write.value;
+      owners_.At(write.voxel) = {id, write.confidence};
+      field_.blocks.AddBlockOf(write.voxel);
+    }
+  }
+
+  MapConfig config_;
+  bool keep_minimum_;
+  DenseVolume field_;
+  DenseGrid<Ownership> owners_;
+  PoseBook poses_;
+};
+
+}  // namespace
+
+std::unique_ptr<DenseMap> MakeDenseTsdf(const MapConfig& config, const Box& box,
+                                        bool keep_minimum) {
+  return std::make_unique<DenseTsdf>(config, box, keep_minimum);
+}
+
+}  // namespace tsdfpp::reference
