@@ -150,7 +150,8 @@ cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, doubl
       }
     }
     const Eigen::Vector2f at = (samples.points[i].head<2>() - bounds.min()) / pixel;
-    const float half = 0.5F * std::sqrt(samples.area_m2[i]) / pixel;
+    // Samples are jittered in their cells: squares a little larger than a cell leave no gaps.
+    const float half = 0.8F * std::sqrt(samples.area_m2[i]) / pixel;
     // y of the world points up in the picture.
     cv::rectangle(image, cv::Point2f(at.x() - half, static_cast<float>(height) - at.y() - half),
                   cv::Point2f(at.x() + half, static_cast<float>(height) - at.y() + half), colour,
@@ -184,15 +185,14 @@ std::vector<int> PictureMaker::Columns() const {
 
 Expected<void> PictureMaker::Take(const CompareRun& run, const Evaluation& evaluation,
                                   const Frame& frame) {
+  const double scale = frame.intrinsics.width / kCellWidth;
   const std::vector<int> columns = Columns();
   if (std::find(columns.begin(), columns.end(), frame.index) != columns.end()) {
-    cells_[&run][frame.index] =
-        DrawScene(evaluation.scene, frame.intrinsics, frame.T_WC, kCellScale);
-    cv::resize(frame.colour, camera_[frame.index], {}, 1 / kCellScale, 1 / kCellScale,
-               cv::INTER_AREA);
+    cells_[&run][frame.index] = DrawScene(evaluation.scene, frame.intrinsics, frame.T_WC, scale);
+    cv::resize(frame.colour, camera_[frame.index], {}, 1 / scale, 1 / scale, cv::INTER_AREA);
   }
   if (frame.index != ExaminedFrame()) return {};
-  after_removal_[&run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, kCellScale);
+  after_removal_[&run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, scale);
   cv::Mat table = DrawTable(*result_.truth, evaluation.table_reconstructed, kTablePixel_m);
   const Measured& hole = evaluation.objects.front().preserved.hole_area_cm2;
   const std::string text =

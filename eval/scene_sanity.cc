@@ -1,5 +1,7 @@
 #include "eval/scene_sanity.h"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -54,9 +56,8 @@ void LeaveOutEdges(const Frame& frame, double voxel_m, cv::Mat& mapped) {
   }
 }
 
-bool SawPoint(const Frame& before, const Eigen::Vector3d& p_W, InstanceId id, double voxel_m) {
+bool SawPoint(const Frame& before, const Eigen::Vector3d& p_C, InstanceId id, double voxel_m) {
   const Intrinsics& k = before.intrinsics;
-  const Eigen::Vector3d p_C = before.T_WC.inverse() * p_W;
   if (p_C.z() <= 0) return false;
   const int u = static_cast<int>(std::lround(k.fx * p_C.x() / p_C.z() + k.cx));
   const int v = static_cast<int>(std::lround(k.fy * p_C.y() / p_C.z() + k.cy));
@@ -65,13 +66,23 @@ bool SawPoint(const Frame& before, const Eigen::Vector3d& p_W, InstanceId id, do
          std::abs(before.depth.at<float>(v, u) - p_C.z()) <= voxel_m;
 }
 
+// From a point of the object in the world now to the camera of an earlier frame, the object moved back.
+Pose BackInTime(const Frame& before, const Frame& now, InstanceId id) {
+  const auto now_WO = now.T_WO.find(id);
+  const auto before_WO = before.T_WO.find(id);
+  if (now_WO == now.T_WO.end() || before_WO == before.T_WO.end()) return before.T_WC.inverse();
+  return before.T_WC.inverse() * before_WO->second * now_WO->second.inverse();
+}
+
 }  // namespace
 
 cv::Mat MappedPixels(const std::deque<Frame>& recent, double voxel_m) {
   const Frame& now = recent.back();
   const Intrinsics& k = now.intrinsics;
   cv::Mat mapped(now.depth.size(), CV_8UC1, cv::Scalar(0));
-  for (int v = 0; v < k.height; ++v) {
+  tbb::parallel_for(0, k.height, [&](int v) {
+    InstanceId last_id = kNoInstance;
+    std::vector<Pose> T_before_W(recent.size());
     for (int u = 0; u < k.width; ++u) {
       const float z = now.depth.at<float>(v, u);
       if (!IsValidDepth(z)) continue;
@@ -80,17 +91,17 @@ cv::Mat MappedPixels(const std::deque<Frame>& recent, double voxel_m) {
           now.T_WC * Eigen::Vector3d((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
       bool seen = true;
       for (std::size_t i = 0; i + 1 < recent.size() && seen; ++i) {
-        Eigen::Vector3d before_W = p_W;
-        const auto now_WO = now.T_WO.find(id);
-        const auto before_WO = recent[i].T_WO.find(id);
-        if (now_WO != now.T_WO.end() && before_WO != recent[i].T_WO.end()) {
-          before_W = before_WO->second * (now_WO->second.inverse() * p_W);
+        if (id != last_id) {
+          last_id = id;
+          for (std::size_t k_before = 0; k_before + 1 < recent.size(); ++k_before) {
+            T_before_W[k_before] = BackInTime(recent[k_before], now, id);
+          }
         }
-        seen = SawPoint(recent[i], before_W, id, voxel_m);
+        seen = SawPoint(recent[i], T_before_W[i] * p_W, id, voxel_m);
       }
       if (seen) mapped.at<std::uint8_t>(v, u) = 255;
     }
-  }
+  });
   LeaveOutEdges(now, voxel_m, mapped);
   return mapped;
 }

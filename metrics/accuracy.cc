@@ -1,6 +1,7 @@
 #include "metrics/accuracy.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "metrics/mesh_tools.h"
 
@@ -57,12 +58,12 @@ Measured ScoreLabelPurity(const SampleSet& samples_W, InstanceId object,
   for (const PlacedTruth& truth : truths) {
     (truth.surface->id() == object ? own : others).push_back(truth);
   }
-  const NearestTruth to_own = FindNearestTruth(samples_W.points, own);
-  const NearestTruth to_others = FindNearestTruth(samples_W.points, others);
+  std::vector<float> limit_m = FindNearestTruth(samples_W.points, own).distance_m;
+  for (float& limit : limit_m) limit -= static_cast<float>(tie_m);
+  const NearestTruth others_nearer = FindNearestTruth(samples_W.points, others, limit_m);
   Selection pure(samples_W.size(), 0);
   for (std::size_t i = 0; i < pure.size(); ++i) {
-    const double own_m = to_own.distance_m[i];
-    pure[i] = own_m <= static_cast<double>(to_others.distance_m[i]) + tie_m ? 1 : 0;
+    pure[i] = others_nearer.object[i] == kNoInstance && std::isfinite(limit_m[i]) ? 1 : 0;
   }
   return ShareOf(samples_W, SelectAll(samples_W), pure, "nothing of it is reconstructed");
 }

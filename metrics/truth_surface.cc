@@ -13,9 +13,11 @@ TruthSurface::TruthSurface(TrueModel model)
       bounds_O_(BoundsOf(model_.mesh_O)) {}
 
 NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,
-                              std::span<const PlacedTruth> truths) {
+                              std::span<const PlacedTruth> truths,
+                              std::span<const float> within_m) {
   NearestTruth out;
   out.distance_m.assign(points_W.size(), std::numeric_limits<float>::infinity());
+  if (!within_m.empty()) out.distance_m.assign(within_m.begin(), within_m.end());
   out.object.assign(points_W.size(), kNoInstance);
   std::vector<std::size_t> asked;
   std::vector<Eigen::Vector3f> points_O;

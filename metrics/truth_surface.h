@@ -39,12 +39,15 @@ struct PlacedTruth {
 
 // For each point (world frame) the distance to the nearest of the true surfaces, metres, and its
 // object; infinite and kNoInstance where there is none. At equal distance the first in `truths`.
+// With `within_m`, a limit a point, surfaces that are not nearer than it are passed over (and that
+// limit is given back with kNoInstance): far cheaper where most points are far from everything.
 struct NearestTruth {
   std::vector<float> distance_m;
   std::vector<InstanceId> object;
 };
 NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,
-                              std::span<const PlacedTruth> truths);
+                              std::span<const PlacedTruth> truths,
+                              std::span<const float> within_m = {});
 
 // 1 for each point (world frame) that lies inside one of the true solids.
 std::vector<std::uint8_t> InsideTruth(std::span<const Eigen::Vector3f> points_W,
