@@ -1,5 +1,7 @@
 #include "eval/evaluation.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <chrono>
 
 #include "metrics/mesh_tools.h"
@@ -148,43 +150,49 @@ Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
   }
 
   start = Clock::now();
-  const Evaluator evaluator(truth, voxel_m);
-  double visible_area = 0;
-  double visible_present = 0;
-  for (std::size_t i = 0; i < truth.trackers().size(); ++i) {
-    const SeenTracker& tracker = truth.trackers()[i];
-    const SampleSet& samples = tracker.samples_O();
-    const InstanceId id = tracker.id();
-    const bool moves = movers.contains(id);
-    std::set<InstanceId> removed = movers;
-    removed.erase(id);
-    result.objects.push_back(evaluator.ScoreObject(
-        i, names[i], moves ? alone[id] : result.revealed, removed, last_seen[i],
-        id == kBackground ? &result.table_reconstructed : nullptr));
+  const auto score_objects = [&] {
+    const Evaluator evaluator(truth, voxel_m);
+    double visible_area = 0;
+    double visible_present = 0;
+    for (std::size_t i = 0; i < truth.trackers().size(); ++i) {
+      const SeenTracker& tracker = truth.trackers()[i];
+      const SampleSet& samples = tracker.samples_O();
+      const InstanceId id = tracker.id();
+      const bool moves = movers.contains(id);
+      std::set<InstanceId> removed = movers;
+      removed.erase(id);
+      result.objects.push_back(evaluator.ScoreObject(
+          i, names[i], moves ? alone[id] : result.revealed, removed, last_seen[i],
+          id == kBackground ? &result.table_reconstructed : nullptr));
 
-    const Selection visible = SelectSeenWith(tracker, SampleStatus::kVisible, SelectAll(samples));
-    const Selection present = evaluator.ReconstructedOn(FacesOf(result.scene, id), i, visible);
-    Selection both = visible;
-    Selection scored = ScoredSamples(truth, i);
-    for (std::size_t k = 0; k < both.size(); ++k) {
-      both[k] = visible[k] & present[k];
-      scored[k] = scored[k] & visible[k];
+      const Selection visible = SelectSeenWith(tracker, SampleStatus::kVisible, SelectAll(samples));
+      const Selection present = evaluator.ReconstructedOn(FacesOf(result.scene, id), i, visible);
+      Selection both = visible;
+      Selection scored = ScoredSamples(truth, i);
+      for (std::size_t k = 0; k < both.size(); ++k) {
+        both[k] = visible[k] & present[k];
+        scored[k] = scored[k] & visible[k];
+      }
+      visible_area += SelectedArea_m2(samples, visible);
+      visible_present += SelectedArea_m2(samples, both);
+      result.objects.back().visible_completion =
+          ShareOf(samples, scored, present, "nothing that was seen is visible");
     }
-    visible_area += SelectedArea_m2(samples, visible);
-    visible_present += SelectedArea_m2(samples, both);
-    result.objects.back().visible_completion =
-        ShareOf(samples, scored, present, "nothing that was seen is visible");
-  }
-  result.visible_completion = visible_area > 0 ? Measured::Of(visible_present / visible_area)
-                                               : Measured::Undefined("nothing seen is visible");
-  const GhostScores ghosts = ScoreGhosts(SampleReconstruction(result.scene, {}),
-                                         truth.PlacedWithout({}), voxel_m, &truth.free_space());
-  result.ghost_area_m2 = ghosts.area_m2;
-  result.ghost_share = ghosts.share_of_mesh;
-  result.revealed_ghost_area_m2 = ScoreGhosts(SampleReconstruction(result.revealed, {}),
-                                              truth.PlacedWithout(movers), voxel_m, nullptr)
-                                      .area_m2;
-  result.sanity = ScoreSanity(result.scene, truth.recent(), voxel_m);
+    result.visible_completion = visible_area > 0 ? Measured::Of(visible_present / visible_area)
+                                                 : Measured::Undefined("nothing seen is visible");
+  };
+  const auto score_scene = [&] {
+    const GhostScores ghosts = ScoreGhosts(SampleReconstruction(result.scene, {}),
+                                           truth.PlacedWithout({}), voxel_m, &truth.free_space());
+    result.ghost_area_m2 = ghosts.area_m2;
+    result.ghost_share = ghosts.share_of_mesh;
+    result.revealed_ghost_area_m2 = ScoreGhosts(SampleReconstruction(result.revealed, {}),
+                                                truth.PlacedWithout(movers), voxel_m, nullptr)
+                                        .area_m2;
+    result.sanity = ScoreSanity(result.scene, truth.recent(), voxel_m);
+  };
+  // Each writes its own part of the result.
+  tbb::parallel_invoke(score_objects, score_scene);
   result.evaluate_s = Since(start);
   return result;
 }

@@ -11,7 +11,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr double kCellScale = 2.5;  // images are shown this many times smaller
+constexpr double kCellWidth = 384;  // pixels; images are scaled to it
 constexpr double kTablePixel_m = 0.0025;
 constexpr std::size_t kMaxColumns = 4;
 

@@ -27,7 +27,9 @@ cv::Mat EdgePixels(const Frame& frame, double voxel_m) {
         if (!edge) {
           float step = std::abs(depth(v1, u1) - depth(v, u));
           if (v - dv >= 0 && u - du >= 0) {
-            step = std::abs(depth(v1, u1) - 2 * depth(v, u) + depth(v - dv, u - du));
+            // The slope shown across an edge is none: the step itself has to be large too.
+            step =
+                std::min(step, std::abs(depth(v1, u1) - 2 * depth(v, u) + depth(v - dv, u - du)));
           }
           edge = step > jump;
         }
@@ -66,7 +68,8 @@ bool SawPoint(const Frame& before, const Eigen::Vector3d& p_C, InstanceId id, do
          std::abs(before.depth.at<float>(v, u) - p_C.z()) <= voxel_m;
 }
 
-// From a point of the object in the world now to the camera of an earlier frame, the object moved back.
+// From a point of the object in the world now to the camera of an earlier frame, the object moved
+// back.
 Pose BackInTime(const Frame& before, const Frame& now, InstanceId id) {
   const auto now_WO = now.T_WO.find(id);
   const auto before_WO = before.T_WO.find(id);

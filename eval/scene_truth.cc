@@ -9,8 +9,10 @@ Expected<SceneTruth> SceneTruth::Create(FrameSource& source) {
   SceneTruth truth;
   for (TrueModel& model : models) {
     const InstanceId id = model.info.id;
-    truth.trackers_.emplace_back(SampleModel(model, SampleConfig{}), id);
-    truth.surfaces_.push_back(std::make_unique<TruthSurface>(std::move(model)));
+    const auto& surface =
+        truth.surfaces_.emplace_back(std::make_unique<TruthSurface>(std::move(model)));
+    truth.trackers_.emplace_back(
+        WithoutInner(SampleModel(surface->model(), SampleConfig{}), surface->solid_O()), id);
     truth.T_WO_.push_back(Pose::Identity());
   }
   return truth;

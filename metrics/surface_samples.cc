@@ -147,6 +147,24 @@ SampleSet SampleModel(const TrueModel& model, const SampleConfig& config) {
   return out;
 }
 
+SampleSet WithoutInner(const SampleSet& samples, const Solid& solid) {
+  std::vector<Eigen::Vector3f> outward(samples.size());
+  for (std::size_t i = 0; i < outward.size(); ++i) {
+    outward[i] = samples.points[i] + static_cast<float>(kInnerOffset_m) * samples.normals[i];
+  }
+  const std::vector<std::uint8_t> inner = solid.Contains(outward);
+  SampleSet kept;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (inner[i] != 0) continue;
+    kept.points.push_back(samples.points[i]);
+    kept.normals.push_back(samples.normals[i]);
+    kept.region.push_back(samples.region[i]);
+    kept.triangle.push_back(samples.triangle[i]);
+    kept.area_m2.push_back(samples.area_m2[i]);
+  }
+  return kept;
+}
+
 std::vector<Eigen::Vector3f> TransformPoints(const Pose& T_target_source,
                                              const std::vector<Eigen::Vector3f>& points) {
   std::vector<Eigen::Vector3f> out;

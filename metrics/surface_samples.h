@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/types.h"
+#include "metrics/solid.h"
 
 namespace tsdfpp {
 
@@ -45,6 +46,13 @@ SampleSet SampleMesh(const TriangleMesh& mesh, double per_cm2, std::uint64_t see
 // The same, region by region with the densities of `config`, at least one sample a region that has
 // any area. The stream is the object's id.
 SampleSet SampleModel(const TrueModel& model, const SampleConfig& config);
+
+// Without the samples that lie inside the object: true models are unions of closed parts, so a
+// part's faces go on inside another, where nobody can ever see them, yet a depth test with a margin
+// takes those just under the surface for seen. A sample is inner where the point kInnerOffset_m
+// along its normal is inside `solid`.
+inline constexpr double kInnerOffset_m = 0.0005;
+SampleSet WithoutInner(const SampleSet& samples, const Solid& solid);
 
 // `points` (or, rotated only, `normals`) in another frame.
 std::vector<Eigen::Vector3f> TransformPoints(const Pose& T_target_source,

@@ -86,22 +86,25 @@ std::vector<ModelPart> Truck() {
        yellow, "", ""});
   parts.push_back(
       {"stripe",
-       MakeExtrusion(RoundedRectangle({-0.1615, 0.088}, {0.0495, 0.116}, 0.004), 0.0765, 0.004),
+       // Proud by 0.3 mm alone: a wider ledge would be surface that no 1 cm voxel can hold.
+       MakeExtrusion(RoundedRectangle({-0.1603, 0.088}, {0.0483, 0.116}, 0.004), 0.0753, 0.004),
        {36, 96, 150},
        "",
        ""});
-  parts.push_back({"cabin",
-                   MakeExtrusion(Polygon{{0.056, 0.050},
-                                         {0.150, 0.050},
-                                         {0.157, 0.058},
-                                         {0.156, 0.088},
-                                         {0.148, 0.097},
-                                         {0.126, 0.140},
-                                         {0.118, 0.146},
-                                         {0.064, 0.146},
-                                         {0.056, 0.138}},
-                                 0.070, 0.012),
-                   red, "", ""});
+  parts.push_back(
+      {"cabin",
+       // Joined to the cargo: a slot of less than a voxel between them could not be mapped.
+       MakeExtrusion(Polygon{{0.046, 0.050},
+                             {0.150, 0.050},
+                             {0.157, 0.058},
+                             {0.156, 0.088},
+                             {0.148, 0.097},
+                             {0.126, 0.140},
+                             {0.118, 0.146},
+                             {0.054, 0.146},
+                             {0.046, 0.138}},
+                     0.070, 0.012),
+       red, "", ""});
   parts.push_back(
       {"windscreen",
        MakeExtrusion(Polygon{{0.100, 0.098}, {0.1492, 0.0985}, {0.1302, 0.1355}, {0.100, 0.136}},

@@ -105,5 +105,31 @@ TEST(SurfaceSamples, NothingFromNoArea) {
   EXPECT_EQ(SampleMesh(TriangleMesh{}, 4, 1).size(), 0U);
 }
 
+// Two unit boxes that overlap by half: a quarter of each one's six faces is inside the other (half
+// of four faces, and one whole face).
+TEST(SurfaceSamples, InnerFacesOfOverlappingPartsAreLeftOut) {
+  TriangleMesh mesh = testing::Box({0, 0, 0}, {1, 1, 1});
+  testing::Append(mesh, testing::Box({0.5F, -0.25F, -0.25F}, {1.5F, 1.25F, 1.25F}));
+  constexpr double kPerCm2 = 0.2;
+  const SampleSet all = SampleMesh(mesh, kPerCm2, 1);
+  const Solid solid(mesh);
+  const SampleSet outer = WithoutInner(all, solid);
+  double area = 0;
+  for (std::size_t i = 0; i < outer.size(); ++i) {
+    area += outer.area_m2[i];
+    const Eigen::Vector3f& p = outer.points[i];
+    const Eigen::Vector3f& n = outer.normals[i];
+    const bool of_first = p.x() < 0.5F - 1e-6F;
+    const bool of_second =
+        std::abs(n.x()) > 0.5F || p.y() < 0 || p.y() > 1 || p.z() < 0 || p.z() > 1;
+    EXPECT_TRUE(of_first || of_second) << p.transpose();
+  }
+  // Of the first box 1 + 4 x 0.5 is outside; of the second 2 x 2.25 + 4 x 1.5, less the 1 m^2 of
+  // its face at x = 0.5 that is inside the first. A sample stands for 5 cm^2; only those on the
+  // seams are in doubt.
+  constexpr double kSeams_m2 = 0.02;
+  EXPECT_NEAR(area, 1 + 2 + 4.5 + 6 - 1, kSeams_m2);
+}
+
 }  // namespace
 }  // namespace tsdfpp
