@@ -4,9 +4,27 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <sstream>
 
 namespace tsdfpp {
+namespace {
+
+CLI::Validator Number(bool zero_allowed) {
+  // CLI11's own names the greatest double as the other limit. Words are refused by the option.
+  return {[zero_allowed](const std::string& text) {
+            const double number = std::strtod(text.c_str(), nullptr);
+            if (number > 0 || (zero_allowed && number == 0)) return std::string();
+            return fmt::format("found {}, expected a number {}", text,
+                               zero_allowed ? "from 0" : "above 0");
+          },
+          "", ""};
+}
+
+}  // namespace
+
+CLI::Validator AboveZero() { return Number(false); }
+CLI::Validator NotNegative() { return Number(true); }
 
 ProgressBar::ProgressBar(std::string title)
     : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0) {}

@@ -45,6 +45,10 @@ class ProgressBar {
   bool shown_ = false;
 };
 
+// What a number has to be, for add_option(...)->check().
+CLI::Validator AboveZero();
+CLI::Validator NotNegative();
+
 // The words between commas. Empty text gives none.
 std::vector<std::string> SplitList(const std::string& text);
 

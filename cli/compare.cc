@@ -71,7 +71,7 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();
   app.add_option("--every", options->config.every, "Frames between evaluations")
-      ->check(CLI::PositiveNumber)
+      ->check(AboveZero())
       ->capture_default_str();
   app.add_option("--until", options->config.until,
                  "Where to stop: reveal, end, or a frame's number")

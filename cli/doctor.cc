@@ -13,9 +13,8 @@
 
 namespace tsdfpp {
 
-Run AddDoctor(CLI::App& app, const CommonOptions&) {
-  (void)app;
-  return []() -> Expected<CommandResult> {
+Run AddDoctor(CLI::App&, const CommonOptions& common) {
+  return [&common]() -> Expected<CommandResult> {
     const unsigned cores = std::thread::hardware_concurrency();
     nlohmann::json json{{"tsdfpp", TSDFPP_VERSION},
                         {"cores", cores},
@@ -33,7 +32,8 @@ Run AddDoctor(CLI::App& app, const CommonOptions&) {
     auto gl = GlContext::Create();
     if (!gl) {
       // The rest of what is known is worth printing, and then the fault decides the exit code.
-      std::fputs(text.c_str(), stderr);
+      json["gl"] = nullptr;
+      std::fputs(common.json ? (json.dump(2) + "\n").c_str() : text.c_str(), stdout);
       return tl::unexpected(gl.error());
     }
     const GlInfo& info = (*gl)->info();

@@ -38,7 +38,12 @@ int RunCommand(int argc, char** argv) {
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "tsdfpp: %s (see tsdfpp --help)\n", error.what());
+    // CLI11 misses the subcommand before it looks at the word that is none.
+    const std::vector<std::string> unknown = app.remaining();
+    const std::string what = app.get_subcommands().empty() && !unknown.empty()
+                                 ? "'" + unknown.front() + "' is no subcommand or option"
+                                 : error.what();
+    std::fprintf(stderr, "tsdfpp: %s (see tsdfpp --help)\n", what.c_str());
     return static_cast<int>(ErrorKind::kUsage);
   }
   std::unique_ptr<tbb::global_control> limit;

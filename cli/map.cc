@@ -106,13 +106,12 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "Truncation: paper (10 voxels in front, 10 behind) or close (10, 3)")
       ->capture_default_str();
   app.add_option("--trunc-front", options->trunc_front, "Truncation in front, voxels")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   app.add_option("--trunc-back", options->trunc_back, "Truncation behind, voxels")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--layers", options->map.layers, "Objects a voxel lists (K)")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
+  app.add_option("--layers", options->map.layers, "Objects a voxel lists (K)")->check(AboveZero());
   app.add_option("--voxel", options->map.voxel_m, "Voxel size, metres")->capture_default_str();
-  app.add_option("--until", options->until, "Last frame to map")->check(CLI::NonNegativeNumber);
+  app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
   app.add_option("--out", options->out, "Output folder")->required();

@@ -91,6 +91,7 @@ class Evaluator {
 
     const SampleSet surface = SampleReconstruction(faces, {});
     std::vector<double> thresholds_m;
+    thresholds_m.reserve(kThresholdsVoxels.size());
     for (const double voxels : kThresholdsVoxels) thresholds_m.push_back(voxels * voxel_m_);
     scores.accuracy =
         ScoreAccuracy(surface, {&truth_.surface(i), T_WO}, ScoredRegion(truth_, i), thresholds_m);

@@ -3,9 +3,11 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "eval/rasteriser.h"
+#include "metrics/visibility.h"
 
 namespace tsdfpp {
 namespace {
@@ -68,6 +70,24 @@ bool SawPoint(const Frame& before, const Eigen::Vector3d& p_C, InstanceId id, do
          std::abs(before.depth.at<float>(v, u) - p_C.z()) <= voxel_m;
 }
 
+// Whether the surface at the pixel, by the depth of its neighbours, is seen at less than the
+// steepest incidence at which a sample counts as seen.
+bool SeenSquarely(const Frame& frame, int v, int u) {
+  static const double kLeastCosine =
+      std::cos(VisibilityConfig{}.max_incidence_deg * std::numbers::pi / 180);
+  const Intrinsics& k = frame.intrinsics;
+  const auto point = [&](int pv, int pu) -> Eigen::Vector3d {
+    const double z = frame.depth.at<float>(pv, pu);
+    return {(pu - k.cx) / k.fx * z, (pv - k.cy) / k.fy * z, z};
+  };
+  const Eigen::Vector3d right =
+      point(v, std::min(u + 1, k.width - 1)) - point(v, std::max(u - 1, 0));
+  const Eigen::Vector3d down =
+      point(std::min(v + 1, k.height - 1), u) - point(std::max(v - 1, 0), u);
+  const Eigen::Vector3d normal = right.cross(down).normalized();
+  return std::abs(normal.dot(point(v, u).normalized())) > kLeastCosine;
+}
+
 // From a point of the object in the world now to the camera of an earlier frame, the object moved
 // back.
 Pose BackInTime(const Frame& before, const Frame& now, InstanceId id) {
@@ -92,7 +112,7 @@ cv::Mat MappedPixels(const std::deque<Frame>& recent, double voxel_m) {
       const InstanceId id = now.mask.at<std::uint16_t>(v, u);
       const Eigen::Vector3d p_W =
           now.T_WC * Eigen::Vector3d((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
-      bool seen = true;
+      bool seen = SeenSquarely(now, v, u);
       for (std::size_t i = 0; i + 1 < recent.size() && seen; ++i) {
         if (id != last_id) {
           last_id = id;

@@ -1,5 +1,8 @@
 #include "sequence/image_files.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -22,6 +25,32 @@ void EnableExr() {
   static std::once_flag once;
   std::call_once(once, [] { setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1); });
 }
+
+// OpenCV and the codecs below it print their own words about a damaged image to stderr, where ours
+// belong, and offer no hook. While this lives, what the process prints there is dropped.
+class QuietStderr {
+ public:
+  QuietStderr() : lock_(Mutex()), saved_(dup(STDERR_FILENO)) {
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (saved_ >= 0 && nowhere >= 0) dup2(nowhere, STDERR_FILENO);
+    if (nowhere >= 0) close(nowhere);
+  }
+  ~QuietStderr() {
+    if (saved_ < 0) return;
+    dup2(saved_, STDERR_FILENO);
+    close(saved_);
+  }
+  QuietStderr(const QuietStderr&) = delete;
+  QuietStderr& operator=(const QuietStderr&) = delete;
+
+ private:
+  static std::mutex& Mutex() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  std::lock_guard<std::mutex> lock_;  // two at once would restore each other's silence
+  int saved_;
+};
 
 std::string TypeName(const cv::Mat& image) {
   static constexpr const char* kDepths[] = {"8-bit unsigned", "8-bit signed",   "16-bit unsigned",
@@ -50,6 +79,7 @@ Expected<cv::Mat> Decode(const fs::path& path, cv::Size expected) {
   if (!fs::exists(path, code)) return DataError("{}: no such image", path.string());
   cv::Mat image;
   try {
+    const QuietStderr quiet;
     image = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {
     image.release();

@@ -13,8 +13,8 @@ struct Open3dVolume::Impl {
 };
 
 Open3dVolume::Open3dVolume(double voxel_m, double truncation_m)
-    : impl_(new Impl{{voxel_m, truncation_m,
-                      open3d::pipelines::integration::TSDFVolumeColorType::NoColor}}) {}
+    : impl_(new Impl{
+          {voxel_m, truncation_m, open3d::pipelines::integration::TSDFVolumeColorType::NoColor}}) {}
 
 Open3dVolume::~Open3dVolume() = default;
 

@@ -74,7 +74,8 @@ TriangleMesh RandomMesh(std::uint64_t seed, int triangles, const Pose& T_WC) {
     const auto centre = UniformDraw(seed, 1, static_cast<std::uint64_t>(i));
     const double z = 0.2 + 2.8 * centre[2] - (i % 7 == 0 ? 1.0 : 0.0);
     for (std::uint64_t c = 0; c < 3; ++c) {
-      const auto d = UniformDraw(seed, 2 + static_cast<std::uint32_t>(c), static_cast<std::uint64_t>(i));
+      const auto d =
+          UniformDraw(seed, 2 + static_cast<std::uint32_t>(c), static_cast<std::uint64_t>(i));
       const Eigen::Vector3d p_C(1.4 * (centre[0] - 0.5) * z + 0.5 * (d[0] - 0.5),
                                 1.2 * (centre[1] - 0.5) * z + 0.5 * (d[1] - 0.5),
                                 z + 0.5 * (d[2] - 0.5));

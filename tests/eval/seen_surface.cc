@@ -2,13 +2,11 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <numeric>
 
 #include "metrics/visibility.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {
-
 Expected<FrameSet> ReadFrames(const std::string& scene, int step, int last) {
   const auto path = std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes" / (scene + ".toml");
   TSDFPP_ASSIGN(auto source, OpenScene(path));
@@ -47,10 +45,16 @@ SampleSet SeenSamples(const TriangleMesh& mesh_W, const std::vector<Frame>& fram
   return seen;
 }
 
-double MeanDistance_m(const SampleSet& samples_W, const SurfaceIndex& surface_W) {
-  const std::vector<float> distances_m = surface_W.Nearest(samples_W.points).distance_m;
-  return std::accumulate(distances_m.begin(), distances_m.end(), 0.0) /
-         static_cast<double>(distances_m.size());
+double MeanIn(const Eigen::AlignedBox3f& box_W, const std::vector<Eigen::Vector3f>& points_W,
+              const std::vector<float>& values) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < points_W.size(); ++i) {
+    if (!box_W.contains(points_W[i])) continue;
+    sum += values[i];
+    ++count;
+  }
+  return sum / static_cast<double>(count);
 }
 
 }  // namespace tsdfpp

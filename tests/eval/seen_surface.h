@@ -1,12 +1,11 @@
-// The part of a surface that a set of frames saw, and distances on it: what maps of the same frames
-// are compared on.
+// The part of a surface that a set of frames saw, which is what maps of the same frames are
+// compared on.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "core/frame_source.h"
-#include "metrics/surface_index.h"
 #include "metrics/surface_samples.h"
 
 namespace tsdfpp {
@@ -27,7 +26,8 @@ Expected<FrameSet> ReadFrames(const std::string& scene, int step, int last = 0);
 SampleSet SeenSamples(const TriangleMesh& mesh_W, const std::vector<Frame>& frames,
                       double margin_m);
 
-// Mean over the samples (each stands for an equal area) of the distance to the surface, metres.
-double MeanDistance_m(const SampleSet& samples_W, const SurfaceIndex& surface_W);
+// Mean of the values of the points in the box.
+double MeanIn(const Eigen::AlignedBox3f& box_W, const std::vector<Eigen::Vector3f>& points_W,
+              const std::vector<float>& values);
 
 }  // namespace tsdfpp

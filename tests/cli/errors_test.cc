@@ -1,0 +1,254 @@
+// What a user reads when something is wrong: one sentence on stderr, the right exit code, nothing
+// on stdout, nothing half-written.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "core/files.h"
+#include "tests/cli/run_command.h"
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using test::CommandOutput;
+using test::RunTsdfpp;
+using test::TempFolder;
+using Variables = std::map<std::string, std::string>;
+
+constexpr int kUsage = 2;
+constexpr int kEnvironment = 3;
+constexpr int kData = 4;
+
+// Four frames of a few pixels.
+const char* const kTinyScene = R"(name = "tiny"
+purpose = "For tests of the command."
+frames = 4
+rate_hz = 30
+[camera]
+width = 64
+height = 48
+f = 50.0
+cx = 32
+cy = 24
+target = [0.0, 0.0, 0.74]
+azimuth_deg = [-100.0, -80.0]
+radius_m = [1.2, 1.2]
+height_m = [0.8, 0.8]
+[[object]]
+name = "mug"
+id = 1
+class = "mug"
+model = "mug"
+x = 0.0
+y = 0.0
+)";
+
+void Write(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+// All paths below the folder.
+std::vector<std::string> Below(const fs::path& folder) {
+  std::vector<std::string> paths;
+  if (!fs::exists(folder)) return paths;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    paths.push_back(entry.path().string());
+  }
+  return paths;
+}
+
+class CommandErrors : public testing::Test {
+ protected:
+  void SetUp() override {
+    scene_ = folder_ / "tiny.toml";
+    out_ = folder_ / "out";
+    Write(scene_, kTinyScene);
+  }
+
+  // The command fails with this code and one sentence that holds these words.
+  void ExpectError(const std::vector<std::string>& arguments, int exit_code,
+                   const std::vector<std::string>& words, const Variables& variables = {}) {
+    std::string typed;
+    for (const std::string& argument : arguments) typed += " " + argument;
+    SCOPED_TRACE("tsdfpp" + typed);
+    const CommandOutput output = RunTsdfpp(arguments, folder_.path(), variables);
+    EXPECT_EQ(output.exit_code, exit_code);
+    EXPECT_EQ(output.out, "");
+    EXPECT_TRUE(output.err.starts_with("tsdfpp: ")) << output.err;
+    EXPECT_EQ(std::count(output.err.begin(), output.err.end(), '\n'), 1) << output.err;
+    EXPECT_TRUE(output.err.ends_with("\n")) << output.err;
+    // A sentence, not a dump.
+    EXPECT_LT(output.err.size(), 400U) << output.err;
+    EXPECT_GT(output.err.size(), 20U) << output.err;
+    for (const std::string& word : words) {
+      EXPECT_NE(output.err.find(word), std::string::npos) << word << " is not in: " << output.err;
+    }
+    // The output folder may have been made; no file may be in it, and no hidden leftover beside it.
+    EXPECT_EQ(Below(out_), std::vector<std::string>{});
+    for (const auto& entry : fs::directory_iterator(folder_.path())) {
+      EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path();
+    }
+  }
+
+  // A sequence on disk made from the tiny scene.
+  std::string Generate() {
+    const std::string sequence = folder_ / "sequence";
+    const CommandOutput output = RunTsdfpp({"generate", scene_, "--out", sequence}, folder_.path());
+    EXPECT_EQ(output.exit_code, 0) << output.err;
+    return sequence;
+  }
+
+  TempFolder folder_;
+  std::string scene_;
+  std::string out_;
+};
+
+TEST_F(CommandErrors, Arguments) {
+  ExpectError({}, kUsage, {"ubcommand"});
+  ExpectError({"frobnicate"}, kUsage, {"frobnicate"});
+  ExpectError({"map"}, kUsage, {"SEQ"});
+  ExpectError({"map", scene_}, kUsage, {"--out"});
+  ExpectError({"map", scene_, "--out", out_, "--bogus"}, kUsage, {"--bogus"});
+  ExpectError({"compare", scene_, "--out", out_, "--bogus", "1"}, kUsage, {"--bogus"});
+  ExpectError({"generate", scene_, "--out"}, kUsage, {"--out"});
+  ExpectError({"map", scene_, "--out", out_, "--method", "voxels"}, kUsage,
+              {"voxels", "tsdf++/anchored"});
+  ExpectError({"map", scene_, "--out", out_, "--profile", "thin"}, kUsage,
+              {"thin", "paper", "close"});
+  ExpectError({"map", scene_, "--out", out_, "--poses", "vicon"}, kUsage, {"vicon", "gt", "icp"});
+  ExpectError({"map", scene_, "--out", out_, "--segmentation", "net"}, kUsage, {"net", "gt"});
+  ExpectError({"map", scene_, "--out", out_, "--layers", "0"}, kUsage, {"--layers", "0"});
+  ExpectError({"map", scene_, "--out", out_, "--layers", "3", "--method", "tsdf"}, kUsage,
+              {"--layers", "3", "tsdf"});
+  ExpectError({"map", scene_, "--out", out_, "--voxel", "-0.01"}, kUsage, {"voxel", "-0.01"});
+  ExpectError({"map", scene_, "--out", out_, "--voxel", "wide"}, kUsage, {"--voxel", "wide"});
+  ExpectError({"map", scene_, "--out", out_, "--trunc-front", "0"}, kUsage, {"--trunc-front", "0"});
+  ExpectError({"map", scene_, "--out", out_, "--threads", "0"}, kUsage, {"--threads", "0"});
+  ExpectError({"map", scene_, "--out", out_, "--until", "2.5"}, kUsage, {"--until", "2.5"});
+  ExpectError({"compare", scene_, "--out", out_, "--methods", "tsdf,voxels"}, kUsage, {"voxels"});
+  ExpectError({"compare", scene_, "--out", out_, "--methods", ","}, kUsage, {"--methods"});
+  ExpectError({"compare", scene_, "--out", out_, "--profiles", "paper,thin"}, kUsage, {"thin"});
+  ExpectError({"compare", scene_, "--out", out_, "--every", "0"}, kUsage, {"--every", "0"});
+}
+
+TEST_F(CommandErrors, MissingScene) {
+  for (const char* command : {"generate", "map", "compare"}) {
+    ExpectError({command, folder_ / "none.toml", "--out", out_}, kUsage, {"none.toml"});
+  }
+  ExpectError({"map", folder_ / "none", "--out", out_}, kUsage, {"none", "no such"});
+  // A folder that is no sequence.
+  fs::create_directories(folder_ / "empty");
+  ExpectError({"map", folder_ / "empty", "--out", out_}, kData, {"empty"});
+}
+
+TEST_F(CommandErrors, BrokenScene) {
+  const std::string text = kTinyScene;
+  Write(scene_, text + "[[object\n");
+  for (const char* command : {"generate", "map", "compare"}) {
+    ExpectError({command, scene_, "--out", out_}, kUsage, {"tiny.toml"});
+  }
+  Write(scene_, "colour = \"red\"\n" + text);
+  for (const char* command : {"generate", "map", "compare"}) {
+    ExpectError({command, scene_, "--out", out_}, kUsage, {"tiny.toml", "colour"});
+  }
+  Write(scene_, text + "weight = 3\n");  // in [[object]]
+  ExpectError({"generate", scene_, "--out", out_}, kUsage, {"tiny.toml", "weight"});
+  Write(scene_, "");
+  ExpectError({"generate", scene_, "--out", out_}, kUsage, {"tiny.toml"});
+}
+
+TEST_F(CommandErrors, FrameOrObjectThatIsNotThere) {
+  ExpectError({"map", scene_, "--out", out_, "--until", "5"}, kUsage, {"--until 5", "1 to 4"});
+  ExpectError({"map", scene_, "--out", out_, "--until", "0"}, kUsage, {"--until 0", "1 to 4"});
+  ExpectError({"map", scene_, "--out", out_, "--until", "-3"}, kUsage, {"--until", "-3"});
+  ExpectError({"compare", scene_, "--out", out_, "--until", "5"}, kUsage, {"--until 5", "1 to 4"});
+  ExpectError({"compare", scene_, "--out", out_, "--until", "soon"}, kUsage, {"--until", "soon"});
+  ExpectError({"map", scene_, "--out", out_, "--remove", "1,dragon"}, kUsage, {"dragon", "mug"});
+  ExpectError({"map", scene_, "--out", out_, "--remove", "7"}, kUsage, {"7", "mug"});
+}
+
+TEST_F(CommandErrors, UnusableImages) {
+  const fs::path sequence = Generate();
+  // The first frames are sound, so the fault is met on the way.
+  const auto damage = [&](const fs::path& file, const std::string& bytes) {
+    const std::string sound = ReadFile(sequence / file).value();
+    Write(sequence / file, bytes);
+    for (const char* command : {"map", "compare"}) {
+      ExpectError({command, sequence, "--out", out_}, kData, {file.filename()});
+    }
+    Write(sequence / file, sound);
+  };
+  damage("colour/Color0003.png", "no image");
+  damage("mask_id/Mask0004.png", "");
+  const std::string mask = ReadFile(sequence / "mask_id/Mask0003.png").value();
+  damage("mask_id/Mask0003.png", mask.substr(0, mask.size() / 2));
+  damage("depth_original/Depth0003.exr", "no image");
+  const std::string depth = ReadFile(sequence / "depth_original/Depth0003.exr").value();
+  damage("depth_original/Depth0003.exr", depth.substr(0, depth.size() / 2));
+
+  std::vector<unsigned char> small;
+  ASSERT_TRUE(cv::imencode(".png", cv::Mat(24, 32, CV_8UC3, cv::Scalar(1, 2, 3)), small));
+  damage("colour/Color0002.png", std::string(small.begin(), small.end()));
+  ASSERT_TRUE(cv::imencode(".png", cv::Mat(24, 32, CV_8UC1, cv::Scalar(0)), small));
+  damage("mask_id/Mask0002.png", std::string(small.begin(), small.end()));
+
+  fs::remove(sequence / "mask_id/Mask0003.png");
+  ExpectError({"map", sequence, "--out", out_}, kData, {"Mask0003.png"});
+}
+
+TEST_F(CommandErrors, NoOpenGl) {
+  for (const char* command : {"generate", "map", "compare"}) {
+    ExpectError({command, scene_, "--out", out_}, kUsage, {"MUJOCO_GL", "nonsense"},
+                {{"MUJOCO_GL", "nonsense"}});
+  }
+  // A machine without the libraries: the loader finds files of that name that are none.
+  fs::create_directories(folder_ / "lib");
+  for (const char* name : {"libEGL.so.1", "libOSMesa.so.8"}) {
+    Write(folder_ / "lib" / name, std::string(4096, 'x'));
+  }
+  for (const auto& [backend, library] :
+       {std::pair<std::string, std::string>{"egl", "libEGL.so.1"}, {"osmesa", "libOSMesa.so.8"}}) {
+    for (const char* command : {"generate", "map", "compare"}) {
+      ExpectError({command, scene_, "--out", out_}, kEnvironment, {library, "install"},
+                  {{"MUJOCO_GL", backend}, {"LD_LIBRARY_PATH", (folder_ / "lib").string()}});
+    }
+  }
+}
+
+// A sequence on disk needs no OpenGL.
+TEST_F(CommandErrors, MapsASequenceWithoutOpenGl) {
+  const std::string sequence = Generate();
+  const CommandOutput output =
+      RunTsdfpp({"map", sequence, "--out", out_}, folder_.path(), {{"MUJOCO_GL", "nonsense"}});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(output.err, "");
+}
+
+// Below a regular file no folder can be made, not even by root.
+TEST_F(CommandErrors, UnwritableOutput) {
+  Write(folder_ / "file", "kept");
+  for (const char* command : {"generate", "map", "compare"}) {
+    ExpectError({command, scene_, "--out", folder_ / "file/out"}, kEnvironment, {"file"});
+    EXPECT_EQ(ReadFile(folder_ / "file"), "kept") << command;
+  }
+  for (const char* command : {"map", "compare"}) {
+    ExpectError({command, scene_, "--out", folder_ / "file"}, kEnvironment, {"file"});
+    EXPECT_EQ(ReadFile(folder_ / "file"), "kept") << command;
+  }
+  // Someone else's folder is not a place for a sequence.
+  fs::create_directories(folder_ / "mine");
+  Write(folder_ / "mine/letter.txt", "kept");
+  ExpectError({"generate", scene_, "--out", folder_ / "mine"}, kUsage, {"mine"});
+  ExpectError({"generate", scene_, "--out", folder_ / "mine", "--overwrite"}, kUsage, {"mine"});
+  EXPECT_EQ(ReadFile(folder_ / "mine/letter.txt"), "kept");
+}
+
+}  // namespace
+}  // namespace tsdfpp
