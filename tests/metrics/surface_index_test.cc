@@ -89,8 +89,8 @@ TEST(MeshTools, DegenerateTriangleIsItsSegment) {
   EXPECT_FLOAT_EQ(PointTriangleDistance({4, 4, 0}, a, b, a), 5);
 }
 
-// Marching cubes makes triangles of no area where a distance is exactly 0; Open3D as Debian builds it
-// aborts on them.
+// Marching cubes makes triangles of no area where a distance is exactly 0; Open3D as Debian builds
+// it aborts on them.
 TEST(SurfaceIndex, DegenerateTrianglesChangeNothing) {
   const TriangleMesh shards = Shards(100);
   TriangleMesh with_degenerate = shards;
