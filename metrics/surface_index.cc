@@ -15,18 +15,19 @@ using open3d::core::Tensor;
 
 namespace {
 
-// A triangle thinner than this share of its longest edge is left out of the index: Open3D's closest
-// point divides by its area in single precision, and Debian's build aborts on the NaN. What is left
-// out lies within that share of an edge from its neighbours.
-constexpr double kThinnest = 1e-3;
+// A triangle with an edge shorter than this is left out of the index: Open3D's closest point
+// divides by an edge's squared length, taken in single precision as a difference of products with
+// the query's distance (which for queries up to some 80 m away vanishes below this length), and
+// Debian's build aborts on the NaN. What is left out is a sliver of this width along its
+// neighbours.
+constexpr float kShortestEdge_m = 5e-6F;
 
-bool IsThin(const TriangleMesh& mesh, std::size_t triangle) {
-  double longest = 0;
+bool IsSliver(const TriangleMesh& mesh, std::size_t triangle) {
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f edge = Corner(mesh, triangle, (i + 1) % 3) - Corner(mesh, triangle, i);
-    longest = std::max(longest, edge.cast<double>().squaredNorm());
+    if (edge.norm() < kShortestEdge_m) return true;
   }
-  return 2 * AreaVector(mesh, triangle).norm() <= kThinnest * longest;
+  return false;
 }
 
 }  // namespace
@@ -53,7 +54,7 @@ SurfaceIndex::SurfaceIndex(TriangleMesh mesh) : mesh_(std::move(mesh)) {
   auto impl = std::make_unique<Impl>();
   std::vector<std::array<std::uint32_t, 3>> kept;
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-    if (IsThin(mesh_, t)) continue;
+    if (IsSliver(mesh_, t)) continue;
     kept.push_back(mesh_.triangles[t]);
     impl->indexed.push_back(static_cast<std::uint32_t>(t));
   }
