@@ -1,13 +1,21 @@
 // tsdfpp_bench side-by-side [options], or Google Benchmark's own options for the kernels.
 #include <benchmark/benchmark.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <string_view>
 
 #include "bench/side_by_side.h"
 
 int main(int argc, char** argv) {
+  // OpenMP's waiting threads would take the cores from whoever comes after Open3D; the library
+  // reads this as it is loaded, so the program starts itself again.
+  if (std::getenv("OMP_WAIT_POLICY") == nullptr) {
+    setenv("OMP_WAIT_POLICY", "passive", 1);
+    execv("/proc/self/exe", argv);
+  }
   if (argc < 2 || std::string_view(argv[1]) != "side-by-side") {
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;

@@ -8,7 +8,10 @@ function(tsdfpp_compile_options target)
             -Wshadow
             -Werror
             # One result for all compilers and instruction sets: no fused multiply-add behind our back.
-            -ffp-contract=off)
+            -ffp-contract=off
+            # Values are unchanged by these; without them loops with a square root or a choice are not vectorised.
+            -fno-math-errno
+            -fno-trapping-math)
   if(TSDFPP_SANITIZE)
     # Instrumented, GCC 12 takes the error inside every tl::expected for uninitialised.
     target_compile_options(${target} PRIVATE -fsanitize=${TSDFPP_SANITIZE} -fno-omit-frame-pointer

@@ -9,7 +9,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kPixelStride = 2;
+constexpr int kPixelStride = 4;  // a block is far larger than four pixels
 constexpr int kRowsPerTask = 32;
 
 // Remembers the keys met lately, so that most repetitions are dropped before sorting.
@@ -33,8 +33,11 @@ struct Lattice {
   Eigen::Vector3d camera_L;
 };
 
+// floor(x + 0.5), without a call into the mathematical library.
 int NearestVoxel(double coordinate_voxels) {
-  return static_cast<int>(std::floor(coordinate_voxels + 0.5));
+  const double shifted = coordinate_voxels + 0.5;
+  const int truncated = static_cast<int>(shifted);
+  return truncated - (shifted < truncated ? 1 : 0);
 }
 
 // Appends (label, packed block) of the rows [begin, end).
@@ -68,12 +71,15 @@ void CollectRows(const FrameView& frame, const MapConfig& config,
       ray /= length;
       const Eigen::Vector3d origin = lattice->camera_L * inverse_voxel;
       const Eigen::Vector3d direction = lattice->R_LC * ray * inverse_voxel;
+      std::uint64_t last_key = ~0ULL;
       const auto visit = [&](double r) {
         if (r < 0) return;
         const Index3 voxel{NearestVoxel(origin.x() + direction.x() * r),
                            NearestVoxel(origin.y() + direction.y() * r),
                            NearestVoxel(origin.z() + direction.z() * r)};
         const std::uint64_t key = PackIndex(BlockOf(voxel));
+        if (key == last_key) return;
+        last_key = key;
         if (keys->Insert(key)) out.emplace_back(label, key);
       };
       const double last = range + back;
@@ -85,6 +91,8 @@ void CollectRows(const FrameView& frame, const MapConfig& config,
       visit(last);
     }
   }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <bit>
+#include <set>
 
 namespace tsdfpp {
 namespace {
@@ -76,18 +77,17 @@ void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
-  std::map<InstanceId, std::vector<Index3>> fused;
-  for (const FusedBlock& block : FuseIntoVolumes(view, config_, volumes_)) {
-    fused[block.id].push_back(block.index);
-  }
-  for (auto& [id, blocks] : fused) {
+  const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
+  std::set<InstanceId> changed_ids;
+  for (const FusedBlock& block : fused) changed_ids.insert(block.id);
+  for (const InstanceId id : changed_ids) {
     const ObjectVolume& volume = volumes_.at(id);
     if (!volume.lattice_is_world) {
       AddReach(id);
       moved_.push_back(id);
       continue;
     }
-    const std::vector<Index3> changed = WithNeighbours(volume.grid, std::move(blocks));
+    const std::vector<Index3> changed = WithNeighbours(volume.grid, ChangedMasks(fused, id));
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, changed.size(), kBlocksPerTask),
         [&](const tbb::blocked_range<std::size_t>& range) {
@@ -98,7 +98,27 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
         tbb::simple_partitioner());
     dirty_.insert(dirty_.end(), changed.begin(), changed.end());
   }
+  // Where one object alone is listed, its distances do not matter; where several are, they order
+  // the list.
+  for (const FusedBlock& block : fused) {
+    if (volumes_.at(block.id).lattice_is_world && IsShared(block.index, block.id)) {
+      dirty_.push_back(block.index);
+    }
+  }
   RefreshIndex();
+}
+
+// Whether another object may be listed in this block of the index.
+bool AnchoredMap::IsShared(const Index3& index, InstanceId id) const {
+  for (const auto& [other, volume] : volumes_) {
+    if (other == id) continue;
+    if (volume.lattice_is_world) {
+      if (volume.grid.Find(index) != nullptr) return true;
+    } else if (const auto reach = reach_.find(other); reach != reach_.end()) {
+      if (std::binary_search(reach->second.begin(), reach->second.end(), index)) return true;
+    }
+  }
+  return false;
 }
 
 void AnchoredMap::Remove(InstanceId id) {
@@ -183,6 +203,13 @@ AnchoredMap::IndexBlock AnchoredMap::ComputeBlock(const Index3& index,
       const Index3 v = VoxelAt(index, place);
       const Eigen::Vector3d q =
           object.T_LW * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
+      // A cover needs a negative corner; most blocks in front of a surface have none.
+      const Index3 base = FloorOf(q);
+      const bool between_planes = q.x() != base.x && q.y() != base.y && q.z() != base.z;
+      if (between_planes && (base.x & 7) != 7 && (base.y & 7) != 7 && (base.z & 7) != 7) {
+        const TsdfBlock* block = object.reader.BlockAt(BlockOf(base));
+        if (block == nullptr || !block->AnyNegative()) continue;
+      }
       const Corners corners = FindCorners(object.reader, q);
       std::optional<float> distance;
       if (!Covers(object.reader, corners, config_.back(), distance)) continue;

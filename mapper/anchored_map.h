@@ -31,6 +31,7 @@ class AnchoredMap final : public LayeredMap {
   // a function of volumes and poses.
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
+  bool IsShared(const Index3& index, InstanceId id) const;
   IndexBlock ComputeBlock(const Index3& index, const Participants& participants) const;
 
   int layers_;

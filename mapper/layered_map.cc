@@ -140,6 +140,14 @@ std::vector<Index3> LayeredMap::WithNeighbours(const TsdfGrid& grid, std::vector
   return blocks;
 }
 
+std::vector<Index3> LayeredMap::ChangedMasks(const std::vector<FusedBlock>& fused, InstanceId id) {
+  std::vector<Index3> changed;
+  for (const FusedBlock& block : fused) {
+    if (block.id == id && block.masks_changed) changed.push_back(block.index);
+  }
+  return changed;
+}
+
 MapMemory LayeredMap::VolumeMemory() const {
   MapMemory memory;
   for (const auto& [id, volume] : volumes_) {

@@ -26,6 +26,9 @@ class LayeredMap : public MapRepresentation {
   // change. Sorted, unique.
   static std::vector<Index3> WithNeighbours(const TsdfGrid& grid, std::vector<Index3> blocks);
 
+  // The fused blocks of one object whose masks changed.
+  static std::vector<Index3> ChangedMasks(const std::vector<FusedBlock>& fused, InstanceId id);
+
   MapMemory VolumeMemory() const;
 
   MapConfig config_;

@@ -42,12 +42,10 @@ VoxelReader::VoxelReader(const TsdfGrid& grid) : grid_(&grid) {
 
 Corners FindCorners(const VoxelReader& reader, const Eigen::Vector3d& q) {
   Corners corners;
-  const Eigen::Vector3d floor = q.array().floor();
-  corners.base = {static_cast<int>(floor.x()), static_cast<int>(floor.y()),
-                  static_cast<int>(floor.z())};
-  for (int axis = 0; axis < 3; ++axis) {
-    corners.fraction[At(axis)] = static_cast<float>(q[axis] - floor[axis]);
-  }
+  corners.base = FloorOf(q);
+  corners.fraction = {static_cast<float>(q.x() - corners.base.x),
+                      static_cast<float>(q.y() - corners.base.y),
+                      static_cast<float>(q.z() - corners.base.z)};
   const Index3& base = corners.base;
   const TsdfBlock* inner = nullptr;
   const bool one_block = (base.x & 7) != 7 && (base.y & 7) != 7 && (base.z & 7) != 7;

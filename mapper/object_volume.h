@@ -57,6 +57,15 @@ struct Corners {
   Index3 base;
 };
 
+// The floor of each coordinate, without a call into the mathematical library.
+inline Index3 FloorOf(const Eigen::Vector3d& q) {
+  const auto floor = [](double x) {
+    const int truncated = static_cast<int>(x);
+    return truncated - (x < truncated ? 1 : 0);
+  };
+  return {floor(q.x()), floor(q.y()), floor(q.z())};
+}
+
 // Corners of the point q, in voxels of the lattice.
 Corners FindCorners(const VoxelReader& reader, const Eigen::Vector3d& q);
 

@@ -1,5 +1,7 @@
 #include "mapper/observation.h"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <cstdlib>
 
@@ -96,16 +98,20 @@ FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
   Require(frame.depth.type() == CV_32FC1 && frame.depth.size() == size);
   Require(labels.type() == CV_16UC1 && labels.size() == size);
   Require(frame.colour.type() == CV_8UC3 && frame.colour.size() == size);
-  depth_ = frame.depth.clone();
+  depth_.create(size, CV_32FC1);
   label_ = labels.isContinuous() ? labels : labels.clone();
   colour_ = frame.colour.isContinuous() ? frame.colour : frame.colour.clone();
   depth = depth_.ptr<float>();
   label = label_.ptr<std::uint16_t>();
   colour = colour_.ptr<std::uint8_t>();
-  float* d = depth_.ptr<float>();
-  for (int i = 0; i < width * height; ++i) {
-    if (!IsValidDepth(d[i]) || label[i] == kNoInstance) d[i] = 0;
-  }
+  tbb::parallel_for(0, height, [&](int v) {
+    const auto* from = frame.depth.ptr<float>(v);
+    auto* to = depth_.ptr<float>(v);
+    const std::uint16_t* ids = label + static_cast<std::ptrdiff_t>(v) * width;
+    for (int u = 0; u < width; ++u) {
+      to[u] = IsValidDepth(from[u]) && ids[u] != kNoInstance ? from[u] : 0;
+    }
+  });
 }
 
 CameraFromLattice::CameraFromLattice(const Pose& T_WC, const Pose& T_WL, bool lattice_is_world) {

@@ -124,41 +124,54 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   }
   Vacate(id);
 
+  struct Arrival {
+    int place;
+    Resampled voxel;
+    std::int16_t confidence;
+  };
   const VoxelReader reader(source);
   const Pose T_inverse = T_rel.inverse();
-  for (const Index3& index : BlocksTouchedBy(reader, T_rel, config_.voxel_m)) {
-    TsdfBlock* block = field_.Find(index);
-    LabelBlock* labels = labels_.Find(index);
-    bool changed = false;
-    for (int place = 0; place < kBlockVoxels; ++place) {
-      const Index3 v = VoxelAt(index, place);
-      const Eigen::Vector3d q =
-          T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
-      const auto voxel = ResampleAt(FindCorners(reader, q));
-      if (!voxel || voxel->distance > config_.voxel()) continue;
-      if (block == nullptr) {
-        block = &field_.FindOrAdd(index);
-        labels = &labels_.FindOrAdd(index);
-      }
-      const std::size_t i = At(place);
-      if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
-          std::abs(block->distance[i]) <= std::abs(voxel->distance)) {
+  const std::vector<Index3> touched = BlocksTouchedBy(reader, T_rel, config_.voxel_m);
+  std::vector<std::vector<Arrival>> arrivals(touched.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, touched.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          for (int place = 0; place < kBlockVoxels; ++place) {
+            const Index3 v = VoxelAt(touched[i], place);
+            const Eigen::Vector3d q =
+                T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
+            const auto voxel = ResampleAt(FindCorners(reader, q));
+            if (!voxel || voxel->distance > config_.voxel()) continue;
+            const Index3 nearest{static_cast<int>(std::floor(q.x() + 0.5)),
+                                 static_cast<int>(std::floor(q.y() + 0.5)),
+                                 static_cast<int>(std::floor(q.z() + 0.5))};
+            arrivals[i].push_back(
+                {place, *voxel,
+                 source_labels.Find(BlockOf(nearest))->confidence[At(PlaceInBlock(nearest))]});
+          }
+        }
+      },
+      tbb::simple_partitioner());
+  for (std::size_t b = 0; b < touched.size(); ++b) {
+    if (arrivals[b].empty()) continue;
+    TsdfBlock& block = field_.FindOrAdd(touched[b]);
+    LabelBlock& labels = labels_.FindOrAdd(touched[b]);
+    for (const Arrival& arrival : arrivals[b]) {
+      const std::size_t i = At(arrival.place);
+      if (rule_ == MoveRule::kKeepNearer && block.weight[i] > 0 && labels.id[i] != id &&
+          std::abs(block.distance[i]) <= std::abs(arrival.voxel.distance)) {
         continue;
       }
-      block->distance[i] = voxel->distance;
-      block->weight[i] = voxel->weight;
-      block->colour[i] = voxel->colour;
-      block->colour_count[i] = voxel->colour_count;
-      const Index3 nearest{static_cast<int>(std::floor(q.x() + 0.5)),
-                           static_cast<int>(std::floor(q.y() + 0.5)),
-                           static_cast<int>(std::floor(q.z() + 0.5))};
-      labels->id[i] = id;
-      labels->confidence[i] =
-          source_labels.Find(BlockOf(nearest))->confidence[At(PlaceInBlock(nearest))];
-      labels->ever |= EverBit(id);
-      changed = true;
+      block.distance[i] = arrival.voxel.distance;
+      block.weight[i] = arrival.voxel.weight;
+      block.colour[i] = arrival.voxel.colour;
+      block.colour_count[i] = arrival.voxel.colour_count;
+      labels.id[i] = id;
+      labels.confidence[i] = arrival.confidence;
+      labels.ever |= EverBit(id);
     }
-    if (changed) block->UpdateMasks(config_.back());
+    block.UpdateMasks(config_.back());
   }
 }
 

@@ -1,5 +1,9 @@
 #include "mapper/tsdf_block.h"
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 namespace tsdfpp {
 namespace {
 
@@ -65,26 +69,49 @@ CrossedCubes CrossedOf(const Rows& observed, const Rows& negative) {
   return crossed;
 }
 
+struct SliceMasks {
+  std::uint64_t observed = 0;
+  std::uint64_t negative = 0;   // distance < 0, observed or not
+  std::uint64_t near_back = 0;  // distance >= -back, observed or not
+};
+
+SliceMasks MasksOf(const float* distance, const float* weight, float back) {
+  SliceMasks masks;
+#ifdef __SSE2__
+  const __m128 zero = _mm_setzero_ps();
+  const __m128 minus_back = _mm_set1_ps(-back);
+  for (unsigned i = 0; i < 64; i += 4) {
+    const __m128 d = _mm_loadu_ps(distance + i);
+    const auto bits = [i](__m128 test) {
+      return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_ps(test))) << i;
+    };
+    masks.observed |= bits(_mm_cmpgt_ps(_mm_loadu_ps(weight + i), zero));
+    masks.negative |= bits(_mm_cmplt_ps(d, zero));
+    masks.near_back |= bits(_mm_cmpge_ps(d, minus_back));
+  }
+#else
+  for (unsigned i = 0; i < 64; ++i) {
+    masks.observed |= static_cast<std::uint64_t>(weight[i] > 0) << i;
+    masks.negative |= static_cast<std::uint64_t>(distance[i] < 0) << i;
+    masks.near_back |= static_cast<std::uint64_t>(distance[i] >= -back) << i;
+  }
+#endif
+  return masks;
+}
+
 }  // namespace
 
-void TsdfBlock::UpdateMasks(float back) {
+bool TsdfBlock::UpdateMasks(float back) {
+  const BlockMask old_observed = observed;
+  const BlockMask old_negative = negative;
+  const BlockMask old_band = band;
   for (std::size_t z = 0; z < kBlockSide; ++z) {
-    std::uint64_t o = 0;
-    std::uint64_t n = 0;
-    std::uint64_t b = 0;
-    for (std::size_t i = 0; i < 64; ++i) {
-      const float d = distance[64 * z + i];
-      const std::uint64_t is_observed = weight[64 * z + i] > 0 ? 1 : 0;
-      const std::uint64_t is_negative = d < 0 ? is_observed : 0;
-      const std::uint64_t is_band = d >= -back ? is_negative : 0;
-      o |= is_observed << i;
-      n |= is_negative << i;
-      b |= is_band << i;
-    }
+    const auto [o, n, b] = MasksOf(&distance[64 * z], &weight[64 * z], back);
     observed[z] = o;
-    negative[z] = n;
-    band[z] = b;
+    negative[z] = n & o;
+    band[z] = b & n & o;
   }
+  return observed != old_observed || negative != old_negative || band != old_band;
 }
 
 CrossedCubes FindCrossedCubes(const TsdfGrid& grid, const Index3& block) {

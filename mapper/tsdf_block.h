@@ -31,8 +31,14 @@ struct TsdfBlock {
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see UpdateCover
 
-  // Brings observed, negative and band in line with the values. `back` in metres.
-  void UpdateMasks(float back);
+  // Brings observed, negative and band in line with the values; true where one of them changed.
+  // `back` in metres.
+  bool UpdateMasks(float back);
+  bool AnyNegative() const {
+    std::uint64_t any = 0;
+    for (const std::uint64_t slice : negative) any |= slice;
+    return any != 0;
+  }
   void Clear(int place) {
     const auto i = static_cast<std::size_t>(place);
     distance[i] = 0;

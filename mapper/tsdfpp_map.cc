@@ -17,14 +17,19 @@ void ForEachBit(std::uint64_t bits, int slice, const Function& function) {
 
 }  // namespace
 
-// What a frame did to one object's block.
-struct TsdfppMap::Change {
+// A block of one object whose cover may have changed in a frame.
+struct TsdfppMap::CoverChange {
   Index3 index;
   InstanceId id = kNoInstance;
   TsdfBlock* block = nullptr;
-  BlockMask votes{};
   BlockMask old_cover{};
+};
+
+// All that a frame did at one block of the index, by increasing id.
+struct TsdfppMap::Group {
   ListBlock* lists = nullptr;
+  std::vector<std::size_t> changes;  // into the cover changes
+  std::vector<std::size_t> votes;    // into the fused blocks
 };
 
 TsdfppMap::TsdfppMap(const MapConfig& config, int layers) : LayeredMap(config), layers_(layers) {}
@@ -83,22 +88,11 @@ void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
 }
 
 void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
-  std::vector<Change> changes;
-  auto next = fused.begin();
+  std::vector<CoverChange> changes;
   for (auto& [id, volume] : volumes_) {
-    std::vector<Index3> indices;
-    const auto first = next;
-    for (; next != fused.end() && next->id == id; ++next) indices.push_back(next->index);
-    auto vote = first;
-    for (const Index3& index : WithNeighbours(volume.grid, std::move(indices))) {
-      Change change;
-      change.index = index;
-      change.id = id;
-      change.block = volume.grid.Find(index);
-      change.old_cover = change.block->cover;
-      change.lists = &ListsOf(index);
-      if (vote != next && vote->index == index) change.votes = (vote++)->votes;
-      changes.push_back(change);
+    for (const Index3& index : WithNeighbours(volume.grid, ChangedMasks(fused, id))) {
+      TsdfBlock* block = volume.grid.Find(index);
+      changes.push_back({index, id, block, block->cover});
     }
   }
   // Covers read the neighbours' values, which no longer change.
@@ -110,41 +104,58 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
         }
       },
       tbb::simple_partitioner());
-  std::stable_sort(changes.begin(), changes.end(),
-                   [](const Change& a, const Change& b) { return a.index < b.index; });
-  std::vector<std::size_t> starts;
-  for (std::size_t i = 0; i < changes.size(); ++i) {
-    if (i == 0 || changes[i - 1].index != changes[i].index) starts.push_back(i);
-  }
-  starts.push_back(changes.size());
+
+  BlockGrid<std::size_t> group_of;
+  std::vector<Group> groups;
+  const auto group_at = [&](const Index3& index) -> Group& {
+    std::size_t& number = group_of.FindOrAdd(index);
+    if (number == 0) {
+      groups.push_back({&ListsOf(index), {}, {}});
+      number = groups.size();
+    }
+    return groups[number - 1];
+  };
+  for (std::size_t i = 0; i < changes.size(); ++i) group_at(changes[i].index).changes.push_back(i);
+  for (std::size_t i = 0; i < fused.size(); ++i) group_at(fused[i].index).votes.push_back(i);
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, starts.size() - 1, kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, groups.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          ApplyChanges(changes.data() + starts[i], changes.data() + starts[i + 1]);
+          ApplyGroup(groups[i], fused, changes);
         }
       },
       tbb::simple_partitioner());
 }
 
-void TsdfppMap::ApplyChanges(const Change* begin, const Change* end) {
-  ListBlock& lists = *begin->lists;
+void TsdfppMap::ApplyGroup(const Group& group, const std::vector<FusedBlock>& fused,
+                           const std::vector<CoverChange>& changes) {
+  ListBlock& lists = *group.lists;
   for (int z = 0; z < kBlockSide; ++z) {
     const auto slice = static_cast<std::size_t>(z);
-    for (const Change* change = begin; change != end; ++change) {
-      const std::uint64_t lost = change->old_cover[slice] & ~change->block->cover[slice];
-      ForEachBit(lost, z, [&](int place) { ListOf(lists, place).Remove(change->id); });
+    for (const std::size_t i : group.changes) {
+      const CoverChange& change = changes[i];
+      const std::uint64_t lost = change.old_cover[slice] & ~change.block->cover[slice];
+      ForEachBit(lost, z, [&](int place) { ListOf(lists, place).Remove(change.id); });
     }
-    for (const Change* change = begin; change != end; ++change) {
-      const std::uint64_t votes = change->votes[slice] & change->block->cover[slice];
-      ForEachBit(votes, z,
-                 [&](int place) { ListOf(lists, place).Vote(change->id, config_.confidence_cap); });
+    for (const std::size_t i : group.votes) {
+      const FusedBlock& vote = fused[i];
+      const std::uint64_t votes = vote.votes[slice] & vote.block->cover[slice];
+      ForEachBit(votes, z, [&](int place) {
+        // Nearly every vote is for the active object.
+        ListEntry& active = lists[static_cast<std::size_t>(place * layers_)];
+        if (active.id != vote.id) {
+          ListOf(lists, place).Vote(vote.id, config_.confidence_cap);
+        } else if (active.confidence < config_.confidence_cap) {
+          ++active.confidence;
+        }
+      });
     }
-    for (const Change* change = begin; change != end; ++change) {
-      const std::uint64_t gained = change->block->cover[slice] & ~change->old_cover[slice];
+    for (const std::size_t i : group.changes) {
+      const CoverChange& change = changes[i];
+      const std::uint64_t gained = change.block->cover[slice] & ~change.old_cover[slice];
       ForEachBit(gained, z, [&](int place) {
         VoxelList list = ListOf(lists, place);
-        if (!list.Lists(change->id)) list.Append(change->id, 1);
+        if (!list.Lists(change.id)) list.Append(change.id, 1);
       });
     }
   }

@@ -24,14 +24,16 @@ class TsdfppMap final : public LayeredMap {
  private:
   // kBlockVoxels lists of K entries.
   using ListBlock = std::vector<ListEntry>;
-  struct Change;
+  struct CoverChange;
+  struct Group;
 
   ListBlock& ListsOf(const Index3& block);
   VoxelList ListOf(ListBlock& lists, int place) const;
   void Deactivate(InstanceId id);
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
-  void ApplyChanges(const Change* begin, const Change* end);
+  void ApplyGroup(const Group& group, const std::vector<FusedBlock>& fused,
+                  const std::vector<CoverChange>& changes);
 
   int layers_;
   BlockGrid<ListBlock> index_;

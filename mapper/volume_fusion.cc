@@ -49,7 +49,7 @@ bool FuseBlock(const FrameView& frame, const MapConfig& config, const BlockObser
       changed = true;
     }
   }
-  if (changed) block.UpdateMasks(config.back());
+  if (changed) fused.masks_changed = block.UpdateMasks(config.back());
   return changed;
 }
 
@@ -63,8 +63,8 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
   std::map<InstanceId, CameraFromLattice> cameras;
   for (auto& [id, volume] : volumes) {
     cameras.emplace(id, CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world));
-    for (const TsdfGrid::Entry* entry : volume.grid.Sorted()) {
-      tasks.push_back({id, entry->index, entry->block.get(), {}});
+    for (const TsdfGrid::Entry& entry : volume.grid.entries()) {
+      tasks.push_back({id, entry.index, entry.block.get(), {}, false});
     }
   }
   std::vector<std::uint8_t> changed(tasks.size(), 0);

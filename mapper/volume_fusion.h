@@ -22,9 +22,10 @@ inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std
   block.weight[i] = std::min(weight + 1, weight_cap);
   if (colour == nullptr) return;
   const auto count = static_cast<float>(block.colour_count[i]);
+  const float share = 1.0F / (count + 1);
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const auto old = static_cast<float>(block.colour[i][channel]);
-    const float mean = old + (256.0F * static_cast<float>(colour[channel]) - old) / (count + 1);
+    const float mean = old + (256.0F * static_cast<float>(colour[channel]) - old) * share;
     block.colour[i][channel] = static_cast<std::uint16_t>(mean + 0.5F);
   }
   block.colour_count[i] = static_cast<std::uint16_t>(std::min(count + 1, weight_cap));
@@ -35,7 +36,8 @@ struct FusedBlock {
   InstanceId id = kNoInstance;
   Index3 index;
   TsdfBlock* block = nullptr;
-  BlockMask votes{};  // voxels with an observation of this object in band
+  BlockMask votes{};           // voxels with an observation of this object in band
+  bool masks_changed = false;  // of observed, negative, band: only then can a cover change
 };
 
 // Allocates the blocks of the labels in the frame (making volumes for new labels), fuses, applies

@@ -221,8 +221,7 @@ TEST(Compare, TwiceTheSameWhateverTheThreads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     auto source = OpenSource(kMini);
     ASSERT_TRUE(source.has_value()) << source.error().message;
-    const auto result =
-        RunCompare(**source, CloseConfig(7, "12"), folder / name, "the command", {});
+    const auto result = RunCompare(**source, CloseConfig(4, "8"), folder / name, "the command", {});
     ASSERT_TRUE(result.has_value()) << result.error().message;
   };
   compare(2, "first");

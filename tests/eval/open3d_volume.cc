@@ -1,5 +1,6 @@
 #include "tests/eval/open3d_volume.h"
 
+#include <omp.h>
 #include <open3d/geometry/RGBDImage.h>
 #include <open3d/geometry/TriangleMesh.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
@@ -19,6 +20,8 @@ Open3dVolume::Open3dVolume(double voxel_m, double truncation_m)
 Open3dVolume::~Open3dVolume() = default;
 
 void Open3dVolume::Integrate(const Frame& frame) {
+  // Several threads spin at OpenMP's barriers on a busy machine, many times as long as they work.
+  omp_set_num_threads(1);
   const Intrinsics& k = frame.intrinsics;
   open3d::geometry::RGBDImage image;
   image.depth_.Prepare(k.width, k.height, 1, 4);

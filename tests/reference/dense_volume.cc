@@ -28,8 +28,8 @@ void Allocate(const Frame& frame, const cv::Mat& labels, const Pose& T_WL, const
   const double back = config.trunc_back_voxels * h;
   const Intrinsics& camera = frame.intrinsics;
   const Pose T_LC = T_WL.inverse() * frame.T_WC;
-  for (int v = 0; v < camera.height; v += 2) {
-    for (int u = 0; u < camera.width; u += 2) {
+  for (int v = 0; v < camera.height; v += 4) {
+    for (int u = 0; u < camera.width; u += 4) {
       const InstanceId label = labels.at<std::uint16_t>(v, u);
       const float z = frame.depth.at<float>(v, u);
       if (label == kNoInstance || !IsValidDepth(z) || !wanted(label)) continue;
