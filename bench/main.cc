@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
+#include <string>
 #include <string_view>
+#include <thread>
 
 #include "bench/side_by_side.h"
 
@@ -14,6 +16,8 @@ int main(int argc, char** argv) {
   // reads this as it is loaded, so the program starts itself again.
   if (std::getenv("OMP_WAIT_POLICY") == nullptr) {
     setenv("OMP_WAIT_POLICY", "passive", 1);
+    // Without it Open3D 0.16 does not heed omp_set_num_threads.
+    setenv("OMP_NUM_THREADS", std::to_string(std::thread::hardware_concurrency()).c_str(), 0);
     execv("/proc/self/exe", argv);
   }
   if (argc < 2 || std::string_view(argv[1]) != "side-by-side") {

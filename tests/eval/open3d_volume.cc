@@ -5,6 +5,7 @@
 #include <open3d/geometry/TriangleMesh.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
 
+#include <cstdlib>
 #include <cstring>
 
 namespace tsdfpp {
@@ -21,6 +22,8 @@ Open3dVolume::~Open3dVolume() = default;
 
 void Open3dVolume::Integrate(const Frame& frame) {
   // Several threads spin at OpenMP's barriers on a busy machine, many times as long as they work.
+  // Open3D takes one a core, whatever OpenMP is told, unless this variable is set.
+  setenv("OMP_NUM_THREADS", "1", 1);
   omp_set_num_threads(1);
   const Intrinsics& k = frame.intrinsics;
   open3d::geometry::RGBDImage image;
