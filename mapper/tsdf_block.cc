@@ -46,6 +46,9 @@ Rows GatherRows(const Neighbours& neighbours, BlockMask TsdfBlock::*mask) {
   return rows;
 }
 
+// Row z, y, bit x: whether the cube named by voxel (x - 1, y - 1, z - 1) of the block is crossed.
+using CrossedCubes = std::array<std::array<std::uint16_t, 9>, 9>;
+
 CrossedCubes CrossedOf(const Rows& observed, const Rows& negative) {
   CrossedCubes crossed{};
   for (std::size_t z = 0; z < 9; ++z) {
@@ -112,12 +115,6 @@ bool TsdfBlock::UpdateMasks(float back) {
     band[z] = b & n & o;
   }
   return observed != old_observed || negative != old_negative || band != old_band;
-}
-
-CrossedCubes FindCrossedCubes(const TsdfGrid& grid, const Index3& block) {
-  const Neighbours neighbours = FindNeighbours(grid, block);
-  return CrossedOf(GatherRows(neighbours, &TsdfBlock::observed),
-                   GatherRows(neighbours, &TsdfBlock::negative));
 }
 
 BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {

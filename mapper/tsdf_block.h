@@ -57,11 +57,6 @@ struct TsdfBlock {
 
 using TsdfGrid = BlockGrid<TsdfBlock>;
 
-// Bit (9 z + y) row, bit x: the cube whose lowest corner is voxel (x-1, y-1, z-1) of the block is
-// crossed (all corners observed, zero between them). Reads the masks of the 27 blocks around.
-using CrossedCubes = std::array<std::array<std::uint16_t, 9>, 9>;
-CrossedCubes FindCrossedCubes(const TsdfGrid& grid, const Index3& block);
-
 // The cover mask at the lattice points of this block: band, or corner of a crossed cube.
 BlockMask FindCover(const TsdfGrid& grid, const Index3& block);
 
