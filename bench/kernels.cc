@@ -4,6 +4,7 @@
 #include "mapper/allocation.h"
 #include "mapper/map_representation.h"
 #include "mapper/marching_cubes.h"
+#include "mapper/pull_back.h"
 #include "mapper/volume_fusion.h"
 
 namespace tsdfpp {

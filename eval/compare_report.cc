@@ -133,7 +133,11 @@ const CompareRun* BaselineOf(const CompareResult& result, const CompareRun& run)
 // mean over the frames at which both are defined.
 nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& run) {
   const CompareRun* baseline = BaselineOf(result, run);
-  if (baseline == nullptr) return nullptr;
+  if (baseline == nullptr) {
+    return ToJson(Measured::Undefined(run.config.method == Method::kTsdf
+                                          ? "this is the baseline itself"
+                                          : "the baseline was not run with these settings"));
+  }
   nlohmann::json differences;
   for (const Column& column : Columns()) {
     double sum = 0;
@@ -149,9 +153,11 @@ nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& 
     const Measured theirs = column.value(result, Examined(result, *baseline));
     nlohmann::json& entry = differences[column.csv];
     entry["frames"] = count;
-    entry["mean"] = count == 0 ? nlohmann::json(nullptr) : nlohmann::json(sum / count);
-    entry["examined"] = ours.value && theirs.value ? nlohmann::json(*ours.value - *theirs.value)
-                                                   : nlohmann::json(nullptr);
+    entry["mean"] = ToJson(count == 0 ? Measured::Undefined("never defined for both maps")
+                                      : Measured::Of(sum / count));
+    entry["examined"] = ToJson(!ours.value     ? ours
+                               : !theirs.value ? theirs
+                                               : Measured::Of(*ours.value - *theirs.value));
   }
   return differences;
 }

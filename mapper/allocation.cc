@@ -4,13 +4,17 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <limits>
 #include <set>
+
+#include "mapper/fusion_kernels.h"
 
 namespace tsdfpp {
 namespace {
 
 constexpr int kPixelStride = 4;  // a block is far larger than four pixels
 constexpr int kRowsPerTask = 32;
+constexpr int kNowhere = std::numeric_limits<int>::max();
 
 // Remembers the keys met lately, so that most repetitions are dropped before sorting.
 class RecentKeys {
@@ -33,13 +37,6 @@ struct Lattice {
   Eigen::Vector3d camera_L;
 };
 
-// floor(x + 0.5), without a call into the mathematical library.
-int NearestVoxel(double coordinate_voxels) {
-  const double shifted = coordinate_voxels + 0.5;
-  const int truncated = static_cast<int>(shifted);
-  return truncated - (shifted < truncated ? 1 : 0);
-}
-
 // Appends (label, packed block) of the rows [begin, end).
 void CollectRows(const FrameView& frame, const MapConfig& config,
                  const std::map<InstanceId, Lattice>& lattices, int begin, int end,
@@ -50,6 +47,7 @@ void CollectRows(const FrameView& frame, const MapConfig& config,
   const double step = 2 * config.voxel_m;
   const Intrinsics& k = frame.intrinsics;
   std::map<InstanceId, RecentKeys> recent;
+  BlocksOfPoints blocks(static_cast<std::size_t>((front + back) / step) + 3);
   InstanceId last_label = kNoInstance;
   const Lattice* lattice = nullptr;
   RecentKeys* keys = nullptr;
@@ -69,26 +67,27 @@ void CollectRows(const FrameView& frame, const MapConfig& config,
       const double length = ray.norm();
       const double range = depth * length;
       ray /= length;
-      const Eigen::Vector3d origin = lattice->camera_L * inverse_voxel;
       const Eigen::Vector3d direction = lattice->R_LC * ray * inverse_voxel;
-      std::uint64_t last_key = ~0ULL;
-      const auto visit = [&](double r) {
-        if (r < 0) return;
-        const Index3 voxel{NearestVoxel(origin.x() + direction.x() * r),
-                           NearestVoxel(origin.y() + direction.y() * r),
-                           NearestVoxel(origin.z() + direction.z() * r)};
-        const std::uint64_t key = PackIndex(BlockOf(voxel));
-        if (key == last_key) return;
-        last_key = key;
+      const Eigen::Vector3d origin = lattice->camera_L * inverse_voxel;
+      Index3 last_block{kNowhere, kNowhere, kNowhere};
+      const auto visit = [&](const Index3& block) {
+        if (block == last_block) return;
+        last_block = block;
+        const std::uint64_t key = PackIndex(block);
         if (keys->Insert(key)) out.emplace_back(label, key);
       };
+      const double first = range - front;
       const double last = range + back;
-      for (int i = 0;; ++i) {
-        const double r = (range - front) + step * i;
-        if (r >= last) break;
-        visit(r);
+      std::size_t points = 1;  // the last one included
+      while (first + step * static_cast<double>(points - 1) < last) ++points;
+      BlocksAtPoints({origin.x(), origin.y(), origin.z()},
+                     {direction.x(), direction.y(), direction.z()}, {first, step, last}, points,
+                     blocks);
+      for (std::size_t i = 0; i < points; ++i) {
+        if (first + step * static_cast<double>(i) >= 0) {
+          visit({blocks.x[i], blocks.y[i], blocks.z[i]});
+        }
       }
-      visit(last);
     }
   }
   std::sort(out.begin(), out.end());

@@ -6,6 +6,8 @@
 #include <bit>
 #include <set>
 
+#include "mapper/pull_back.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -37,7 +39,7 @@ struct AnchoredMap::Participants {
   };
   struct Moved {
     InstanceId id;
-    Pose T_LW;
+    std::array<double, 12> T_LW;  // rows
     VoxelReader reader;
     const std::vector<Index3>* reach;
   };
@@ -139,7 +141,7 @@ void AnchoredMap::RefreshIndex() const {
         entry.block->cover = FindCover(volume.grid, entry.index);
       }
     } else {
-      reach_[id] = BlocksTouchedBy(VoxelReader(volume.grid), volume.T_WL, config_.voxel_m);
+      reach_[id] = BlocksTouchedBy(VoxelReader(volume.grid), volume.T_WL, config_.voxel_m, true);
     }
     AddReach(id);
   }
@@ -155,7 +157,7 @@ void AnchoredMap::RefreshIndex() const {
       participants.in_world.push_back({id, &volume.grid});
     } else {
       participants.moved.push_back(
-          {id, volume.T_WL.inverse(), VoxelReader(volume.grid), &reach_[id]});
+          {id, RowsOf(volume.T_WL.inverse()), VoxelReader(volume.grid), &reach_[id]});
     }
   }
   std::vector<IndexBlock> computed(dirty_.size());
@@ -199,21 +201,13 @@ AnchoredMap::IndexBlock AnchoredMap::ComputeBlock(const Index3& index,
   }
   for (const Participants::Moved& object : participants.moved) {
     if (!std::binary_search(object.reach->begin(), object.reach->end(), index)) continue;
+    PulledCover cover;
+    if (!CoverOfBlock(object.reader, object.T_LW, config_.voxel_m, config_.back(), index, cover)) {
+      continue;
+    }
     for (int place = 0; place < kBlockVoxels; ++place) {
-      const Index3 v = VoxelAt(index, place);
-      const Eigen::Vector3d q =
-          object.T_LW * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
-      // A cover needs a negative corner; most blocks in front of a surface have none.
-      const Index3 base = FloorOf(q);
-      const bool between_planes = q.x() != base.x && q.y() != base.y && q.z() != base.z;
-      if (between_planes && (base.x & 7) != 7 && (base.y & 7) != 7 && (base.z & 7) != 7) {
-        const TsdfBlock* block = object.reader.BlockAt(BlockOf(base));
-        if (block == nullptr || !block->AnyNegative()) continue;
-      }
-      const Corners corners = FindCorners(object.reader, q);
-      std::optional<float> distance;
-      if (!Covers(object.reader, corners, config_.back(), distance)) continue;
-      Sift(list_of(place), layers_, {*distance, object.id});
+      const auto i = static_cast<std::size_t>(place);
+      if (cover.covered[i] != 0) Sift(list_of(place), layers_, {cover.distance[i], object.id});
     }
   }
   IndexBlock ids(lists.size());

@@ -7,6 +7,7 @@
 #include "mapper/layered_map.h"
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
+#include "mapper/pull_back.h"
 
 namespace tsdfpp {
 namespace {
@@ -30,7 +31,13 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
   std::vector<Task> tasks;
   tasks.reserve(lists_.size());
-  for (const auto* entry : lists_.Sorted()) tasks.push_back({entry->index, entry->block.get(), {}});
+  const auto sorted = lists_.Sorted();
+  for (const std::uint32_t i :
+       BlocksInView(view, sorted.size(), config_.voxel(), [&](std::size_t k) -> BlockInView {
+         return {sorted[k]->index, &T_CW};
+       })) {
+    tasks.push_back({sorted[i]->index, sorted[i]->block.get(), {}});
+  }
   const auto for_each_task = [&](const auto& function) {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, tasks.size(), kBlocksPerTask),
@@ -80,7 +87,7 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
       if (pixel < 0 || task.lists->active[i].id != id) continue;
       const float s = observation.distance[i];
       if (s <= config_.front()) {
-        FuseVoxel(*block, i, s, frame.colour + 3 * pixel, weight_cap);
+        FuseVoxel(*block, i, s, frame.kernel.colour + pixel, weight_cap);
         changed = true;
       } else if (frame.label[pixel] == id) {
         FuseVoxel(*block, i, config_.front(), nullptr, weight_cap);
@@ -155,8 +162,7 @@ TriangleMesh LiteralMap::SceneMesh() const {
         if (entry->block->active[i].id != id) continue;
         block->distance[i] = of->distance[i];
         block->weight[i] = of->weight[i];
-        block->colour[i] = of->colour[i];
-        block->colour_count[i] = of->colour_count[i];
+        block->SetColour(i, of->FixedColourAt(i), of->colour_count[i]);
       }
     }
     block->UpdateMasks(config_.back());

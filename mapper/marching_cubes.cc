@@ -80,7 +80,7 @@ struct Cell {
   int place;
 };
 
-constexpr std::array<std::uint16_t, 3> kUncoloured{128U << 8U, 128U << 8U, 128U << 8U};
+constexpr FixedColour kUncoloured{128U << 8U, 128U << 8U, 128U << 8U};
 
 void MakeVertices(const Index3& index, const TsdfBlock& block,
                   const std::array<const TsdfBlock*, 8>& around, float voxel, BlockVertices& out) {
@@ -107,9 +107,9 @@ void MakeVertices(const Index3& index, const TsdfBlock& block,
       position[axis] += t;
       const bool coloured0 = block.colour_count[i] > 0;
       const bool coloured1 = other.block->colour_count[j] > 0;
-      const auto& c0 =
-          coloured0 ? block.colour[i] : (coloured1 ? other.block->colour[j] : kUncoloured);
-      const auto& c1 = coloured1 ? other.block->colour[j] : c0;
+      const FixedColour c0 = coloured0 ? block.FixedColourAt(i)
+                                       : (coloured1 ? other.block->FixedColourAt(j) : kUncoloured);
+      const FixedColour c1 = coloured1 ? other.block->FixedColourAt(j) : c0;
       Colour colour{};
       for (std::size_t c = 0; c < 3; ++c) {
         colour[c] = TsdfBlock::Level(static_cast<std::uint16_t>(

@@ -1,8 +1,5 @@
 #include "mapper/object_volume.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <cmath>
 #include <limits>
 
@@ -88,79 +85,8 @@ std::optional<float> DistanceAt(const Corners& corners) {
   return Trilinear(distance, corners.fraction);
 }
 
-bool Covers(const VoxelReader& reader, const Corners& corners, float back,
-            std::optional<float>& distance) {
-  distance = DistanceAt(corners);
-  if (!distance) return false;
-  if (*distance < 0 && *distance >= -back) return true;
-  // The closed cubes that hold the point: one, or more where it lies on a lattice plane.
-  const Index3& base = corners.base;
-  const auto lowest = [&](int axis) { return corners.fraction[At(axis)] == 0 ? -1 : 0; };
-  for (int dz = lowest(2); dz <= 0; ++dz) {
-    for (int dy = lowest(1); dy <= 0; ++dy) {
-      for (int dx = lowest(0); dx <= 0; ++dx) {
-        const bool own = dx == 0 && dy == 0 && dz == 0;
-        const Corners cube =
-            own ? corners
-                : FindCorners(reader, Eigen::Vector3d(base.x + dx, base.y + dy, base.z + dz));
-        bool all = true;
-        bool negative = false;
-        bool positive = false;
-        for (int i = 0; i < 8 && all; ++i) {
-          const TsdfBlock* block = cube.block[At(i)];
-          all = block != nullptr && block->weight[At(cube.place[At(i)])] > 0;
-          if (all) {
-            (block->distance[At(cube.place[At(i)])] < 0 ? negative : positive) = true;
-          }
-        }
-        if (all && negative && positive) return true;
-      }
-    }
-  }
-  return false;
-}
-
-std::optional<Resampled> ResampleAt(const Corners& corners) {
-  std::array<float, 8> distance{};
-  std::array<float, 8> weight{};
-  std::array<float, 8> count{};
-  for (int i = 0; i < 8; ++i) {
-    const TsdfBlock* block = corners.block[At(i)];
-    const std::size_t place = At(corners.place[At(i)]);
-    if (block == nullptr || block->weight[place] <= 0) return std::nullopt;
-    distance[At(i)] = block->distance[place];
-    weight[At(i)] = block->weight[place];
-    count[At(i)] = block->colour_count[place];
-  }
-  Resampled voxel;
-  voxel.distance = Trilinear(distance, corners.fraction);
-  voxel.weight = Trilinear(weight, corners.fraction);
-  voxel.colour_count = static_cast<std::uint16_t>(Trilinear(count, corners.fraction) + 0.5F);
-  float total = 0;
-  std::array<float, 3> colour{};
-  for (int i = 0; i < 8; ++i) {
-    if (count[At(i)] <= 0) continue;
-    float coefficient = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float f = corners.fraction[At(axis)];
-      coefficient *= ((i >> axis) & 1) != 0 ? f : 1 - f;
-    }
-    total += coefficient;
-    const auto& c = corners.block[At(i)]->colour[At(corners.place[At(i)])];
-    for (std::size_t channel = 0; channel < 3; ++channel)
-      colour[channel] += coefficient * c[channel];
-  }
-  if (total > 0) {
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      voxel.colour[channel] = static_cast<std::uint16_t>(colour[channel] / total + 0.5F);
-    }
-  } else {
-    voxel.colour_count = 0;
-  }
-  return voxel;
-}
-
-std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, double voxel_m) {
+std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, double voxel_m,
+                                    bool only_negative) {
   std::vector<Index3> blocks;
   if (reader.empty()) return blocks;
   Eigen::AlignedBox3d box;
@@ -187,7 +113,8 @@ std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, do
     for (int z = block_of(source.min().z() - 1); z <= block_of(source.max().z() + 1); ++z) {
       for (int y = block_of(source.min().y() - 1); y <= block_of(source.max().y() + 1); ++y) {
         for (int x = block_of(source.min().x() - 1); x <= block_of(source.max().x() + 1); ++x) {
-          if (reader.BlockAt({x, y, z}) != nullptr) return true;
+          const TsdfBlock* block_L = reader.BlockAt({x, y, z});
+          if (block_L != nullptr && (!only_negative || block_L->AnyNegative())) return true;
         }
       }
     }
@@ -201,42 +128,6 @@ std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, do
     }
   }
   return blocks;
-}
-
-TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back) {
-  const VoxelReader reader(grid);
-  const std::vector<Index3> candidates = BlocksTouchedBy(reader, T_rel, voxel_m);
-  std::vector<std::unique_ptr<TsdfBlock>> made(candidates.size());
-  const Pose T_inverse = T_rel.inverse();
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, candidates.size(), 8),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          auto block = std::make_unique<TsdfBlock>();
-          bool any = false;
-          for (int place = 0; place < kBlockVoxels; ++place) {
-            const Index3 v = VoxelAt(candidates[i], place);
-            const Eigen::Vector3d q =
-                T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * voxel_m) / voxel_m;
-            const auto voxel = ResampleAt(FindCorners(reader, q));
-            if (!voxel) continue;
-            any = true;
-            block->distance[At(place)] = voxel->distance;
-            block->weight[At(place)] = voxel->weight;
-            block->colour[At(place)] = voxel->colour;
-            block->colour_count[At(place)] = voxel->colour_count;
-          }
-          if (!any) continue;
-          block->UpdateMasks(back);
-          made[i] = std::move(block);
-        }
-      },
-      tbb::simple_partitioner());
-  TsdfGrid moved;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (made[i]) moved.Add(candidates[i], std::move(made[i]));
-  }
-  return moved;
 }
 
 }  // namespace tsdfpp

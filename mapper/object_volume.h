@@ -76,25 +76,10 @@ float Trilinear(const std::array<float, 8>& corner, const std::array<float, 3>& 
 // is unobserved.
 std::optional<float> DistanceAt(const Corners& corners);
 
-// docs/map.md, "Cover". `back` in metres; `distance` is set where it is defined.
-bool Covers(const VoxelReader& reader, const Corners& corners, float back,
-            std::optional<float>& distance);
-
-// The voxel resampled at a point, nothing unless all eight neighbours are observed (paper III-E).
-struct Resampled {
-  float distance = 0;
-  float weight = 0;
-  std::array<std::uint16_t, 3> colour{};
-  std::uint16_t colour_count = 0;
-};
-std::optional<Resampled> ResampleAt(const Corners& corners);
-
-// Moves the values of a volume by T_rel (paper III-E): the new grid, masks up to date but for
-// `cover`.
-TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back);
-
 // Blocks (in Index3's order) whose voxels T * (voxels of the reader's blocks) can touch: the box of
-// the transformed blocks' corners, one voxel larger on all sides.
-std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, double voxel_m);
+// the transformed blocks' corners, one voxel larger on all sides. `only_negative` leaves out the
+// reader's blocks that hold no negative voxel, near which nothing is covered.
+std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, double voxel_m,
+                                    bool only_negative = false);
 
 }  // namespace tsdfpp

@@ -1,7 +1,9 @@
 #include "mapper/observation.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -9,52 +11,15 @@ namespace tsdfpp {
 namespace {
 
 constexpr float kNearest_m = 0.05F;  // voxels closer to the camera's plane are not in view
+constexpr int kTile_px = 32;         // about the size of a block in the image
+constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
+constexpr std::size_t kBlocksPerTask = 512;
 
-// The arithmetic of all voxels of a block. Every instruction set gives the same bits: only
-// correctly rounded operations, and no contraction.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void ProjectBlock(
-    const float* m, const float* intrinsics, float width, float height, float voxel, int x0, int y0,
-    int z0, float* out_z, float* out_scale, std::int32_t* out_pixel) {
-  const float fx = intrinsics[0];
-  const float fy = intrinsics[1];
-  const float cx = intrinsics[2];
-  const float cy = intrinsics[3];
-  const auto stride = static_cast<std::int32_t>(width);
-  for (int z = 0; z < kBlockSide; ++z) {
-    for (int y = 0; y < kBlockSide; ++y) {
-      const float py = static_cast<float>(y0 + y) * voxel;
-      const float pz = static_cast<float>(z0 + z) * voxel;
-      const float bx = (m[1] * py + m[2] * pz) + m[3];
-      const float by = (m[5] * py + m[6] * pz) + m[7];
-      const float bz = (m[9] * py + m[10] * pz) + m[11];
-      const int row = 64 * z + 8 * y;
-      for (int x = 0; x < kBlockSide; ++x) {
-        const float px = static_cast<float>(x0 + x) * voxel;
-        const float cam_x = bx + m[0] * px;
-        const float cam_y = by + m[4] * px;
-        const float cam_z = bz + m[8] * px;
-        const float iz = 1.0F / cam_z;
-        const float u = ((fx * cam_x) * iz + cx) + 0.5F;
-        const float v = ((fy * cam_y) * iz + cy) + 0.5F;
-        const float ray = std::sqrt((cam_x * cam_x + cam_y * cam_y) + cam_z * cam_z);
-        const bool in_view =
-            (cam_z >= kNearest_m) & (u >= 0.0F) & (u < width) & (v >= 0.0F) & (v < height);
-        // Non-negative here, so truncation is the floor.
-        const float safe_u = in_view ? u : 0.0F;
-        const float safe_v = in_view ? v : 0.0F;
-        const std::int32_t pixel =
-            static_cast<std::int32_t>(safe_v) * stride + static_cast<std::int32_t>(safe_u);
-        out_pixel[row + x] = in_view ? pixel : -1;
-        out_z[row + x] = cam_z;
-        out_scale[row + x] = ray * iz;
-      }
-    }
-  }
-}
-
-// Whether a sphere around the block lies wholly outside one of the planes of the view.
-bool CertainlyOutOfView(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
-                        float voxel) {
+// The tile of the image that the middle of a block falls into (the nearest one, where the middle is
+// out of the image), or kOutOfView where a sphere around the block lies wholly outside one of the
+// planes of the view.
+std::uint32_t TileOf(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
+                     float voxel) {
   const Eigen::Vector3f centre_L = Eigen::Vector3f(static_cast<float>(block.x * 8) + 3.5F,
                                                    static_cast<float>(block.y * 8) + 3.5F,
                                                    static_cast<float>(block.z * 8) + 3.5F) *
@@ -65,18 +30,29 @@ bool CertainlyOutOfView(const FrameView& frame, const CameraFromLattice& T_CL, c
     c[r] = m[0] * centre_L.x() + m[1] * centre_L.y() + m[2] * centre_L.z() + m[3];
   }
   const float radius = 3.5F * 1.7321F * voxel * 1.01F;
-  if (c.z() + radius < kNearest_m) return true;
+  if (c.z() + radius < kNearest_m) return kOutOfView;
   const float slack = 1.0F;  // pixels, for rounding to the nearest one
   const auto outside = [&](float normal_xy, float normal_z, float offset) {
     // normal_xy * x + normal_z * z >= 0 inside, up to the normal's length
-    return normal_xy * offset + normal_z * c.z() < -radius * std::hypot(normal_xy, normal_z);
+    return normal_xy * offset + normal_z * c.z() <
+           -radius * std::sqrt(normal_xy * normal_xy + normal_z * normal_z);
   };
   const float left = (-slack - frame.cx) / frame.fx;
   const float right = (static_cast<float>(frame.width) + slack - frame.cx) / frame.fx;
   const float top = (-slack - frame.cy) / frame.fy;
   const float bottom = (static_cast<float>(frame.height) + slack - frame.cy) / frame.fy;
-  return outside(1, -left, c.x()) || outside(-1, right, c.x()) || outside(1, -top, c.y()) ||
-         outside(-1, bottom, c.y());
+  if (outside(1, -left, c.x()) || outside(-1, right, c.x()) || outside(1, -top, c.y()) ||
+      outside(-1, bottom, c.y())) {
+    return kOutOfView;
+  }
+  const float z = std::max(c.z(), kNearest_m);
+  const auto tile = [](float pixel, int size) {
+    const float last = static_cast<float>(size - 1);
+    return static_cast<std::uint32_t>(std::clamp(pixel, 0.0F, last)) / kTile_px;
+  };
+  const auto per_row = static_cast<std::uint32_t>((frame.width + kTile_px - 1) / kTile_px);
+  return tile(frame.fy * c.y() / z + frame.cy, frame.height) * per_row +
+         tile(frame.fx * c.x() / z + frame.cx, frame.width);
 }
 
 void Require(bool condition) {
@@ -100,18 +76,29 @@ FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
   Require(frame.colour.type() == CV_8UC3 && frame.colour.size() == size);
   depth_.create(size, CV_32FC1);
   label_ = labels.isContinuous() ? labels : labels.clone();
-  colour_ = frame.colour.isContinuous() ? frame.colour : frame.colour.clone();
   depth = depth_.ptr<float>();
   label = label_.ptr<std::uint16_t>();
-  colour = colour_.ptr<std::uint8_t>();
+  const auto stride = static_cast<std::size_t>(width);
+  pixels_.resize(stride * static_cast<std::size_t>(height));
+  packed_colour_.resize(pixels_.size());
   tbb::parallel_for(0, height, [&](int v) {
     const auto* from = frame.depth.ptr<float>(v);
-    auto* to = depth_.ptr<float>(v);
-    const std::uint16_t* ids = label + static_cast<std::ptrdiff_t>(v) * width;
+    const auto* ids = label_.ptr<std::uint16_t>(v);
+    const auto* colour = frame.colour.ptr<std::uint8_t>(v);
+    auto* cleaned = depth_.ptr<float>(v);
+    DepthAndLabel* pixel = &pixels_[stride * static_cast<std::size_t>(v)];
+    std::int32_t* packed = &packed_colour_[stride * static_cast<std::size_t>(v)];
     for (int u = 0; u < width; ++u) {
-      to[u] = IsValidDepth(from[u]) && ids[u] != kNoInstance ? from[u] : 0;
+      cleaned[u] = IsValidDepth(from[u]) && ids[u] != kNoInstance ? from[u] : 0;
+      pixel[u] = {cleaned[u], ids[u]};
+      packed[u] = colour[3 * u] | (colour[3 * u + 1] << 8) | (colour[3 * u + 2] << 16);
     }
   });
+  kernel.pixels = pixels_.data();
+  kernel.colour = packed_colour_.data();
+  kernel.width = static_cast<float>(width);
+  kernel.height = static_cast<float>(height);
+  kernel.intrinsics = {fx, fy, cx, cy};
 }
 
 CameraFromLattice::CameraFromLattice(const Pose& T_WC, const Pose& T_WL, bool lattice_is_world) {
@@ -124,28 +111,37 @@ CameraFromLattice::CameraFromLattice(const Pose& T_WC, const Pose& T_WL, bool la
   }
 }
 
+std::vector<std::uint32_t> BlocksInView(const FrameView& frame, std::size_t count, float voxel,
+                                        const std::function<BlockInView(std::size_t)>& block_at) {
+  std::vector<std::uint32_t> tile_of(count);
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, count, kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const BlockInView at = block_at(i);
+          tile_of[i] = TileOf(frame, *at.T_CL, at.block, voxel);
+        }
+      },
+      tbb::simple_partitioner());
+  // Sorted by counting.
+  const int columns = (frame.width + kTile_px - 1) / kTile_px;
+  const int rows = (frame.height + kTile_px - 1) / kTile_px;
+  std::vector<std::uint32_t> first(static_cast<std::size_t>(columns * rows) + 1, 0);
+  for (const std::uint32_t tile : tile_of) {
+    if (tile != kOutOfView) ++first[tile + 1];
+  }
+  for (std::size_t tile = 1; tile < first.size(); ++tile) first[tile] += first[tile - 1];
+  std::vector<std::uint32_t> order(first.back());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (tile_of[i] != kOutOfView) order[first[tile_of[i]]++] = static_cast<std::uint32_t>(i);
+  }
+  return order;
+}
+
 bool ObserveBlock(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
                   float voxel, float back, BlockObservation& out) {
-  if (CertainlyOutOfView(frame, T_CL, block, voxel)) return false;
-  const std::array<float, 4> intrinsics{frame.fx, frame.fy, frame.cx, frame.cy};
-  std::array<float, kBlockVoxels> z;
-  std::array<float, kBlockVoxels> scale;
-  ProjectBlock(T_CL.rows[0].data(), intrinsics.data(), static_cast<float>(frame.width),
-               static_cast<float>(frame.height), voxel, block.x * kBlockSide, block.y * kBlockSide,
-               block.z * kBlockSide, z.data(), scale.data(), out.pixel.data());
-  bool any = false;
-  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    if (out.pixel[i] < 0) continue;
-    const float depth = frame.depth[out.pixel[i]];
-    const float s = (depth - z[i]) * scale[i];
-    if (depth <= 0 || s < -back) {
-      out.pixel[i] = -1;
-    } else {
-      out.distance[i] = s;
-      any = true;
-    }
-  }
-  return any;
+  const Index3 first{block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide};
+  return ObserveVoxels(frame.kernel, T_CL.rows[0].data(), voxel, first, back, out);
 }
 
 }  // namespace tsdfpp

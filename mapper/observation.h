@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <vector>
 
 #include "core/types.h"
-#include "mapper/block_grid.h"
+#include "mapper/fusion_kernels.h"
 
 namespace tsdfpp {
 
@@ -24,14 +26,15 @@ class FrameView {
   float cy = 0;
   const float* depth = nullptr;  // 0 where invalid or labelled kNoInstance
   const std::uint16_t* label = nullptr;
-  const std::uint8_t* colour = nullptr;  // three channels
+  KernelFrame kernel;
   Intrinsics intrinsics;
   Pose T_WC = Pose::Identity();
 
  private:
-  cv::Mat depth_;   // cleaned copy
-  cv::Mat label_;   // continuous
-  cv::Mat colour_;  // continuous
+  std::vector<DepthAndLabel> pixels_;
+  std::vector<std::int32_t> packed_colour_;
+  cv::Mat depth_;  // cleaned copy
+  cv::Mat label_;  // continuous
 };
 
 // T_CL as float rows, exactly T_WC^-1 where the lattice is the world's.
@@ -40,14 +43,19 @@ struct CameraFromLattice {
   std::array<std::array<float, 4>, 3> rows{};
 };
 
-struct BlockObservation {
-  std::array<float, kBlockVoxels> distance{};  // s, metres
-  std::array<std::int32_t, kBlockVoxels>
-      pixel{};  // row-major pixel, or -1 where not in view or s < -back
+// A block to be observed, in a lattice seen from the camera.
+struct BlockInView {
+  Index3 block;
+  const CameraFromLattice* T_CL = nullptr;
 };
 
-// False where the whole block is certainly out of view (then `out` is untouched).
-// `voxel`, `back` in metres.
+// Numbers i of [0, count) whose block `block_at(i)` is not certainly out of view, ordered by the
+// part of the image that the block's middle falls into (then by i), so that one after the other
+// read neighbouring pixels. `voxel` in metres.
+std::vector<std::uint32_t> BlocksInView(const FrameView& frame, std::size_t count, float voxel,
+                                        const std::function<BlockInView(std::size_t)>& block_at);
+
+// False where no voxel of the block is observed. `voxel`, `back` in metres.
 bool ObserveBlock(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
                   float voxel, float back, BlockObservation& out);
 

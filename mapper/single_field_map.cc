@@ -10,6 +10,7 @@
 #include "mapper/layered_map.h"
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
+#include "mapper/pull_back.h"
 
 namespace tsdfpp {
 namespace {
@@ -38,11 +39,16 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   }
   const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
   const auto& blocks = field_.entries();
+  const std::vector<std::uint32_t> order =
+      BlocksInView(view, blocks.size(), config_.voxel(), [&](std::size_t i) -> BlockInView {
+        return {blocks[i].index, &T_CW};
+      });
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, blocks.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, order.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         BlockObservation observation;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        for (std::size_t k = range.begin(); k != range.end(); ++k) {
+          const std::size_t i = order[k];
           const Index3& index = blocks[i].index;
           if (!ObserveBlock(view, T_CW, index, config_.voxel(), config_.back(), observation)) {
             continue;
@@ -56,27 +62,20 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
 
 void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
                                TsdfBlock& block, LabelBlock& labels) const {
-  const float front = config_.front();
-  const auto weight_cap = static_cast<float>(config_.weight_cap);
-  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    const std::int32_t pixel = observation.pixel[i];
-    if (pixel < 0) continue;
-    const float s = observation.distance[i];
-    if (s > front) {
-      FuseVoxel(block, i, front, nullptr, weight_cap);
-      continue;
+  Lanes in_band;
+  Lanes contradicted;
+  FusionRule rule;
+  rule.every_label = true;
+  rule.front = config_.front();
+  rule.weight_cap = static_cast<float>(config_.weight_cap);
+  const FusionResult result =
+      FuseVoxels(frame.kernel, rule, observation, block, in_band, contradicted);
+  if (!result.any_in_band) return;
+  if (VoteLabels(observation, in_band, config_.confidence_cap, labels.id.data(),
+                 labels.confidence.data())) {
+    for (const InstanceId id : labels.id) {
+      if (id != kNoInstance) labels.ever |= EverBit(id);
     }
-    FuseVoxel(block, i, s, frame.colour + 3 * pixel, weight_cap);
-    const InstanceId observed = frame.label[pixel];
-    std::int16_t& confidence = labels.confidence[i];
-    if (labels.id[i] == observed) {
-      if (confidence < config_.confidence_cap) ++confidence;
-      continue;
-    }
-    if (labels.id[i] != kNoInstance && --confidence > 0) continue;
-    labels.id[i] = observed;
-    confidence = 1;
-    labels.ever |= EverBit(observed);
   }
 }
 
@@ -119,59 +118,59 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
       any = any || block->weight[i] > 0;
     }
     if (!any) continue;
+    block->UpdateMasks(config_.back());
     source.Add(entry->index, std::move(block));
     source_labels.FindOrAdd(entry->index) = *entry->block;
   }
   Vacate(id);
 
-  struct Arrival {
-    int place;
-    Resampled voxel;
-    std::int16_t confidence;
-  };
   const VoxelReader reader(source);
   const Pose T_inverse = T_rel.inverse();
+  const std::array<double, 12> T_inverse_rows = RowsOf(T_inverse);
   const std::vector<Index3> touched = BlocksTouchedBy(reader, T_rel, config_.voxel_m);
-  std::vector<std::vector<Arrival>> arrivals(touched.size());
+  std::vector<std::unique_ptr<TsdfBlock>> arrivals(touched.size());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, touched.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          for (int place = 0; place < kBlockVoxels; ++place) {
-            const Index3 v = VoxelAt(touched[i], place);
-            const Eigen::Vector3d q =
-                T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
-            const auto voxel = ResampleAt(FindCorners(reader, q));
-            if (!voxel || voxel->distance > config_.voxel()) continue;
-            const Index3 nearest{static_cast<int>(std::floor(q.x() + 0.5)),
-                                 static_cast<int>(std::floor(q.y() + 0.5)),
-                                 static_cast<int>(std::floor(q.z() + 0.5))};
-            arrivals[i].push_back(
-                {place, *voxel,
-                 source_labels.Find(BlockOf(nearest))->confidence[At(PlaceInBlock(nearest))]});
+          auto block = std::make_unique<TsdfBlock>();
+          if (ResampleBlock(reader, T_inverse_rows, config_.voxel_m, touched[i], *block)) {
+            arrivals[i] = std::move(block);
           }
         }
       },
       tbb::simple_partitioner());
+  const auto confidence_at = [&](const Index3& v) {
+    const Eigen::Vector3d q =
+        T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
+    const Index3 nearest{static_cast<int>(std::floor(q.x() + 0.5)),
+                         static_cast<int>(std::floor(q.y() + 0.5)),
+                         static_cast<int>(std::floor(q.z() + 0.5))};
+    return source_labels.Find(BlockOf(nearest))->confidence[At(PlaceInBlock(nearest))];
+  };
   for (std::size_t b = 0; b < touched.size(); ++b) {
-    if (arrivals[b].empty()) continue;
-    TsdfBlock& block = field_.FindOrAdd(touched[b]);
-    LabelBlock& labels = labels_.FindOrAdd(touched[b]);
-    for (const Arrival& arrival : arrivals[b]) {
-      const std::size_t i = At(arrival.place);
-      if (rule_ == MoveRule::kKeepNearer && block.weight[i] > 0 && labels.id[i] != id &&
-          std::abs(block.distance[i]) <= std::abs(arrival.voxel.distance)) {
+    if (arrivals[b] == nullptr) continue;
+    const TsdfBlock& arrival = *arrivals[b];
+    TsdfBlock* block = nullptr;
+    LabelBlock* labels = nullptr;
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
+      if (block == nullptr) {
+        block = &field_.FindOrAdd(touched[b]);
+        labels = &labels_.FindOrAdd(touched[b]);
+      }
+      if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
+          std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
         continue;
       }
-      block.distance[i] = arrival.voxel.distance;
-      block.weight[i] = arrival.voxel.weight;
-      block.colour[i] = arrival.voxel.colour;
-      block.colour_count[i] = arrival.voxel.colour_count;
-      labels.id[i] = id;
-      labels.confidence[i] = arrival.confidence;
-      labels.ever |= EverBit(id);
+      block->distance[i] = arrival.distance[i];
+      block->weight[i] = arrival.weight[i];
+      block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
+      labels->id[i] = id;
+      labels->confidence[i] = confidence_at(VoxelAt(touched[b], static_cast<int>(i)));
+      labels->ever |= EverBit(id);
     }
-    block.UpdateMasks(config_.back());
+    if (block != nullptr) block->UpdateMasks(config_.back());
   }
 }
 

@@ -33,7 +33,7 @@ class SingleFieldMap final : public MapRepresentation {
   struct LabelBlock {
     LabelBlock() { id.fill(kNoInstance); }
     std::array<InstanceId, kBlockVoxels> id;
-    std::array<std::int16_t, kBlockVoxels> confidence{};
+    std::array<std::uint16_t, kBlockVoxels> confidence{};
     std::uint64_t ever = 0;  // bit (id % 64) of every label that the block ever had
   };
 

@@ -20,10 +20,15 @@ inline void SetBit(BlockMask& mask, int place) {
   mask[static_cast<std::size_t>(place >> 6)] |= 1ULL << static_cast<unsigned>(place & 63);
 }
 
+// One number a voxel for the vectorised loops; -1 is yes and 0 is no where they answer a question.
+using Lanes = std::array<std::int32_t, kBlockVoxels>;
+
+using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
+
 struct TsdfBlock {
   std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
   std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
-  std::array<std::array<std::uint16_t, 3>, kBlockVoxels> colour{};  // 8.8 fixed point
+  std::array<std::array<std::uint16_t, kBlockVoxels>, 3> colour{};  // by channel, 8.8 fixed point
   std::array<std::uint16_t, kBlockVoxels> colour_count{};
 
   BlockMask observed{};  // weight > 0
@@ -43,11 +48,17 @@ struct TsdfBlock {
     const auto i = static_cast<std::size_t>(place);
     distance[i] = 0;
     weight[i] = 0;
-    colour[i] = {};
-    colour_count[i] = 0;
+    SetColour(i, {}, 0);
+  }
+  FixedColour FixedColourAt(std::size_t i) const {
+    return {colour[0][i], colour[1][i], colour[2][i]};
+  }
+  void SetColour(std::size_t i, const FixedColour& fixed, std::uint16_t count) {
+    for (std::size_t channel = 0; channel < 3; ++channel) colour[channel][i] = fixed[channel];
+    colour_count[i] = count;
   }
   Colour ColourAt(int place) const {
-    const auto& c = colour[static_cast<std::size_t>(place)];
+    const FixedColour c = FixedColourAt(static_cast<std::size_t>(place));
     return {Level(c[0]), Level(c[1]), Level(c[2])};
   }
   static std::uint8_t Level(std::uint16_t fixed) {

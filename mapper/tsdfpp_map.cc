@@ -5,6 +5,8 @@
 
 #include <bit>
 
+#include "mapper/pull_back.h"
+
 namespace tsdfpp {
 namespace {
 

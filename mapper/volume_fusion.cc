@@ -21,36 +21,38 @@ void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolum
   }
 }
 
+struct Task : FusedBlock {
+  const CameraFromLattice* T_CL = nullptr;
+};
+
 // True where a voxel of the block changed.
 bool FuseBlock(const FrameView& frame, const MapConfig& config, const BlockObservation& observation,
                FusedBlock& fused) {
-  const float front = config.front();
-  const float half_voxel = 0.5F * config.voxel();
-  const auto weight_cap = static_cast<float>(config.weight_cap);
   TsdfBlock& block = *fused.block;
-  bool changed = false;
-  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    const std::int32_t pixel = observation.pixel[i];
-    if (pixel < 0) continue;
-    const float s = observation.distance[i];
-    if (frame.label[pixel] == fused.id) {
-      const bool in_band = s <= front;
-      FuseVoxel(block, i, in_band ? s : front, in_band ? frame.colour + 3 * pixel : nullptr,
-                weight_cap);
-      if (in_band) SetBit(fused.votes, static_cast<int>(i));
-      changed = true;
-    } else if (config.contradiction && block.weight[i] > 0 && block.distance[i] < -half_voxel &&
-               s >= -half_voxel) {
+  Lanes in_band;
+  Lanes contradicted;
+  FusionRule rule;
+  rule.id = fused.id;
+  rule.contradiction = config.contradiction;
+  rule.front = config.front();
+  rule.half_voxel = 0.5F * config.voxel();
+  rule.weight_cap = static_cast<float>(config.weight_cap);
+  const FusionResult result =
+      FuseVoxels(frame.kernel, rule, observation, block, in_band, contradicted);
+  if (result.any_in_band) fused.votes = MaskOf(in_band);
+  if (result.any_contradicted) {
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      if (contradicted[i] == 0) continue;
       block.Clear(static_cast<int>(i));
-      if (s > config.voxel()) {
-        block.distance[i] = std::min(s, front);
+      if (observation.distance[i] > config.voxel()) {
+        block.distance[i] = std::min(observation.distance[i], rule.front);
         block.weight[i] = 1;
       }
-      changed = true;
     }
   }
-  if (changed) fused.masks_changed = block.UpdateMasks(config.back());
-  return changed;
+  if (!result.any_taken && !result.any_contradicted) return false;
+  fused.masks_changed = block.UpdateMasks(config.back());
+  return true;
 }
 
 }  // namespace
@@ -59,24 +61,29 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
                                         ObjectVolumes& volumes) {
   AllocateBlocks(frame, config, volumes);
 
-  std::vector<FusedBlock> tasks;
+  std::vector<Task> tasks;
   std::map<InstanceId, CameraFromLattice> cameras;
   for (auto& [id, volume] : volumes) {
-    cameras.emplace(id, CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world));
+    const auto camera =
+        cameras.emplace(id, CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world));
     for (const TsdfGrid::Entry& entry : volume.grid.entries()) {
-      tasks.push_back({id, entry.index, entry.block.get(), {}, false});
+      tasks.push_back({{id, entry.index, entry.block.get(), {}, false}, &camera.first->second});
     }
   }
+  const std::vector<std::uint32_t> order =
+      BlocksInView(frame, tasks.size(), config.voxel(), [&](std::size_t i) -> BlockInView {
+        return {tasks[i].index, tasks[i].T_CL};
+      });
   std::vector<std::uint8_t> changed(tasks.size(), 0);
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, tasks.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, order.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         BlockObservation observation;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          FusedBlock& task = tasks[i];
-          if (ObserveBlock(frame, cameras.at(task.id), task.index, config.voxel(), config.back(),
+        for (std::size_t k = range.begin(); k != range.end(); ++k) {
+          Task& task = tasks[order[k]];
+          if (ObserveBlock(frame, *task.T_CL, task.index, config.voxel(), config.back(),
                            observation)) {
-            changed[i] = FuseBlock(frame, config, observation, task) ? 1 : 0;
+            changed[order[k]] = FuseBlock(frame, config, observation, task) ? 1 : 0;
           }
         }
       },

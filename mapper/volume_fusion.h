@@ -15,18 +15,18 @@ using ObjectVolumes = std::map<InstanceId, ObjectVolume>;
 
 // docs/map.md, "Fusion of an observation into a voxel"; distances in metres. `colour` is nullptr
 // where the observation is clamped.
-inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std::uint8_t* colour,
+inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std::int32_t* colour,
                       float weight_cap) {
   const float weight = block.weight[i];
   block.distance[i] = (weight * block.distance[i] + distance) / (weight + 1);
   block.weight[i] = std::min(weight + 1, weight_cap);
   if (colour == nullptr) return;
   const auto count = static_cast<float>(block.colour_count[i]);
-  const float share = 1.0F / (count + 1);
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto old = static_cast<float>(block.colour[i][channel]);
-    const float mean = old + (256.0F * static_cast<float>(colour[channel]) - old) * share;
-    block.colour[i][channel] = static_cast<std::uint16_t>(mean + 0.5F);
+    const auto old = static_cast<float>(block.colour[channel][i]);
+    const auto seen = static_cast<float>((*colour >> (8 * channel)) & 255);
+    const float mean = old + (256.0F * seen - old) / (count + 1);
+    block.colour[channel][i] = static_cast<std::uint16_t>(mean + 0.5F);
   }
   block.colour_count[i] = static_cast<std::uint16_t>(std::min(count + 1, weight_cap));
 }

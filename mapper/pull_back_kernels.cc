@@ -1,0 +1,198 @@
+#include "mapper/pull_back_kernels.h"
+
+#include <algorithm>
+
+// One pass of this file an instruction set (see fusion_kernels.cc).
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "mapper/pull_back_kernels.cc"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace tsdfpp::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+void Points(const std::array<double, 12>& T, double voxel_m, const Index3& first,
+            PulledPoints& points) {
+  const hn::CappedTag<double, kBlockSide> dd;
+  const hn::Rebind<std::int32_t, decltype(dd)> di;
+  const hn::Rebind<float, decltype(dd)> df;
+  const auto h = hn::Set(dd, voxel_m);
+  const auto lane = hn::Iota(dd, 0);
+  std::array<std::array<std::int32_t, kBlockVoxels>, 3> base;
+  auto lowest =
+      std::array{hn::Set(di, 0x7FFFFFFF), hn::Set(di, 0x7FFFFFFF), hn::Set(di, 0x7FFFFFFF)};
+  auto highest =
+      std::array{hn::Set(di, -0x7FFFFFFF), hn::Set(di, -0x7FFFFFFF), hn::Set(di, -0x7FFFFFFF)};
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(dd)) {
+    const double y_m = (first.y + static_cast<int>((i >> 3U) & 7U)) * voxel_m;
+    const double z_m = (first.z + static_cast<int>(i >> 6U)) * voxel_m;
+    const auto x_m = hn::Mul(hn::Add(lane, hn::Set(dd, first.x + static_cast<int>(i & 7U))), h);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double* row = &T[4 * axis];
+      const auto moved =
+          hn::Add(hn::Add(hn::Add(hn::Mul(hn::Set(dd, row[0]), x_m), hn::Set(dd, row[1] * y_m)),
+                          hn::Set(dd, row[2] * z_m)),
+                  hn::Set(dd, row[3]));
+      const auto q = hn::Div(moved, h);
+      const auto floor = hn::Floor(q);
+      hn::StoreU(hn::DemoteTo(df, hn::Sub(q, floor)), df, &points.fraction[axis][i]);
+      const auto corner = hn::DemoteTo(di, floor);
+      hn::StoreU(corner, di, &base[axis][i]);
+      lowest[axis] = hn::Min(lowest[axis], corner);
+      highest[axis] = hn::Max(highest[axis], corner);
+    }
+  }
+  const auto low = [&](std::size_t axis) {
+    return hn::GetLane(hn::MinOfLanes(di, lowest[axis])) - 1;
+  };
+  const auto high = [&](std::size_t axis) {
+    return hn::GetLane(hn::MaxOfLanes(di, highest[axis])) + 1;
+  };
+  points.low = {low(0), low(1), low(2)};
+  points.high = {high(0), high(1), high(2)};
+  const hn::ScalableTag<std::int32_t> dw;
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(dw)) {
+    const auto x = hn::Sub(hn::LoadU(dw, &base[0][i]), hn::Set(dw, points.low.x));
+    const auto y = hn::Sub(hn::LoadU(dw, &base[1][i]), hn::Set(dw, points.low.y));
+    const auto z = hn::Sub(hn::LoadU(dw, &base[2][i]), hn::Set(dw, points.low.z));
+    const auto place = hn::Add(hn::Add(x, hn::ShiftLeft<4>(y)), hn::ShiftLeft<8>(z));
+    hn::StoreU(place, dw, &points.corner[i]);
+  }
+}
+
+constexpr std::array<std::int32_t, 8> kCorner{0,   1,   kPatchSide,       kPatchSide + 1,
+                                              256, 257, 256 + kPatchSide, 257 + kPatchSide};
+
+template <class D, class V>
+V Blend(D d, V low, V high, V fraction) {
+  return hn::Add(hn::Mul(low, hn::Sub(hn::Set(d, 1.0F), fraction)), hn::Mul(high, fraction));
+}
+
+// docs/map.md, "Trilinear interpolation".
+template <class D, class V>
+V Trilinear8(D d, const std::array<V, 8>& c, V fx, V fy, V fz) {
+  const V near = Blend(d, Blend(d, c[0], c[1], fx), Blend(d, c[2], c[3], fx), fy);
+  const V far = Blend(d, Blend(d, c[4], c[5], fx), Blend(d, c[6], c[7], fx), fy);
+  return Blend(d, near, far, fz);
+}
+
+template <bool kOnlyCounted>
+void Interpolate(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+                 float* out) {
+  const hn::ScalableTag<float> df;
+  const hn::RebindToSigned<decltype(df)> di;
+  using V = hn::VFromD<decltype(df)>;
+  const V zero = hn::Zero(df);
+  const V one = hn::Set(df, 1.0F);
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
+    const auto at = hn::LoadU(di, &points.corner[i]);
+    const V fx = hn::LoadU(df, &points.fraction[0][i]);
+    const V fy = hn::LoadU(df, &points.fraction[1][i]);
+    const V fz = hn::LoadU(df, &points.fraction[2][i]);
+    std::array<V, 8> c;
+    for (std::size_t k = 0; k < 8; ++k) {
+      c[k] = hn::GatherIndex(df, values.data() + kCorner[k], at);
+      if constexpr (kOnlyCounted) {
+        const auto counts = [&](V fraction, bool upper) {
+          return upper ? hn::Ne(fraction, zero) : hn::Ne(fraction, one);
+        };
+        c[k] = hn::IfThenElseZero(
+            hn::And(counts(fx, (k & 1U) != 0),
+                    hn::And(counts(fy, (k & 2U) != 0), counts(fz, (k & 4U) != 0))),
+            c[k]);
+      }
+    }
+    hn::StoreU(Trilinear8(df, c, fx, fy, fz), df, out + i);
+  }
+}
+
+void Counted(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+             float* out) {
+  Interpolate<true>(values, points, wanted, out);
+}
+void All(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+         float* out) {
+  Interpolate<false>(values, points, wanted, out);
+}
+
+void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
+             const PulledPoints& points, const std::int32_t* wanted,
+             const std::array<std::uint16_t*, 3>& out, float* totals) {
+  const hn::ScalableTag<float> df;
+  const hn::RebindToSigned<decltype(df)> di;
+  const hn::Rebind<std::uint16_t, decltype(df)> du;
+  using V = hn::VFromD<decltype(df)>;
+  const V zero = hn::Zero(df);
+  const V one = hn::Set(df, 1.0F);
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
+    const auto at = hn::LoadU(di, &points.corner[i]);
+    std::array<V, 3> upper;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      upper[axis] = hn::LoadU(df, &points.fraction[axis][i]);
+    }
+    V total = zero;
+    std::array<V, 3> sum{zero, zero, zero};
+    for (std::size_t k = 0; k < 8; ++k) {
+      V coefficient = one;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const bool is_upper = ((k >> axis) & 1U) != 0;
+        coefficient = hn::Mul(coefficient, is_upper ? upper[axis] : hn::Sub(one, upper[axis]));
+      }
+      const V coloured = hn::GatherIndex(df, count.data() + kCorner[k], at);
+      coefficient = hn::IfThenElseZero(hn::Gt(coloured, zero), coefficient);
+      total = hn::Add(total, coefficient);
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        const V level = hn::GatherIndex(df, channels[channel].data() + kCorner[k], at);
+        sum[channel] = hn::Add(sum[channel], hn::Mul(coefficient, level));
+      }
+    }
+    hn::StoreU(total, df, totals + i);
+    const auto any = hn::Gt(total, zero);
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const V mean = hn::Add(hn::Div(sum[channel], total), hn::Set(df, 0.5F));
+      hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElseZero(any, mean))), du,
+                 out[channel] + i);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tsdfpp {
+
+HWY_EXPORT(Points);
+HWY_EXPORT(Counted);
+HWY_EXPORT(All);
+HWY_EXPORT(Colours);
+
+void PullBackPoints(const std::array<double, 12>& T, double voxel_m, const Index3& first,
+                    PulledPoints& points) {
+  HWY_DYNAMIC_DISPATCH(Points)(T, voxel_m, first, points);
+}
+
+void InterpolateCounted(const PatchValues& values, const PulledPoints& points,
+                        const std::int32_t* wanted, float* out) {
+  HWY_DYNAMIC_DISPATCH(Counted)(values, points, wanted, out);
+}
+
+void InterpolateAll(const PatchValues& values, const PulledPoints& points,
+                    const std::int32_t* wanted, float* out) {
+  HWY_DYNAMIC_DISPATCH(All)(values, points, wanted, out);
+}
+
+void InterpolateColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
+                        const PulledPoints& points, const std::int32_t* wanted,
+                        const std::array<std::uint16_t*, 3>& out, float* total) {
+  HWY_DYNAMIC_DISPATCH(Colours)(channels, count, points, wanted, out, total);
+}
+
+}  // namespace tsdfpp
+#endif
