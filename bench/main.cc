@@ -1,4 +1,4 @@
-// tsdfpp_bench side-by-side [options], or Google Benchmark's own options for the kernels.
+// tsdfpp_bench side-by-side | render [options], or Google Benchmark's own options for the kernels.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -9,6 +9,7 @@
 #include <string_view>
 #include <thread>
 
+#include "bench/render.h"
 #include "bench/side_by_side.h"
 
 int main(int argc, char** argv) {
@@ -20,15 +21,18 @@ int main(int argc, char** argv) {
     setenv("OMP_NUM_THREADS", std::to_string(std::thread::hardware_concurrency()).c_str(), 0);
     execv("/proc/self/exe", argv);
   }
-  if (argc < 2 || std::string_view(argv[1]) != "side-by-side") {
+  const std::string_view word = argc < 2 ? "" : argv[1];
+  if (word != "side-by-side" && word != "render") {
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();
     return 0;
   }
   tsdfpp::SideBySideOptions options;
-  CLI::App app("Mapping beside Open3D's ScalableTSDFVolume, on the same frames in the same run");
-  CLI::App* run = app.add_subcommand("side-by-side", "Run it");
+  CLI::App app("Measurements of the whole, each printed as a table");
+  app.require_subcommand(1);
+  CLI::App* run = app.add_subcommand(
+      "side-by-side", "Mapping beside Open3D's ScalableTSDFVolume, on the same frames");
   run->add_option("--scene", options.scene, "Scene or sequence")->capture_default_str();
   run->add_option("--profile", options.profile, "paper or close")->capture_default_str();
   run->add_option("--frames", options.frames, "Frames from the first on")
@@ -37,8 +41,19 @@ int main(int argc, char** argv) {
   run->add_option("--threads", options.threads, "Numbers of threads")
       ->delimiter(',')
       ->capture_default_str();
+  tsdfpp::RenderBenchOptions render;
+  CLI::App* rendering = app.add_subcommand("render", "Rendering and writing, step by step");
+  rendering->add_option("--scene", render.scene, "Scene")->capture_default_str();
+  rendering->add_option("--frames", render.frames, "Frames, spread over the scene")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  rendering->add_option("--repeats", render.repeats, "Of each frame; the fastest counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  if (const auto done = tsdfpp::RunSideBySide(options); !done) {
+  const auto done =
+      rendering->parsed() ? tsdfpp::RunRenderBench(render) : tsdfpp::RunSideBySide(options);
+  if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());
     return static_cast<int>(done.error().kind);
   }

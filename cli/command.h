@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -27,23 +28,32 @@ struct CommandResult {
 using Run = std::function<Expected<CommandResult>()>;
 Run AddDoctor(CLI::App& app, const CommonOptions& common);
 Run AddGenerate(CLI::App& app, const CommonOptions& common);
+Run AddVerify(CLI::App& app, const CommonOptions& common);
+Run AddExport(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
 
-// A progress bar on stderr where that is a terminal; silent elsewhere.
+// A progress bar on stderr, with frames a second and the time left, where that is a terminal;
+// silent elsewhere.
 class ProgressBar {
  public:
   explicit ProgressBar(std::string title);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
-  void Show(int done, int total);
+  // `before` of the frames `done` were there when the bar began: they do not count for the speed.
+  void Show(int done, int total, int before = 0);
 
  private:
   std::string title_;
   bool terminal_;
   bool shown_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
+
+// "14.2 frames/s, 1:05 left" once `done` of `total` frames took `elapsed_s`; empty while nothing
+// can be said.
+std::string SpeedText(int done, int total, double elapsed_s);
 
 // What a number has to be, for add_option(...)->check().
 CLI::Validator AboveZero();

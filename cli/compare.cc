@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/sequence_options.h"
 #include "eval/compare_report.h"
-#include "eval/open_source.h"
 
 namespace tsdfpp {
 namespace {
 
 struct Options {
-  std::string source;
+  SequenceArguments source;
   std::string out;
   std::string methods = "tsdf,tsdf++,tsdf++/anchored";
   std::string profiles = "paper,close";
@@ -39,11 +39,11 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));
     TSDFPP_RETURN_IF_ERROR(probe.Validate());
   }
-  TSDFPP_ASSIGN(auto source, OpenSource(options.source));
+  TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
   const std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
       "--until {}",
-      options.source, options.out, options.methods, options.profiles, options.poses,
+      TextOf(options.source), options.out, options.methods, options.profiles, options.poses,
       config.map.voxel_m, config.every, config.until);
   ProgressBar bar("compare");
   const auto show = [&](int done, int total) { bar.Show(done, total); };
@@ -58,7 +58,7 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
 
 Run AddCompare(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
-  app.add_option("SCENE-or-SEQ", options->source, "Scene (.toml) or sequence (folder)")->required();
+  AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--out", options->out, "Output folder")->required();
   app.add_option("--methods", options->methods,
                  "Maps to compare, by commas: tsdf, tsdf/min, tsdf++, tsdf++/literal, "

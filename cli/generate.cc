@@ -1,44 +1,172 @@
+#include "eval/generate.h"
+
 #include <fmt/format.h>
 
+#include <atomic>
+#include <csignal>
+#include <thread>
+
 #include "cli/command.h"
-#include "sequence/cofusion_writer.h"
-#include "sim/simulated_source.h"
+#include "eval/scene_page.h"
+#include "sim/scene_list.h"
 
 namespace tsdfpp {
+namespace {
+
+struct Options {
+  std::string scene;
+  std::string out;
+  std::string sensor;
+  std::string scenes = "scenes";
+  std::string page;
+  bool list = false;
+  std::uint64_t seed = 0;
+  CLI::Option* seed_given = nullptr;
+  GenerateOptions generate;
+};
+
+std::atomic<bool> stop{false};
+std::atomic<int> stop_signal{0};
+
+void OnSignal(int signal) {
+  stop_signal = signal;
+  stop = true;
+}
+
+// While this lives, the first SIGINT or SIGTERM asks to stop, and the second one ends the process.
+class StopOnSignal {
+ public:
+  StopOnSignal() {
+    struct sigaction action {};
+    action.sa_handler = OnSignal;
+    action.sa_flags = SA_RESETHAND;  // and no SA_RESTART: waiting ends
+    for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
+  }
+  ~StopOnSignal() {
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+  }
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+};
+
+Expected<CommandResult> ListScenes(const Options& options) {
+  TSDFPP_ASSIGN(const std::vector<SceneFile> scenes, SceneFiles(options.scenes));
+  CommandResult result{nlohmann::json::array(), ""};
+  for (const SceneFile& scene : scenes) {
+    result.json.push_back({{"file", scene.path.string()},
+                           {"name", scene.name},
+                           {"purpose", scene.purpose},
+                           {"frames", scene.frames},
+                           {"rate_hz", scene.rate_hz},
+                           {"width", scene.width},
+                           {"height", scene.height},
+                           {"random", scene.random}});
+    result.text +=
+        fmt::format("{:<16} {:>5} frames {:>4}x{:<4} {}{}\n", scene.name, scene.frames, scene.width,
+                    scene.height, scene.purpose, scene.random ? " (--seed)" : "");
+  }
+  return result;
+}
+
+Expected<CommandResult> WritePage(const Options& options) {
+  {
+    ProgressBar bar("scenes");
+    TSDFPP_RETURN_IF_ERROR(WriteScenePage(options.scenes, options.page,
+                                          [&](int done, int total) { bar.Show(done, total); }));
+  }
+  const std::string file = (std::filesystem::path(options.page) / "scenes.md").string();
+  return CommandResult{{{"page", file}}, file + "\n"};
+}
+
+std::string Summary(const Options& options, const GenerateResult& made) {
+  std::string text =
+      fmt::format("{}: {} frames of {} in {:.1f} s ({:.1f} frames/s, {} jobs; {}, {})\n",
+                  options.out, made.info.frame_count, made.info.name, made.render_s,
+                  (made.info.frame_count - made.resumed_frames) / std::max(made.render_s, 1e-9),
+                  made.jobs, made.gl.backend, made.gl.renderer);
+  if (made.resumed_frames > 0) {
+    text += fmt::format("{} of them were there from an interrupted run\n", made.resumed_frames);
+  }
+  return text + fmt::format("verified in {:.1f} s; ", made.verify_s) +
+         CertifyText(made.certificate);
+}
+
+Expected<CommandResult> RunGenerate(const Options& options) {
+  if (options.list) return ListScenes(options);
+  if (!options.page.empty()) return WritePage(options);
+  if (options.scene.empty()) return UsageError("SCENE is required (see tsdfpp generate --help)");
+  if (options.out.empty()) return UsageError("--out is required (see tsdfpp generate --help)");
+  std::optional<std::uint64_t> seed;
+  if (options.seed_given->count() > 0) seed = options.seed;
+  TSDFPP_ASSIGN(SceneConfig scene, LoadSceneConfig(options.scene, seed));
+  if (!options.sensor.empty()) {
+    TSDFPP_ASSIGN(scene.sensor, SensorPresetNamed(options.sensor));
+  }
+  GenerateOptions generate = options.generate;
+  generate.out = options.out;
+  generate.stop = &stop;
+  if (generate.jobs == 0) {
+    generate.jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  }
+  Expected<GenerateResult> made;
+  {
+    const StopOnSignal handler;
+    std::optional<ProgressBar> bar;
+    std::string shown;
+    generate.progress = [&](const std::string& phase, int done, int resumed, int total) {
+      if (phase != shown) bar.emplace(phase);
+      shown = phase;
+      bar->Show(done, total, resumed);
+    };
+    made = GenerateSequence(scene, TSDFPP_VERSION, generate);
+  }
+  if (!made && stop) {
+    // To whoever waits for this process it died by the signal, as it would have without a handler.
+    std::fprintf(stderr, "tsdfpp: %s\n", made.error().message.c_str());
+    std::raise(stop_signal);
+  }
+  if (!made) return tl::unexpected(made.error());
+  const double seconds = std::max(made->render_s, 1e-9);
+  return CommandResult{{{"scene", made->info.name},
+                        {"frames", made->info.frame_count},
+                        {"resumed_frames", made->resumed_frames},
+                        {"jobs", made->jobs},
+                        {"out", options.out},
+                        {"backend", made->gl.backend},
+                        {"renderer", made->gl.renderer},
+                        {"render_s", made->render_s},
+                        {"frames_per_s", (made->info.frame_count - made->resumed_frames) / seconds},
+                        {"verify_s", made->verify_s},
+                        {"certificate", CertifyJson(made->certificate)}},
+                       Summary(options, *made)};
+}
+
+}  // namespace
 
 Run AddGenerate(CLI::App& app, const CommonOptions&) {
-  struct Options {
-    std::string scene;
-    std::string out;
-    bool overwrite = false;
-  };
   auto options = std::make_shared<Options>();
-  app.add_option("SCENE", options->scene, "Scene file (.toml)")->required();
-  app.add_option("--out", options->out, "Folder of the new sequence")->required();
-  app.add_flag("--overwrite", options->overwrite, "Replace an earlier sequence of ours");
-  return [options]() -> Expected<CommandResult> {
-    TSDFPP_ASSIGN(const SceneConfig scene, LoadSceneConfig(options->scene));
-    TSDFPP_ASSIGN(auto source, SimulatedSource::Open(scene, {}));
-    GeneratorInfo generator;
-    generator.version = TSDFPP_VERSION;
-    generator.sensor = "none";
-    generator.backend = source->gl_info().backend;
-    generator.renderer = source->gl_info().renderer;
-    {
-      ProgressBar bar("generate");
-      TSDFPP_RETURN_IF_ERROR(WriteCofusion(*source, generator, options->out, options->overwrite,
-                                           [&](int done, int total) { bar.Show(done, total); }));
-    }
-    const SequenceInfo& info = source->info();
-    return CommandResult{
-        {{"scene", info.name},
-         {"frames", info.frame_count},
-         {"out", options->out},
-         {"backend", generator.backend},
-         {"renderer", generator.renderer}},
-        fmt::format("{}: {} frames of {} ({}, {})\n", options->out, info.frame_count, info.name,
-                    generator.backend, generator.renderer)};
-  };
+  options->generate.jobs = 0;
+  app.add_option("SCENE", options->scene, "Scene file (.toml)");
+  app.add_option("--out", options->out, "Folder of the new sequence");
+  app.add_flag("--overwrite", options->generate.overwrite, "Replace an earlier sequence of ours");
+  app.add_option("--jobs", options->generate.jobs,
+                 "Processes that render; one a core by default. The bytes do not depend on it")
+      ->check(CLI::Range(1, 256));
+  options->seed_given = app.add_option(
+      "--seed", options->seed, "Replaces the scene's seed: of random scenes, jitter, sensor");
+  app.add_option("--sensor", options->sensor, "Ready-made sensor in place of the scene's own");
+  app.add_flag("!--no-antialias", options->generate.render.antialias,
+               "Colour without multisampling: jagged edges, faster");
+  app.add_option("--share", options->generate.ray_share,
+                 "Share of the frames that are compared with rays before the sequence is published")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_flag("--list", options->list, "List the scenes of --scenes and what they are for");
+  app.add_option("--scenes", options->scenes, "Folder that --list and --page look at")
+      ->capture_default_str();
+  app.add_option("--page", options->page,
+                 "Write scenes.md with pictures of the scenes of --scenes into this folder");
+  return [options] { return RunGenerate(*options); };
 }
 
 }  // namespace tsdfpp

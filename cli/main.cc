@@ -30,6 +30,8 @@ int RunCommand(int argc, char** argv) {
   };
   add("doctor", "Say what this machine has and what is missing", tsdfpp::AddDoctor);
   add("generate", "Render a scene to a sequence on disk", tsdfpp::AddGenerate);
+  add("verify", "Check a sequence of ours against itself and against rays", tsdfpp::AddVerify);
+  add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
 

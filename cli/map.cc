@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/sequence_options.h"
 #include "core/files.h"
 #include "eval/map_output.h"
 #include "eval/open_source.h"
@@ -9,7 +10,7 @@ namespace tsdfpp {
 namespace {
 
 struct Options {
-  std::string source;
+  SequenceArguments source;
   std::string method = "tsdf++/anchored";
   std::string segmentation = "gt";
   std::string poses = "gt";
@@ -36,7 +37,7 @@ Expected<CommandResult> RunMap(const Options& options) {
   }
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
 
-  TSDFPP_ASSIGN(auto source, OpenSource(options.source));
+  TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
   const SequenceInfo& info = source->info();
   const int last = info.first_index + info.frame_count - 1;
   const int until = options.until < 0 ? last : options.until;
@@ -54,8 +55,8 @@ Expected<CommandResult> RunMap(const Options& options) {
     for (int index = info.first_index; index <= until; ++index) {
       TSDFPP_ASSIGN(const Frame frame, source->Read(index));
       if (frame.mask.empty()) {
-        return DataError("{}: frame {} has no mask, which --segmentation gt needs", options.source,
-                         index);
+        return DataError("{}: frame {} has no mask, which --segmentation gt needs",
+                         options.source.path, index);
       }
       times.Add(pipeline.Process(frame));
       bar.Show(index - info.first_index + 1, until - info.first_index + 1);
@@ -93,7 +94,7 @@ Expected<CommandResult> RunMap(const Options& options) {
 
 Run AddMap(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
-  app.add_option("SEQ", options->source, "Sequence (folder) or scene (.toml)")->required();
+  AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--method", options->method,
                  "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored")
       ->capture_default_str();

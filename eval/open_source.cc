@@ -5,14 +5,24 @@
 
 namespace tsdfpp {
 
-Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& scene_or_sequence) {
+Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& scene_or_sequence,
+                                                  const SequenceOptions& options,
+                                                  SequenceNotes* notes) {
   std::error_code code;
-  if (scene_or_sequence.extension() == ".toml") return OpenScene(scene_or_sequence);
+  if (scene_or_sequence.extension() == ".toml") {
+    if (options.format || options.intrinsics || options.depth_units_per_m || options.fixed_camera) {
+      return UsageError(
+          "{}: is a scene; a format, a calibration, depth units or a fixed camera are for "
+          "sequences on disk",
+          scene_or_sequence.string());
+    }
+    return OpenScene(scene_or_sequence);
+  }
   if (!std::filesystem::exists(scene_or_sequence, code)) {
     return UsageError("{}: no such scene (a .toml file) or sequence (a folder)",
                       scene_or_sequence.string());
   }
-  return OpenSequence(scene_or_sequence);
+  return OpenSequence(scene_or_sequence, options, notes);
 }
 
 Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,

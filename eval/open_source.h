@@ -5,12 +5,16 @@
 #include <memory>
 
 #include "core/frame_source.h"
+#include "sequence/sequence_options.h"
 
 namespace tsdfpp {
 
-// A .toml file is a scene and is rendered; a folder is a sequence. Errors: kUsage where there is
-// neither, else those of OpenScene and OpenSequence.
-Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& scene_or_sequence);
+// A .toml file is a scene and is rendered; anything else is a sequence, opened with `options`.
+// `notes`, where given, gets what its reader assumed or left out. Errors: kUsage where there is
+// neither or where options for sequences meet a scene, else those of OpenScene and OpenSequence.
+Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& scene_or_sequence,
+                                                  const SequenceOptions& options = {},
+                                                  SequenceNotes* notes = nullptr);
 
 // The ids that a list of ids or names stands for. Errors: kUsage, naming the objects there are.
 Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,

@@ -34,6 +34,12 @@ std::optional<std::string_view> Middle(std::string_view name, std::string_view p
 std::string ColourFile(int index) { return fmt::format("{}/Color{:04d}.png", kColour, index); }
 std::string DepthFile(int index) { return fmt::format("{}/Depth{:04d}.exr", kDepth, index); }
 std::string MaskFile(int index) { return fmt::format("{}/Mask{:04d}.png", kMask, index); }
+std::string SensedDepthFile(int index) {
+  return fmt::format("{}/Depth{:04d}.exr", kSensedDepth, index);
+}
+std::string SensedMaskFile(int index) {
+  return fmt::format("{}/Mask{:04d}.png", kSensedMask, index);
+}
 std::string TrajectoryFile(const ObjectInfo& object) {
   return fmt::format("{}/gt-{}-{}.txt", kTrajectories, object.name, object.id);
 }

@@ -17,12 +17,21 @@ inline constexpr const char* kTrajectories = "trajectories";
 inline constexpr const char* kCameraTrajectory = "trajectories/gt-cam-0.txt";
 inline constexpr const char* kModels = "models";           // ours
 inline constexpr const char* kSequence = "sequence.json";  // ours
-inline constexpr InstanceId kMaxId = 255;                  // masks are 8-bit
+// Ours: the scene that was rendered, and the truth on what can be seen of it.
+inline constexpr const char* kScene = "scene.toml";
+inline constexpr const char* kVisibility = "truth/visibility.csv";
+// What a sensor with faults gave, beside the truth in depth_original, mask_id and gt-cam-0.
+inline constexpr const char* kSensedDepth = "depth_noise";
+inline constexpr const char* kSensedMask = "mask_noise";
+inline constexpr const char* kSensedCameraTrajectory = "trajectories/sensed-cam-0.txt";
+inline constexpr InstanceId kMaxId = 255;  // masks are 8-bit
 
 // Paths relative to the set's folder, e.g. "colour/Color0001.png".
 std::string ColourFile(int index);
 std::string DepthFile(int index);
 std::string MaskFile(int index);
+std::string SensedDepthFile(int index);
+std::string SensedMaskFile(int index);
 std::string TrajectoryFile(const ObjectInfo& object);  // "trajectories/gt-<name>-<id>.txt"
 std::string ModelFile(const ObjectInfo& object);       // "models/<name>-<id>.ply"
 

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "core/files.h"
 #include "core/ply.h"
+#include "sequence/calibration.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/image_files.h"
+#include "sequence/plausibility.h"
 #include "sequence/sequence_json.h"
 #include "sequence/trajectory_file.h"
 
@@ -33,48 +33,6 @@ std::vector<std::string> FileNames(const fs::path& folder) {
   }
   std::sort(names.begin(), names.end());
   return names;
-}
-
-// "fx fy cx cy [w h]"; w and h are 0 where they are not given.
-Expected<Intrinsics> ReadCalibration(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  std::vector<double> numbers;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  const auto skip_blanks = [&] {
-    while (at != end && std::string_view(" \t\r\n").find(*at) != std::string_view::npos) ++at;
-  };
-  for (skip_blanks(); at != end; skip_blanks()) {
-    double number = 0;
-    const auto [next, status] = std::from_chars(at, end, number);
-    if (status != std::errc() || !std::isfinite(number)) {
-      return DataError("{}: number {} cannot be read, expected fx fy cx cy [width height]",
-                       path.string(), numbers.size() + 1);
-    }
-    numbers.push_back(number);
-    at = next;
-  }
-  if (numbers.size() != 4 && numbers.size() != 6) {
-    return DataError("{}: {} numbers, expected fx fy cx cy [width height]", path.string(),
-                     numbers.size());
-  }
-  Intrinsics camera{0, 0, numbers[0], numbers[1], numbers[2], numbers[3]};
-  if (!(camera.fx > 0) || !(camera.fy > 0)) {
-    return DataError("{}: focal lengths {} and {}, expected both over 0", path.string(), camera.fx,
-                     camera.fy);
-  }
-  if (numbers.size() == 6) {
-    constexpr double kLargestSide_px = 65536;
-    for (const double side : {numbers[4], numbers[5]}) {
-      if (side < 1 || side > kLargestSide_px || side != std::floor(side)) {
-        return DataError("{}: image size {} x {}, expected whole numbers over 0", path.string(),
-                         numbers[4], numbers[5]);
-      }
-    }
-    camera.width = static_cast<int>(numbers[4]);
-    camera.height = static_cast<int>(numbers[5]);
-  }
-  return camera;
 }
 
 // First number and count of the images in colour/. Errors: none, a gap, another first number.
@@ -125,6 +83,8 @@ class CofusionSource : public FrameSource {
       info_.intrinsics.width = first.cols;
       info_.intrinsics.height = first.rows;
     }
+    TSDFPP_RETURN_IF_ERROR(
+        CheckCamera(info_.intrinsics, (folder_ / cofusion::kCalibration).string()));
     NameObjects();
     return {};
   }

@@ -1,7 +1,5 @@
 #include "sequence/cofusion_writer.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <set>
 
@@ -9,83 +7,75 @@
 #include "core/ply.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/image_files.h"
+#include "sequence/staging_folder.h"
 #include "sequence/trajectory_file.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-// A hidden folder beside `out` that is removed again unless it took out's place.
-class StagingFolder {
- public:
-  explicit StagingFolder(const fs::path& out) : out_(out), path_(Sibling("part")) {}
-  ~StagingFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
+Expected<void> CheckImages(const SequenceInfo& info, const Frame& frame) {
+  const Intrinsics& camera = info.intrinsics;
+  if (frame.intrinsics != camera) {
+    return DataError(
+        "frame {}: the intrinsics differ from the sequence's, a Co-Fusion set has "
+        "one camera",
+        frame.index);
   }
-  StagingFolder(const StagingFolder&) = delete;
-  StagingFolder& operator=(const StagingFolder&) = delete;
-
-  const fs::path& path() const { return path_; }
-
-  Expected<void> Make() const {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-    return MakeWritableFolder(path_);
-  }
-
-  // An earlier folder is moved aside first, so that a failure leaves it as it was.
-  Expected<void> TakeThePlace() const {
-    const fs::path old = Sibling("old");
-    std::error_code code;
-    const bool replaces = fs::exists(out_, code);
-    if (replaces) fs::rename(out_, old, code);
-    if (!code) {
-      fs::rename(path_, out_, code);
-      std::error_code ignored;
-      if (code && replaces) fs::rename(old, out_, ignored);
-      if (!code) fs::remove_all(old, ignored);
+  const cv::Size size(camera.width, camera.height);
+  for (const auto& [what, image] : {std::pair{"colour image", &frame.colour},
+                                    {"depth image", &frame.depth},
+                                    {"mask", &frame.mask}}) {
+    const bool needed = image != &frame.mask || !frame.mask.empty();
+    if (needed && image->size() != size) {
+      return DataError("frame {}: the {} is {}x{}, expected {}x{}", frame.index, what, image->cols,
+                       image->rows, size.width, size.height);
     }
-    if (code) {
-      return EnvironmentError("{}: the folder cannot be put in place ({})", out_.string(),
-                              code.message());
-    }
-    return {};
-  }
-
- private:
-  fs::path Sibling(const char* suffix) const {
-    return out_.parent_path() /
-           fmt::format(".{}.{}.{}", out_.filename().string(), getpid(), suffix);
-  }
-
-  fs::path out_;
-  fs::path path_;
-};
-
-Expected<void> MayReplace(const fs::path& out, bool overwrite) {
-  std::error_code code;
-  if (!fs::exists(out, code)) return {};
-  if (!fs::is_directory(out, code)) {
-    return UsageError("{}: is a file, expected a folder to make", out.string());
-  }
-  if (fs::is_empty(out, code)) return {};
-  const bool ours = ReadSequenceJson(out / cofusion::kSequence).has_value();
-  if (!ours) {
-    return UsageError(
-        "{}: the folder holds something other than a sequence of ours, expected a "
-        "new or an empty folder",
-        out.string());
-  }
-  if (!overwrite) {
-    return UsageError(
-        "{}: already holds a sequence, expected a new folder or leave to overwrite it",
-        out.string());
   }
   return {};
 }
 
-Expected<void> CheckObjects(const std::vector<ObjectInfo>& objects) {
+// Writes files and keeps their hashes.
+class HashingWriter {
+ public:
+  HashingWriter(fs::path folder, std::map<std::string, std::string>& hashes)
+      : folder_(std::move(folder)), hashes_(hashes) {}
+
+  Expected<void> Add(const std::string& file, const Expected<std::string>& bytes) {
+    if (!bytes) return tl::unexpected(bytes.error());
+    hashes_[file] = HashText(*bytes);
+    return WriteFile(folder_ / file, *bytes);
+  }
+
+ private:
+  fs::path folder_;
+  std::map<std::string, std::string>& hashes_;
+};
+
+// Journals, half-written files, and what an interrupted run with other settings left.
+Expected<void> RemoveStrangers(const fs::path& folder, const SequenceRecord& record) {
+  std::vector<fs::path> strangers;
+  std::error_code code;
+  for (const auto& entry : fs::recursive_directory_iterator(folder, code)) {
+    const std::string file = entry.path().lexically_relative(folder).string();
+    if (entry.is_directory() || file == "lock" || record.hashes.contains(file)) continue;
+    strangers.push_back(entry.path());
+  }
+  for (const fs::path& stranger : strangers) {
+    fs::remove(stranger, code);
+    if (code) {
+      return EnvironmentError("{}: cannot be removed ({})", stranger.string(), code.message());
+    }
+    // Fails, as it should, where the folder is not empty.
+    std::error_code ignored;
+    if (stranger.parent_path() != folder) fs::remove(stranger.parent_path(), ignored);
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<void> CheckObjectsFit(const std::vector<ObjectInfo>& objects) {
   std::set<InstanceId> ids;
   for (const ObjectInfo& object : objects) {
     if (object.id > cofusion::kMaxId) {
@@ -105,120 +95,121 @@ Expected<void> CheckObjects(const std::vector<ObjectInfo>& objects) {
   return {};
 }
 
-class CofusionWriter {
- public:
-  CofusionWriter(const SequenceInfo& info, const GeneratorInfo& generator, fs::path folder)
-      : record_{info, generator, {}}, folder_(std::move(folder)) {
-    for (const ObjectInfo& object : info.objects) objects_[object.id];
+Expected<WrittenFrame> WriteCofusionFrame(const SequenceInfo& info, const Frame& frame,
+                                          const std::optional<SensedImages>& sensed,
+                                          const fs::path& folder) {
+  TSDFPP_RETURN_IF_ERROR(CheckImages(info, frame));
+  WrittenFrame written;
+  written.index = frame.index;
+  written.T_WC = frame.T_WC;
+  written.T_WO = frame.T_WO;
+  written.has_mask = !frame.mask.empty();
+  const std::string name = fmt::format("frame {}", frame.index);
+  HashingWriter writer(folder, written.hashes);
+  TSDFPP_RETURN_IF_ERROR(
+      writer.Add(cofusion::ColourFile(frame.index), EncodeColour(frame.colour, name)));
+  TSDFPP_RETURN_IF_ERROR(
+      writer.Add(cofusion::DepthFile(frame.index), EncodeDepth(frame.depth, name)));
+  if (written.has_mask) {
+    TSDFPP_RETURN_IF_ERROR(
+        writer.Add(cofusion::MaskFile(frame.index), EncodeMask(frame.mask, name)));
   }
-
-  Expected<void> AddFrame(const Frame& frame) {
-    const SequenceInfo& info = record_.info;
-    const Intrinsics& camera = info.intrinsics;
-    if (frame.intrinsics != camera) {
-      return DataError(
-          "frame {}: the intrinsics differ from the sequence's, a Co-Fusion set has "
-          "one camera",
-          frame.index);
+  if (sensed) {
+    Frame images = frame;
+    if (!sensed->depth.empty()) images.depth = sensed->depth;
+    if (!sensed->mask.empty()) images.mask = sensed->mask;
+    TSDFPP_RETURN_IF_ERROR(CheckImages(info, images));
+    if (!sensed->depth.empty()) {
+      TSDFPP_RETURN_IF_ERROR(
+          writer.Add(cofusion::SensedDepthFile(frame.index), EncodeDepth(sensed->depth, name)));
     }
-    const bool has_mask = !frame.mask.empty();
-    if (camera_.empty()) has_masks_ = has_mask;
-    if (has_mask != has_masks_) {
+    if (!sensed->mask.empty()) {
+      TSDFPP_RETURN_IF_ERROR(
+          writer.Add(cofusion::SensedMaskFile(frame.index), EncodeMask(sensed->mask, name)));
+    }
+    written.sensed_T_WC = sensed->T_WC;
+  }
+  return written;
+}
+
+Expected<SequenceRecord> FinishCofusion(const SequenceInfo& info, const GeneratorInfo& generator,
+                                        const std::vector<WrittenFrame>& frames,
+                                        const std::vector<TrueModel>& models,
+                                        const std::map<std::string, std::string>& more_files,
+                                        const fs::path& folder) {
+  SequenceRecord record;
+  record.info = info;
+  record.generator = generator;
+  std::map<InstanceId, Trajectory> objects;
+  for (const ObjectInfo& object : info.objects) objects[object.id];
+  Trajectory camera;
+  Trajectory sensed_camera;
+  for (const WrittenFrame& frame : frames) {
+    if (frame.has_mask != frames.front().has_mask) {
       return DataError("frame {}: expected a mask on every frame or on none", frame.index);
     }
-    const cv::Size size(camera.width, camera.height);
-    for (const auto& [what, image] : {std::pair{"colour image", &frame.colour},
-                                      {"depth image", &frame.depth},
-                                      {"mask", &frame.mask}}) {
-      if ((has_mask || image != &frame.mask) && image->size() != size) {
-        return DataError("frame {}: the {} is {}x{}, expected {}x{}", frame.index, what,
-                         image->cols, image->rows, size.width, size.height);
-      }
-    }
-    TSDFPP_RETURN_IF_ERROR(
-        Add(cofusion::ColourFile(frame.index), EncodeColour(frame.colour, FrameName(frame))));
-    TSDFPP_RETURN_IF_ERROR(
-        Add(cofusion::DepthFile(frame.index), EncodeDepth(frame.depth, FrameName(frame))));
-    if (has_mask) {
-      TSDFPP_RETURN_IF_ERROR(
-          Add(cofusion::MaskFile(frame.index), EncodeMask(frame.mask, FrameName(frame))));
-    }
-    camera_.emplace(frame.index, frame.T_WC);
+    record.hashes.insert(frame.hashes.begin(), frame.hashes.end());
+    camera.emplace(frame.index, frame.T_WC);
+    if (frame.sensed_T_WC) sensed_camera.emplace(frame.index, *frame.sensed_T_WC);
     for (const auto& [id, T_WO] : frame.T_WO) {
-      const auto object = objects_.find(id);
-      if (object == objects_.end()) {
+      const auto object = objects.find(id);
+      if (object == objects.end()) {
         return DataError("frame {}: a pose of object {}, which the sequence does not list",
                          frame.index, id);
       }
       object->second.emplace(frame.index, T_WO);
     }
-    return {};
   }
-
-  // After the last frame.
-  Expected<void> AddTheRest(const std::vector<TrueModel>& models) {
-    const Intrinsics& camera = record_.info.intrinsics;
-    TSDFPP_RETURN_IF_ERROR(Add(cofusion::kCalibration,
-                               fmt::format("{} {} {} {} {} {}\n", camera.fx, camera.fy, camera.cx,
-                                           camera.cy, camera.width, camera.height)));
-    TSDFPP_RETURN_IF_ERROR(Add(cofusion::kCameraTrajectory, TrajectoryToText(camera_, "camera")));
-    for (const ObjectInfo& object : record_.info.objects) {
-      const Trajectory& trajectory = objects_.at(object.id);
-      if (trajectory.empty()) continue;
-      TSDFPP_RETURN_IF_ERROR(
-          Add(cofusion::TrajectoryFile(object), TrajectoryToText(trajectory, "object")));
+  HashingWriter writer(folder, record.hashes);
+  const Intrinsics& k = info.intrinsics;
+  TSDFPP_RETURN_IF_ERROR(
+      writer.Add(cofusion::kCalibration,
+                 fmt::format("{} {} {} {} {} {}\n", k.fx, k.fy, k.cx, k.cy, k.width, k.height)));
+  TSDFPP_RETURN_IF_ERROR(
+      writer.Add(cofusion::kCameraTrajectory, TrajectoryToText(camera, "camera")));
+  if (!sensed_camera.empty()) {
+    TSDFPP_RETURN_IF_ERROR(
+        writer.Add(cofusion::kSensedCameraTrajectory, TrajectoryToText(sensed_camera, "camera")));
+  }
+  for (const ObjectInfo& object : info.objects) {
+    const Trajectory& trajectory = objects.at(object.id);
+    if (trajectory.empty()) continue;
+    TSDFPP_RETURN_IF_ERROR(
+        writer.Add(cofusion::TrajectoryFile(object), TrajectoryToText(trajectory, "object")));
+  }
+  for (const TrueModel& model : models) {
+    const std::string file = cofusion::ModelFile(model.info);
+    if (!objects.contains(model.info.id)) {
+      return DataError("a true model of object {}, which the sequence does not list",
+                       model.info.id);
     }
-    for (const TrueModel& model : models) {
-      const std::string file = cofusion::ModelFile(model.info);
-      if (!objects_.contains(model.info.id)) {
-        return DataError("a true model of object {}, which the sequence does not list",
-                         model.info.id);
-      }
-      TSDFPP_RETURN_IF_ERROR(WriteTrueModel(folder_ / file, model));
-      TSDFPP_ASSIGN(const std::string bytes, ReadFile(folder_ / file));
-      record_.hashes[file] = HashText(bytes);
-    }
-    return WriteFile(folder_ / cofusion::kSequence, SequenceToJson(record_));
+    TSDFPP_RETURN_IF_ERROR(WriteTrueModel(folder / file, model));
+    TSDFPP_ASSIGN(const std::string bytes, ReadFile(folder / file));
+    record.hashes[file] = HashText(bytes);
   }
-
- private:
-  static std::string FrameName(const Frame& frame) { return fmt::format("frame {}", frame.index); }
-
-  Expected<void> Add(const std::string& file, const Expected<std::string>& bytes) {
-    if (!bytes) return tl::unexpected(bytes.error());
-    record_.hashes[file] = HashText(*bytes);
-    return WriteFile(folder_ / file, *bytes);
-  }
-
-  SequenceRecord record_;
-  fs::path folder_;
-  bool has_masks_ = false;
-  Trajectory camera_;
-  std::map<InstanceId, Trajectory> objects_;
-};
-
-}  // namespace
+  for (const auto& [file, bytes] : more_files) TSDFPP_RETURN_IF_ERROR(writer.Add(file, bytes));
+  TSDFPP_RETURN_IF_ERROR(RemoveStrangers(folder, record));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(folder / cofusion::kSequence, SequenceToJson(record)));
+  return record;
+}
 
 Expected<void> WriteCofusion(FrameSource& source, const GeneratorInfo& generator,
                              const fs::path& out, bool overwrite,
                              const ProgressCallback& progress) {
-  // An absolute path without a trailing slash has a file name and a folder it stands in.
-  fs::path folder = fs::absolute(out).lexically_normal();
-  if (!folder.has_filename()) folder = folder.parent_path();
-  TSDFPP_RETURN_IF_ERROR(MayReplace(folder, overwrite));
+  TSDFPP_RETURN_IF_ERROR(CheckReplaceable(out, overwrite));
   const SequenceInfo& info = source.info();
-  TSDFPP_RETURN_IF_ERROR(CheckObjects(info.objects));
-
-  const StagingFolder staging(folder);
+  TSDFPP_RETURN_IF_ERROR(CheckObjectsFit(info.objects));
+  StagingFolder staging(out);
   TSDFPP_RETURN_IF_ERROR(staging.Make());
-  CofusionWriter writer(info, generator, staging.path());
+  std::vector<WrittenFrame> frames;
   for (int i = 0; i < info.frame_count; ++i) {
     TSDFPP_ASSIGN(const Frame frame, source.Read(info.first_index + i));
-    TSDFPP_RETURN_IF_ERROR(writer.AddFrame(frame));
+    TSDFPP_ASSIGN(WrittenFrame written, WriteCofusionFrame(info, frame, {}, staging.path()));
+    frames.push_back(std::move(written));
     if (progress) progress(i + 1, info.frame_count);
   }
   TSDFPP_ASSIGN(const std::vector<TrueModel> models, source.Truth());
-  TSDFPP_RETURN_IF_ERROR(writer.AddTheRest(models));
+  TSDFPP_RETURN_IF_ERROR(FinishCofusion(info, generator, frames, models, {}, staging.path()));
   return staging.TakeThePlace();
 }
 

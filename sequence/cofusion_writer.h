@@ -3,6 +3,10 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "core/frame_source.h"
@@ -24,5 +28,43 @@ using ProgressCallback = std::function<void(int done, int total)>;
 Expected<void> WriteCofusion(FrameSource& source, const GeneratorInfo& generator,
                              const std::filesystem::path& out, bool overwrite = false,
                              const ProgressCallback& progress = {});
+
+// The steps of WriteCofusion, for those who write frames in any order or from several processes.
+
+// What a sensor with faults gave in place of the truth. Where a part is absent it equals the truth.
+struct SensedImages {
+  cv::Mat depth;  // as Frame's; may be empty
+  cv::Mat mask;   // as Frame's; may be empty
+  std::optional<Pose> T_WC;
+};
+
+// A frame whose images are on disk: all that is needed to finish the set.
+struct WrittenFrame {
+  int index = 0;
+  Pose T_WC = Pose::Identity();
+  std::optional<Pose> sensed_T_WC;
+  std::map<InstanceId, Pose> T_WO;
+  bool has_mask = false;
+  std::map<std::string, std::string> hashes;  // of the frame's files
+};
+
+// Errors: kUsage, as WriteCofusion's, where an object does not fit.
+Expected<void> CheckObjectsFit(const std::vector<ObjectInfo>& objects);
+
+// Writes the images of a frame into `folder`, each file whole or not at all: the frame's own to the
+// places of the truth, and what was sensed beside them. (Colour is always as sensed.)
+// Errors: those of WriteCofusion that are about frames or the disk.
+Expected<WrittenFrame> WriteCofusionFrame(const SequenceInfo& info, const Frame& frame,
+                                          const std::optional<SensedImages>& sensed,
+                                          const std::filesystem::path& folder);
+
+// Writes all else: calibration, trajectories, models, `more_files` (bytes by the path in the set)
+// and sequence.json, which it returns. Files other than those of the set are removed from the
+// folder. `frames` in order. Errors: kData where a mask or a pose does not fit; kEnvironment.
+Expected<SequenceRecord> FinishCofusion(const SequenceInfo& info, const GeneratorInfo& generator,
+                                        const std::vector<WrittenFrame>& frames,
+                                        const std::vector<TrueModel>& models,
+                                        const std::map<std::string, std::string>& more_files,
+                                        const std::filesystem::path& folder);
 
 }  // namespace tsdfpp

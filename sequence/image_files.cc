@@ -52,14 +52,6 @@ class QuietStderr {
   int saved_;
 };
 
-std::string TypeName(const cv::Mat& image) {
-  static constexpr const char* kDepths[] = {"8-bit unsigned", "8-bit signed",   "16-bit unsigned",
-                                            "16-bit signed",  "32-bit integer", "32-bit float",
-                                            "64-bit float",   "16-bit float"};
-  return fmt::format("{} with {} channel{}", kDepths[image.depth()], image.channels(),
-                     image.channels() == 1 ? "" : "s");
-}
-
 Expected<std::string> Encode(const char* extension, const cv::Mat& image,
                              const std::vector<int>& settings, const std::string& file) {
   std::vector<unsigned char> bytes;
@@ -74,21 +66,24 @@ Expected<std::string> Encode(const char* extension, const cv::Mat& image,
   return EnvironmentError("{}: cannot be encoded ({})", file, why);
 }
 
-Expected<cv::Mat> Decode(const fs::path& path, cv::Size expected) {
-  std::error_code code;
-  if (!fs::exists(path, code)) return DataError("{}: no such image", path.string());
-  cv::Mat image;
+// What `decode` makes of an image; empty where it cannot.
+template <typename Function>
+cv::Mat Quietly(const Function& decode) {
   try {
     const QuietStderr quiet;
-    image = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
+    return decode();
   } catch (const cv::Exception&) {
-    image.release();
+    return {};
   }
+}
+
+Expected<cv::Mat> Decode(const fs::path& path, cv::Size expected,
+                         const std::string& size_source = "calibration.txt") {
+  std::error_code code;
+  if (!fs::exists(path, code)) return DataError("{}: no such image", path.string());
+  cv::Mat image = Quietly([&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
   if (image.empty()) return DataError("{}: cannot be decoded as an image", path.string());
-  if (!expected.empty() && image.size() != expected) {
-    return DataError("{}: the image is {}x{}, expected {}x{} (calibration.txt)", path.string(),
-                     image.cols, image.rows, expected.width, expected.height);
-  }
+  TSDFPP_RETURN_IF_ERROR(CheckImageSize(image, expected, size_source, path.string()));
   return image;
 }
 
@@ -160,11 +155,49 @@ Expected<void> CheckDepthChannels(const fs::path& path) {
   return {};
 }
 
+// Red, green and blue of an image as OpenCV decodes it, whose order is the reverse.
+Expected<cv::Mat> ColourOf(const cv::Mat& image, const std::string& file) {
+  if (image.type() != CV_8UC3 && image.type() != CV_8UC4) {
+    return DataError("{}: the image is {}, expected 8-bit RGB", file, ImageTypeName(image));
+  }
+  return SwapRedAndBlue(image);
+}
+
 }  // namespace
+
+std::string ImageTypeName(const cv::Mat& image) {
+  static constexpr const char* kDepths[] = {"8-bit unsigned", "8-bit signed",   "16-bit unsigned",
+                                            "16-bit signed",  "32-bit integer", "32-bit float",
+                                            "64-bit float",   "16-bit float"};
+  return fmt::format("{} with {} channel{}", kDepths[image.depth()], image.channels(),
+                     image.channels() == 1 ? "" : "s");
+}
+
+Expected<void> CheckImageSize(const cv::Mat& image, cv::Size expected,
+                              const std::string& size_source, const std::string& file) {
+  if (expected.empty() || image.size() == expected) return {};
+  return DataError("{}: the image is {}x{}, expected {}x{} ({})", file, image.cols, image.rows,
+                   expected.width, expected.height, size_source);
+}
+
+Expected<cv::Mat> ReadImage(const fs::path& path) { return Decode(path, {}); }
+
+Expected<cv::Mat> DecodeColour(const std::string& bytes, const std::string& file) {
+  const cv::Mat image = Quietly([&] {
+    return cv::imdecode(std::vector<unsigned char>(bytes.begin(), bytes.end()),
+                        cv::IMREAD_UNCHANGED);
+  });
+  if (image.empty()) return DataError("{}: cannot be decoded as an image", file);
+  return ColourOf(image, file);
+}
+
+Expected<std::string> EncodePng(const cv::Mat& image, const std::string& file) {
+  return Encode(".png", image, {}, file);
+}
 
 Expected<std::string> EncodeColour(const cv::Mat& colour, const std::string& file) {
   if (colour.type() != CV_8UC3) {
-    return DataError("{}: the colour image is {}, expected 8-bit RGB", file, TypeName(colour));
+    return DataError("{}: the colour image is {}, expected 8-bit RGB", file, ImageTypeName(colour));
   }
   return Encode(".png", SwapRedAndBlue(colour), {}, file);
 }
@@ -172,7 +205,7 @@ Expected<std::string> EncodeColour(const cv::Mat& colour, const std::string& fil
 Expected<std::string> EncodeDepth(const cv::Mat& depth, const std::string& file) {
   if (depth.type() != CV_32FC1) {
     return DataError("{}: the depth image is {}, expected 32-bit float with 1 channel", file,
-                     TypeName(depth));
+                     ImageTypeName(depth));
   }
   EnableExr();
   return Encode(".exr", depth,
@@ -184,7 +217,7 @@ Expected<std::string> EncodeDepth(const cv::Mat& depth, const std::string& file)
 Expected<std::string> EncodeMask(const cv::Mat& mask, const std::string& file) {
   if (mask.type() != CV_16UC1) {
     return DataError("{}: the mask is {}, expected 16-bit unsigned with 1 channel", file,
-                     TypeName(mask));
+                     ImageTypeName(mask));
   }
   double largest = 0;
   cv::minMaxLoc(mask, nullptr, &largest);
@@ -196,12 +229,10 @@ Expected<std::string> EncodeMask(const cv::Mat& mask, const std::string& file) {
   return Encode(".png", bytes, {}, file);
 }
 
-Expected<cv::Mat> ReadColour(const fs::path& path, cv::Size expected) {
-  TSDFPP_ASSIGN(const cv::Mat image, Decode(path, expected));
-  if (image.type() != CV_8UC3 && image.type() != CV_8UC4) {
-    return DataError("{}: the image is {}, expected 8-bit RGB", path.string(), TypeName(image));
-  }
-  return SwapRedAndBlue(image);
+Expected<cv::Mat> ReadColour(const fs::path& path, cv::Size expected,
+                             const std::string& size_source) {
+  TSDFPP_ASSIGN(const cv::Mat image, Decode(path, expected, size_source));
+  return ColourOf(image, path.string());
 }
 
 Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
@@ -220,7 +251,7 @@ Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
   TSDFPP_ASSIGN(cv::Mat depth, Decode(path, expected));
   if (depth.depth() != CV_32F) {
     return DataError("{}: depth is {}, expected 32-bit float metres", path.string(),
-                     TypeName(depth));
+                     ImageTypeName(depth));
   }
   if (depth.channels() >= 3) {
     cv::Mat channel;
@@ -244,7 +275,8 @@ Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
 Expected<cv::Mat> ReadMask(const fs::path& path, cv::Size expected) {
   TSDFPP_ASSIGN(cv::Mat mask, Decode(path, expected));
   if (mask.depth() != CV_8U || mask.channels() == 2) {
-    return DataError("{}: the mask is {}, expected 8-bit grey ids", path.string(), TypeName(mask));
+    return DataError("{}: the mask is {}, expected 8-bit grey ids", path.string(),
+                     ImageTypeName(mask));
   }
   if (mask.channels() >= 3) {
     cv::Mat channel;

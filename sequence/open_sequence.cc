@@ -1,23 +1,154 @@
 #include "sequence/open_sequence.h"
 
+#include <algorithm>
+
+#include "sequence/bop_layout.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_reader.h"
+#include "sequence/dataset_readers.h"
+#include "sequence/plausibility.h"
+#include "sequence/text_lines.h"
+#include "sequence/trajectory_file.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
+namespace {
 
-Expected<std::unique_ptr<FrameSource>> OpenSequence(const fs::path& folder) {
+bool Exists(const fs::path& path) {
   std::error_code code;
-  if (!fs::exists(folder, code)) return UsageError("{}: no such folder", folder.string());
-  if (!fs::is_directory(folder, code)) {
-    return UsageError("{}: is a file, expected the folder of a sequence", folder.string());
+  return fs::exists(path, code);
+}
+
+bool HoldsBopScene(const fs::path& folder) {
+  if (Exists(folder / bop::kCamera)) return true;
+  for (const std::string& split : NamesIn(folder)) {
+    for (const std::string& scene : NamesIn(folder / split)) {
+      if (Exists(folder / split / scene / bop::kCamera)) return true;
+    }
   }
-  if (cofusion::IsCofusion(folder)) return OpenCofusion(folder);
-  const bool calibrated = fs::exists(folder / cofusion::kCalibration, code);
-  return DataError(
-      "{}: not a sequence, there is no {}; expected a Co-Fusion set ({}, {}/, {}/, {})",
-      folder.string(), calibrated ? std::string(cofusion::kColour) + "/" : cofusion::kCalibration,
-      cofusion::kCalibration, cofusion::kColour, cofusion::kDepth, cofusion::kCameraTrajectory);
+  return false;
+}
+
+bool LooksLike(const fs::path& path, DatasetFormat format) {
+  const auto any_name = [&](const char* prefix, const char* suffix) {
+    const auto names = NamesIn(path);
+    return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+      return name.starts_with(prefix) && name.ends_with(suffix);
+    });
+  };
+  switch (format) {
+    case DatasetFormat::kCofusion:
+      return cofusion::IsCofusion(path);
+    case DatasetFormat::kTum:
+      return Exists(path / "associations.txt") || Exists(path / "associated.txt") ||
+             (Exists(path / "rgb.txt") && Exists(path / "depth.txt"));
+    case DatasetFormat::kBop:
+      return HoldsBopScene(path);
+    case DatasetFormat::kKlg:
+      return path.extension() == ".klg" || any_name("", ".klg");
+    case DatasetFormat::kScannet:
+      return Exists(path / "color") && Exists(path / "depth") && Exists(path / "pose");
+    case DatasetFormat::kReplica:
+      return Exists(path / "traj.txt") && Exists(path / "results");
+    case DatasetFormat::kSevenScenes:
+      return any_name("frame-", ".depth.png");
+  }
+  return false;
+}
+
+Expected<DatasetFormat> DetectFormat(const fs::path& path) {
+  const std::vector<DatasetFormat> fitting = DetectFormats(path);
+  if (fitting.size() == 1) return fitting.front();
+  if (fitting.empty()) {
+    return DataError(
+        "{}: not a sequence; expected calibration.txt and colour/ (cofusion), rgb.txt and "
+        "depth.txt "
+        "(tum), scene_camera.json (bop), a .klg (klg), color/, depth/ and pose/ (scannet), "
+        "traj.txt "
+        "and results/ (replica), or frame-*.depth.png (7scenes)",
+        path.string());
+  }
+  std::string names;
+  for (const DatasetFormat format : fitting) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", DatasetFormatName(format));
+  }
+  return UsageError("{}: several formats fit ({}), expected --dataset to say which", path.string(),
+                    names);
+}
+
+Expected<std::unique_ptr<FrameSource>> OpenCofusionSet(const fs::path& folder,
+                                                       const SequenceOptions& options) {
+  if (options.intrinsics || options.depth_units_per_m || options.fixed_camera) {
+    return UsageError(
+        "{}: a Co-Fusion set has its own calibration, metres and camera poses, expected no others",
+        folder.string());
+  }
+  TSDFPP_ASSIGN(auto source, OpenCofusion(folder));
+  if (options.check && !Exists(folder / cofusion::kSequence)) {
+    TSDFPP_ASSIGN(const Trajectory camera, ReadTrajectory(folder / cofusion::kCameraTrajectory));
+    std::vector<Pose> T_WC;
+    const SequenceInfo& info = source->info();
+    for (int i = 0; i < info.frame_count; ++i) {
+      const auto pose = camera.find(info.first_index + i);
+      if (pose == camera.end()) return source;  // Read() says so
+      T_WC.push_back(pose->second);
+    }
+    TSDFPP_RETURN_IF_ERROR(CheckFrames(*source, T_WC, std::nullopt));
+  }
+  return source;
+}
+
+Expected<std::unique_ptr<DatasetSource>> OpenOthers(const fs::path& path, DatasetFormat format,
+                                                    const SequenceOptions& options,
+                                                    SequenceNotes& notes) {
+  switch (format) {
+    case DatasetFormat::kTum:
+      return OpenTum(path, options, notes);
+    case DatasetFormat::kBop:
+      return OpenBop(path, options, notes);
+    case DatasetFormat::kKlg:
+      return OpenKlg(path, options, notes);
+    case DatasetFormat::kScannet:
+      return OpenScannet(path, options, notes);
+    case DatasetFormat::kReplica:
+      return OpenReplica(path, options, notes);
+    default:
+      return OpenSevenScenes(path, options, notes);
+  }
+}
+
+}  // namespace
+
+std::vector<DatasetFormat> DetectFormats(const fs::path& path) {
+  std::vector<DatasetFormat> fitting;
+  for (const DatasetFormat format : AllDatasetFormats()) {
+    if (LooksLike(path, format)) fitting.push_back(format);
+  }
+  return fitting;
+}
+
+Expected<std::unique_ptr<FrameSource>> OpenSequence(const fs::path& path,
+                                                    const SequenceOptions& options,
+                                                    SequenceNotes* notes) {
+  std::error_code code;
+  if (!fs::exists(path, code)) return UsageError("{}: no such folder", path.string());
+  if (!fs::is_directory(path, code) && path.extension() != ".klg") {
+    return UsageError("{}: is a file, expected the folder of a sequence or a .klg", path.string());
+  }
+  DatasetFormat format{};
+  if (options.format) {
+    format = *options.format;
+  } else {
+    TSDFPP_ASSIGN(format, DetectFormat(path));
+  }
+  if (format == DatasetFormat::kCofusion) return OpenCofusionSet(path, options);
+  SequenceNotes unheard;
+  TSDFPP_ASSIGN(auto source, OpenOthers(path, format, options, notes ? *notes : unheard));
+  if (options.check) {
+    TSDFPP_RETURN_IF_ERROR(
+        CheckFrames(*source, source->CameraPoses(), source->DepthUnitsPerMetre()));
+  }
+  return source;
 }
 
 }  // namespace tsdfpp

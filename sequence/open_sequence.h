@@ -3,15 +3,27 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "core/error.h"
 #include "core/frame_source.h"
+#include "sequence/sequence_options.h"
 
 namespace tsdfpp {
 
-// Detects the format of the sequence in `folder` and opens it. Co-Fusion sets are known (by
-// calibration.txt beside colour/). Errors: kUsage where there is no such folder, kData where its
-// format is not known, else those of the format's reader.
-Expected<std::unique_ptr<FrameSource>> OpenSequence(const std::filesystem::path& folder);
+// The formats that a path looks like, by the names of what lies there; several or none where it is
+// not clear.
+std::vector<DatasetFormat> DetectFormats(const std::filesystem::path& path);
+
+// Opens the sequence at `path`: a folder, or a .klg file. The format is detected unless `options`
+// has one; a few frames are read to look for wrong units, inverted poses and the like
+// (sequence/plausibility.h) unless `options` leaves that out or the sequence is our own (then
+// `tsdfpp verify` looks closer). `notes`, where given, gets what was assumed or left out.
+// Errors: kUsage where there is nothing at `path`, where several formats fit, or where an option
+// does not fit the format; kData where no format fits or the checks find something; else those of
+// the format's reader (sequence/dataset_readers.h, sequence/cofusion_reader.h).
+Expected<std::unique_ptr<FrameSource>> OpenSequence(const std::filesystem::path& path,
+                                                    const SequenceOptions& options = {},
+                                                    SequenceNotes* notes = nullptr);
 
 }  // namespace tsdfpp

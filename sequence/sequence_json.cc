@@ -10,7 +10,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
+constexpr int kOldestSchemaVersion = 1;
 constexpr const char* kGenerator = "tsdfpp";
 
 // nlohmann's own conversion would wrap a number that does not fit.
@@ -20,7 +21,36 @@ InstanceId IdOf(const Json& json) {
   return static_cast<InstanceId>(id);
 }
 
-SequenceRecord FromJson(const Json& json) {
+Json ResidualJson(const Residual& residual) {
+  return {{"mean_m", residual.mean_m},        {"p99_m", residual.p99_m},
+          {"max_m", residual.max_m},          {"limit_m", residual.limit_m},
+          {"checked", residual.checked},      {"excluded", residual.excluded},
+          {"violations", residual.violations}};
+}
+
+Residual ResidualOf(const Json& json) {
+  return {json.at("mean_m").get<double>(),          json.at("p99_m").get<double>(),
+          json.at("max_m").get<double>(),           json.at("limit_m").get<double>(),
+          json.at("checked").get<std::int64_t>(),   json.at("excluded").get<std::int64_t>(),
+          json.at("violations").get<std::int64_t>()};
+}
+
+Json CertificateJson(const Certificate& certificate) {
+  return {{"frames", certificate.frames},
+          {"ray_frames", certificate.ray_frames},
+          {"model", ResidualJson(certificate.model)},
+          {"ray_depth", ResidualJson(certificate.ray_depth)},
+          {"wrong_ids", certificate.wrong_ids}};
+}
+
+Certificate CertificateOf(const Json& json) {
+  return {json.at("frames").get<int>(), json.at("ray_frames").get<int>(),
+          ResidualOf(json.at("model")), ResidualOf(json.at("ray_depth")),
+          json.at("wrong_ids").get<std::int64_t>()};
+}
+
+// `version` is the schema's.
+SequenceRecord FromJson(const Json& json, int version) {
   SequenceRecord record;
   SequenceInfo& info = record.info;
   info.name = json.at("scene").get<std::string>();
@@ -47,6 +77,11 @@ SequenceRecord FromJson(const Json& json) {
   generator.sensor = json.at("sensor").get<std::string>();
   generator.backend = json.at("backend").get<std::string>();
   generator.renderer = json.at("renderer").get<std::string>();
+  if (version >= 2) {
+    if (const Json& certificate = json.at("certificate"); !certificate.is_null()) {
+      record.certificate = CertificateOf(certificate);
+    }
+  }
   const Json& files = json.at("files");
   for (const auto& [file, hash] : files.at("fnv1a64").items()) {
     record.hashes.emplace(file, hash.get<std::string>());
@@ -94,6 +129,7 @@ std::string SequenceToJson(const SequenceRecord& record) {
   json["sensor"] = generator.sensor;
   json["backend"] = generator.backend;
   json["renderer"] = generator.renderer;
+  json["certificate"] = record.certificate ? CertificateJson(*record.certificate) : Json(nullptr);
   Json hashes = Json::object();
   for (const auto& [file, hash] : record.hashes) hashes[file] = hash;
   json["files"]["fnv1a64"] = std::move(hashes);
@@ -109,12 +145,14 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
   if (!json.contains("generator") || json["generator"] != kGenerator) {
     return DataError("{}: 'generator' is not \"{}\"", file, kGenerator);
   }
-  if (!json.contains("schema_version") || json["schema_version"] != kSchemaVersion) {
-    return DataError("{}: 'schema_version' is not {}, the one that this program reads", file,
+  const Json version = json.value("schema_version", Json(nullptr));
+  if (!version.is_number_integer() || version < kOldestSchemaVersion || version > kSchemaVersion) {
+    return DataError("{}: 'schema_version' is {}, this program reads {} to {}", file,
+                     version.is_null() ? "missing" : version.dump(), kOldestSchemaVersion,
                      kSchemaVersion);
   }
   try {
-    SequenceRecord record = FromJson(json);
+    SequenceRecord record = FromJson(json, version.get<int>());
     if (!(record.info.rate_hz > 0) || record.info.frame_count < 1 || record.info.first_index < 0) {
       return DataError("{}: expected rate_hz and frame_count over 0 and first_index 0 or more",
                        file);

@@ -1,4 +1,5 @@
-// sequence.json: what a Co-Fusion set cannot say about itself (schema version 1).
+// sequence.json: what a Co-Fusion set cannot say about itself. Schema version 2; version 1, which
+// had no certificate, is read too.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +24,34 @@ struct GeneratorInfo {
   bool operator==(const GeneratorInfo&) const = default;
 };
 
+// How far measured values are from true ones, metres, over all pixels that were compared.
+struct Residual {
+  double mean_m = 0;
+  double p99_m = 0;  // rounded up to a two-hundredth of the limit
+  double max_m = 0;
+  double limit_m = 0;           // what a sound sequence keeps to
+  std::int64_t checked = 0;     // pixels compared
+  std::int64_t excluded = 0;    // pixels left out: on an edge, or seen at grazing incidence
+  std::int64_t violations = 0;  // pixels beyond the limit
+  bool operator==(const Residual&) const = default;
+};
+
+// What the verification of a whole sequence measured (eval/certify.h).
+struct Certificate {
+  int frames = 0;              // compared with the models, the poses and each other
+  int ray_frames = 0;          // compared with rays
+  Residual model;              // from each pixel's point to the model of the mask's object
+  Residual ray_depth;          // between depth and MuJoCo's rays
+  std::int64_t wrong_ids = 0;  // pixels whose mask is not what the ray hits
+  bool operator==(const Certificate&) const = default;
+};
+
 struct SequenceRecord {
   SequenceInfo info;
   GeneratorInfo generator;
   // FNV-1a 64 of every other file's bytes, 16 hexadecimal digits, by the path in the set.
   std::map<std::string, std::string> hashes;
+  std::optional<Certificate> certificate = std::nullopt;
 };
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo): finds damage, not malice.

@@ -129,6 +129,7 @@ class EglContext final : public GlContext {
     }
     if (info_.renderer.empty()) {
       FillInfo(reinterpret_cast<GetStringFunction>(egl_.get_proc_address("glGetString")), info_);
+      finish_ = reinterpret_cast<void (*)()>(egl_.get_proc_address("glFinish"));
     }
     return {};
   }
@@ -259,6 +260,7 @@ class OsmesaGlContext final : public GlContext {
     }
     if (info_.renderer.empty()) {
       FillInfo(reinterpret_cast<GetStringFunction>(osmesa_.get_proc_address("glGetString")), info_);
+      finish_ = reinterpret_cast<void (*)()>(osmesa_.get_proc_address("glFinish"));
     }
     return {};
   }

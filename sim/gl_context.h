@@ -44,10 +44,16 @@ class GlContext {
   // Error kEnvironment where another thread holds it.
   virtual Expected<void> MakeCurrent() = 0;
   virtual void Release() = 0;
+  // Waits until everything that was drawn is there (glFinish), for measurements. Bound contexts
+  // only.
+  void Finish() const {
+    if (finish_ != nullptr) finish_();
+  }
 
  protected:
   GlContext() = default;
   GlInfo info_;
+  void (*finish_)() = nullptr;
 };
 
 }  // namespace tsdfpp

@@ -224,6 +224,12 @@ Shape MakeHandle(double ring, double tube) {
   return Outwards(JoinRings(std::move(vertices), kHandleSegments));
 }
 
+Shape MakeLoft(const std::vector<std::vector<Eigen::Vector3d>>& rings) {
+  std::vector<Eigen::Vector3d> vertices;
+  for (const auto& ring : rings) vertices.insert(vertices.end(), ring.begin(), ring.end());
+  return Outwards(JoinRings(std::move(vertices), rings.front().size()));
+}
+
 Shape Transformed(Shape shape, const Eigen::Isometry3d& T) {
   for (Eigen::Vector3d& vertex : shape.vertices) vertex = T * vertex;
   return shape;

@@ -41,6 +41,10 @@ std::vector<Eigen::Vector2d> BallProfile(double radius, double centre_z);
 // radius `ring` around the origin, its ends capped.
 Shape MakeHandle(double ring, double tube);
 
+// Closed rings of equally many vertices, one stacked on the other and joined, both ends closed by
+// fans around their middles (so the first and the last are star-shaped from there).
+Shape MakeLoft(const std::vector<std::vector<Eigen::Vector3d>>& rings);
+
 Shape Transformed(Shape shape, const Eigen::Isometry3d& T);
 Shape Translated(Shape shape, double x, double y, double z);
 

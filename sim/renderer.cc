@@ -1,6 +1,7 @@
 #include "sim/renderer.h"
 
 #include <array>
+#include <chrono>
 #include <opencv2/core/utility.hpp>
 #include <vector>
 
@@ -10,6 +11,12 @@ namespace tsdfpp {
 namespace {
 
 constexpr int kColourSamples = 4;
+
+using Clock = std::chrono::steady_clock;
+
+double MillisecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
 
 // Binds the context to this thread for the length of a scope.
 class BoundContext {
@@ -54,9 +61,9 @@ float DepthFromBuffer(float d) {
 
 }  // namespace
 
-Renderer::Renderer(CompiledScene& scene, const Intrinsics& intrinsics,
+Renderer::Renderer(CompiledScene& scene, const Intrinsics& intrinsics, const RenderOptions& options,
                    std::unique_ptr<GlContext> gl)
-    : scene_(scene), intrinsics_(intrinsics), gl_(std::move(gl)) {
+    : scene_(scene), intrinsics_(intrinsics), options_(options), gl_(std::move(gl)) {
   mjv_defaultScene(&visible_);
   mjr_defaultContext(&id_context_);
   mjr_defaultContext(&colour_context_);
@@ -74,10 +81,11 @@ Renderer::~Renderer() {
 }
 
 Expected<std::unique_ptr<Renderer>> Renderer::Create(CompiledScene& scene,
-                                                     const Intrinsics& intrinsics) {
+                                                     const Intrinsics& intrinsics,
+                                                     const RenderOptions& options) {
   InstallMujocoHandlers();
   TSDFPP_ASSIGN(std::unique_ptr<GlContext> gl, GlContext::Create());
-  std::unique_ptr<Renderer> renderer(new Renderer(scene, intrinsics, std::move(gl)));
+  std::unique_ptr<Renderer> renderer(new Renderer(scene, intrinsics, options, std::move(gl)));
   TSDFPP_RETURN_IF_ERROR(renderer->MakeBuffers());
   return renderer;
 }
@@ -87,7 +95,7 @@ Expected<void> Renderer::MakeBuffers() {
   TSDFPP_RETURN_IF_ERROR(bound.status());
   const int shadow_size = scene_.model()->vis.quality.shadowsize;
   TSDFPP_RETURN_IF_ERROR(MakeBuffer(id_context_, 0, 0));
-  return MakeBuffer(colour_context_, kColourSamples, shadow_size);
+  return MakeBuffer(colour_context_, options_.antialias ? kColourSamples : 0, shadow_size);
 }
 
 Expected<void> Renderer::MakeBuffer(mjrContext& context, int samples, int shadow_size) {
@@ -140,12 +148,20 @@ Expected<void> Renderer::Draw(mjrContext& context, bool ids, unsigned char* rgb,
   visible_.flags[mjRND_IDCOLOR] = static_cast<mjtByte>(ids);
   visible_.flags[mjRND_SHADOW] = static_cast<mjtByte>(!ids);
   int gl_error = 0;
+  const auto start = Clock::now();
   TSDFPP_RETURN_IF_ERROR(RunGuarded([&] {
     mjr_setBuffer(mjFB_OFFSCREEN, &context);
     mjr_render(viewport, &visible_, &context);
+  }));
+  // Reading would wait for the same.
+  gl_->Finish();
+  (ids ? times_.geometry_ms : times_.colour_ms) += MillisecondsSince(start);
+  const auto drawn = Clock::now();
+  TSDFPP_RETURN_IF_ERROR(RunGuarded([&] {
     mjr_readPixels(rgb, depth, viewport, &context);
     gl_error = mjr_getError();
   }));
+  times_.read_back_ms += MillisecondsSince(drawn);
   if (gl_error != 0) return EnvironmentError("OpenGL error {:#x} while rendering", gl_error);
   return {};
 }
@@ -154,6 +170,7 @@ Expected<RenderedImages> Renderer::Render(const Pose& T_WC, bool with_colour) {
   const BoundContext bound(*gl_);
   TSDFPP_RETURN_IF_ERROR(bound.status());
   TSDFPP_RETURN_IF_ERROR(UpdateScene(T_WC));
+  times_ = {};
 
   cv::Mat segment(intrinsics_.height, intrinsics_.width, CV_8UC3);
   cv::Mat buffer(intrinsics_.height, intrinsics_.width, CV_32FC1);
@@ -166,6 +183,7 @@ Expected<RenderedImages> Renderer::Render(const Pose& T_WC, bool with_colour) {
     instance.at(static_cast<std::size_t>(geom.segid) + 1) =
         scene_.geoms()[static_cast<std::size_t>(geom.objid)].id;
   }
+  const auto read = Clock::now();
   RenderedImages images;
   images.depth.create(segment.size(), CV_32FC1);
   images.mask.create(segment.size(), CV_16UC1);
@@ -185,10 +203,13 @@ Expected<RenderedImages> Renderer::Render(const Pose& T_WC, bool with_colour) {
       depth[u] = DepthFromBuffer(d[u]);
     }
   }
+  times_.convert_ms += MillisecondsSince(read);
   if (with_colour) {
     cv::Mat bottom_up(intrinsics_.height, intrinsics_.width, CV_8UC3);
     TSDFPP_RETURN_IF_ERROR(Draw(colour_context_, false, bottom_up.data, nullptr));
+    const auto coloured = Clock::now();
     cv::flip(bottom_up, images.colour, 0);
+    times_.convert_ms += MillisecondsSince(coloured);
   }
   return images;
 }

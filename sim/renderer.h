@@ -17,15 +17,31 @@ struct RenderedImages {
   cv::Mat mask;    // CV_16UC1, instance ids; 0 also where nothing was hit
 };
 
+struct RenderOptions {
+  // Of the colour image: four samples a pixel. Without it colours are jagged and come faster.
+  bool antialias = true;
+  bool operator==(const RenderOptions&) const = default;
+};
+
+// What the last Render() spent, milliseconds of wall clock.
+struct RenderTimes {
+  double geometry_ms = 0;   // depth and ids drawn
+  double colour_ms = 0;     // colour and shadows drawn
+  double read_back_ms = 0;  // both copied from GL
+  double convert_ms = 0;    // to metres, instance ids, rows top-down
+};
+
 // Pixel centres are integers: pixel (u, v) shows the ray ((u - cx) / fx, (v - cy) / fy, 1).
 // Depth and ids come from one pass without multisampling, which alone gives true depth; colour has
-// a pass of its own with four samples a pixel and shadows (facts/rendering.md).
+// a pass of its own with shadows and, unless told otherwise, four samples a pixel
+// (facts/rendering.md).
 class Renderer {
  public:
   // Errors: those of GlContext::Create; kEnvironment where GL gives no off-screen buffer of the
   // image's size.
   static Expected<std::unique_ptr<Renderer>> Create(CompiledScene& scene,
-                                                    const Intrinsics& intrinsics);
+                                                    const Intrinsics& intrinsics,
+                                                    const RenderOptions& options = {});
   ~Renderer();
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
@@ -35,9 +51,11 @@ class Renderer {
   Expected<RenderedImages> Render(const Pose& T_WC, bool with_colour);
 
   const GlInfo& gl_info() const { return gl_->info(); }
+  const RenderTimes& times() const { return times_; }
 
  private:
-  Renderer(CompiledScene& scene, const Intrinsics& intrinsics, std::unique_ptr<GlContext> gl);
+  Renderer(CompiledScene& scene, const Intrinsics& intrinsics, const RenderOptions& options,
+           std::unique_ptr<GlContext> gl);
   Expected<void> MakeBuffers();
   Expected<void> MakeBuffer(mjrContext& context, int samples, int shadow_size);
   Expected<void> UpdateScene(const Pose& T_WC);
@@ -45,6 +63,8 @@ class Renderer {
 
   CompiledScene& scene_;
   Intrinsics intrinsics_;
+  RenderOptions options_;
+  RenderTimes times_;
   std::unique_ptr<GlContext> gl_;
   mjvScene visible_{};
   mjrContext id_context_{};

@@ -1,6 +1,9 @@
 #include "sim/room_model.h"
 
-#include "sim/textures.h"
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <string>
 
 namespace tsdfpp {
 namespace {
@@ -9,6 +12,9 @@ constexpr double kWallThickness_m = 0.1;
 // Cells of the meshes; the renderer lights vertices (mesh_shapes.h).
 constexpr double kTableCell_m = 0.1;
 constexpr double kRoomCell_m = 0.4;
+// Of the default room's floor, what no furniture stands on: |x| and |y| up to these.
+constexpr double kClearHalfX_m = 1.2;
+constexpr double kClearHalfY_m = 1.05;
 
 void AddBox(std::vector<ModelPart>& parts, const char* name, const char* region,
             const Eigen::Vector3d& low, const Eigen::Vector3d& high, const Colour& colour,
@@ -37,28 +43,28 @@ void AddTable(std::vector<ModelPart>& parts) {
   }
 }
 
-void AddShell(std::vector<ModelPart>& parts) {
+void AddShell(std::vector<ModelPart>& parts, const RoomSpec& spec) {
   const double t = kWallThickness_m;
+  const double half_x = spec.half_x;
+  const double half_y = spec.half_y;
+  const double height = spec.height;
   const Colour wall{214, 206, 190};
   // Walls stand on the inside edge of the floor slab and overlap at the corners.
-  AddBox(parts, "floor", "floor", {-kRoomHalfX_m - t, -kRoomHalfY_m - t, -t},
-         {kRoomHalfX_m + t, kRoomHalfY_m + t, 0}, {150, 150, 150}, kTileMaterial, kRoomCell_m);
-  AddBox(parts, "ceiling", "wall", {-kRoomHalfX_m - t, -kRoomHalfY_m - t, kRoomHeight_m},
-         {kRoomHalfX_m + t, kRoomHalfY_m + t, kRoomHeight_m + t}, {240, 238, 232}, "", kRoomCell_m);
-  AddBox(parts, "wall_back", "wall", {-kRoomHalfX_m - t, kRoomHalfY_m, -t / 2},
-         {kRoomHalfX_m + t, kRoomHalfY_m + t, kRoomHeight_m + t / 2}, wall, kPlasterMaterial,
-         kRoomCell_m);
-  AddBox(parts, "wall_front", "wall", {-kRoomHalfX_m - t, -kRoomHalfY_m - t, -t / 2},
-         {kRoomHalfX_m + t, -kRoomHalfY_m, kRoomHeight_m + t / 2}, wall, kPlasterMaterial,
-         kRoomCell_m);
-  AddBox(parts, "wall_left", "wall", {-kRoomHalfX_m - t, -kRoomHalfY_m - t / 2, -t / 2},
-         {-kRoomHalfX_m, kRoomHalfY_m + t / 2, kRoomHeight_m + t / 2}, wall, kPlasterMaterial,
-         kRoomCell_m);
-  AddBox(parts, "wall_right", "wall", {kRoomHalfX_m, -kRoomHalfY_m - t / 2, -t / 2},
-         {kRoomHalfX_m + t, kRoomHalfY_m + t / 2, kRoomHeight_m + t / 2}, wall, kPlasterMaterial,
-         kRoomCell_m);
+  AddBox(parts, "floor", "floor", {-half_x - t, -half_y - t, -t}, {half_x + t, half_y + t, 0},
+         {150, 150, 150}, kTileMaterial, kRoomCell_m);
+  AddBox(parts, "ceiling", "wall", {-half_x - t, -half_y - t, height},
+         {half_x + t, half_y + t, height + t}, {240, 238, 232}, "", kRoomCell_m);
+  AddBox(parts, "wall_back", "wall", {-half_x - t, half_y, -t / 2},
+         {half_x + t, half_y + t, height + t / 2}, wall, kPlasterMaterial, kRoomCell_m);
+  AddBox(parts, "wall_front", "wall", {-half_x - t, -half_y - t, -t / 2},
+         {half_x + t, -half_y, height + t / 2}, wall, kPlasterMaterial, kRoomCell_m);
+  AddBox(parts, "wall_left", "wall", {-half_x - t, -half_y - t / 2, -t / 2},
+         {-half_x, half_y + t / 2, height + t / 2}, wall, kPlasterMaterial, kRoomCell_m);
+  AddBox(parts, "wall_right", "wall", {half_x, -half_y - t / 2, -t / 2},
+         {half_x + t, half_y + t / 2, height + t / 2}, wall, kPlasterMaterial, kRoomCell_m);
 }
 
+// Laid out for the default room.
 void AddFurniture(std::vector<ModelPart>& parts) {
   const Colour oak{158, 112, 70};
   const Colour door{196, 150, 100};
@@ -100,13 +106,83 @@ void AddFurniture(std::vector<ModelPart>& parts) {
          0.2);
 }
 
+// In a larger room the furniture keeps its distance from its wall.
+void AddFurnitureAlongWalls(std::vector<ModelPart>& parts, const RoomSpec& spec) {
+  const double dx = spec.half_x - kRoomHalfX_m;
+  const double dy = spec.half_y - kRoomHalfY_m;
+  std::vector<ModelPart> furniture;
+  AddFurniture(furniture);
+  for (ModelPart& part : furniture) {
+    const bool right = part.name == "chest" || part.name == "box";
+    const double x = right ? dx : part.name == "stool" ? -dx : 0;
+    const double y = part.name == "chest" ? 0 : dy;
+    if (x != 0 || y != 0) part.shape = Translated(std::move(part.shape), x, y, 0);
+    parts.push_back(std::move(part));
+  }
+}
+
+std::shared_ptr<const TextureImage> PictureOf(const TextureSpec& spec) {
+  auto picture = MakeTexture(spec);
+  // The caller validated it.
+  if (!picture) std::abort();
+  return std::make_shared<const TextureImage>(std::move(*picture));
+}
+
+void Cover(std::vector<ModelPart>& parts, const char* material,
+           const std::optional<TextureSpec>& texture) {
+  if (!texture) return;
+  const auto picture = PictureOf(*texture);
+  for (ModelPart& part : parts) {
+    if (part.material != material) continue;
+    part.material = picture->material;
+    part.picture = picture;
+  }
+}
+
 }  // namespace
 
-std::vector<ModelPart> MakeRoom() {
+Expected<void> RoomSpec::Validate() const {
+  // The longest sight line, which has to stay within the renderer's depth range (kFar_m).
+  constexpr double kLongest_m = 9.9;
+  if (!(half_x >= kRoomHalfX_m) || !(half_y >= kRoomHalfY_m) || !(height >= kRoomHeight_m)) {
+    return UsageError(
+        "the room's half sides and height are {}, {} and {} m, expected {}, {} and {} at least",
+        half_x, half_y, height, kRoomHalfX_m, kRoomHalfY_m, kRoomHeight_m);
+  }
+  const double diagonal = std::sqrt(4 * half_x * half_x + 4 * half_y * half_y + height * height);
+  if (!(diagonal <= kLongest_m)) {
+    return UsageError("the room's diagonal is {:.2f} m, expected {} m at most: depth ends there",
+                      diagonal, kLongest_m);
+  }
+  for (const auto& [field, texture] :
+       {std::pair{"table_texture", &table_texture}, std::pair{"floor_texture", &floor_texture},
+        std::pair{"wall_texture", &wall_texture}}) {
+    if (!*texture) continue;
+    if (auto picture = MakeTexture(**texture); !picture) {
+      return UsageError("{}: {}", field, picture.error().message);
+    }
+  }
+  return {};
+}
+
+double RoomSpec::ground_half_x() const {
+  if (table) return kTableHalfX_m;
+  return furniture ? kClearHalfX_m + half_x - kRoomHalfX_m : half_x;
+}
+
+double RoomSpec::ground_half_y() const {
+  if (table) return kTableHalfY_m;
+  return furniture ? kClearHalfY_m + half_y - kRoomHalfY_m : half_y;
+}
+
+std::vector<ModelPart> MakeRoom(const RoomSpec& spec) {
   std::vector<ModelPart> parts;
-  AddTable(parts);
-  AddShell(parts);
-  AddFurniture(parts);
+  if (spec.table) AddTable(parts);
+  AddShell(parts, spec);
+  if (spec.furniture) AddFurnitureAlongWalls(parts, spec);
+  Cover(parts, kWoodMaterial, spec.table_texture);
+  Cover(parts, kTileMaterial, spec.floor_texture);
+  Cover(parts, kPlasterMaterial, spec.wall_texture);
   return parts;
 }
 

@@ -1,8 +1,11 @@
-// The room that every scene shares: floor, walls, ceiling, a table and furniture, all of id 0.
+// The room that scenes share: floor, walls, ceiling, a table and furniture, all of id 0.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "core/error.h"
+#include "sim/textures.h"
 #include "sim/toy_models.h"
 
 namespace tsdfpp {
@@ -18,7 +21,29 @@ inline constexpr double kRoomHalfX_m = 2.4;
 inline constexpr double kRoomHalfY_m = 2.2;
 inline constexpr double kRoomHeight_m = 2.6;
 
+// What a scene may vary of the room; the default is the room of toycar3.
+struct RoomSpec {
+  bool table = true;             // without it, things stand on the floor
+  bool furniture = true;         // along the walls
+  double half_x = kRoomHalfX_m;  // metres, no smaller than the default
+  double half_y = kRoomHalfY_m;
+  double height = kRoomHeight_m;
+  std::optional<TextureSpec> table_texture;  // of the table's top
+  std::optional<TextureSpec> floor_texture;
+  std::optional<TextureSpec> wall_texture;
+
+  // Errors: kUsage, with the field: out of range (a far corner would leave the depth range), or a
+  // texture's own error.
+  Expected<void> Validate() const;
+  // Where things stand: the table's top or the floor, metres.
+  double ground_m() const { return table ? kTableTop_m : 0; }
+  // Half the sides of the rectangle around the origin on which nothing of the room stands.
+  double ground_half_x() const;
+  double ground_half_y() const;
+};
+
 // The parts of the room, in the world's frame. Regions: "table", "floor", "wall", "furniture".
-std::vector<ModelPart> MakeRoom();
+// `spec` must be valid.
+std::vector<ModelPart> MakeRoom(const RoomSpec& spec = {});
 
 }  // namespace tsdfpp

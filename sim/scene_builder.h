@@ -35,7 +35,7 @@ struct GeomInfo {
 // A compiled scene and its state. Every object is a mocap body; the room belongs to the world body.
 class CompiledScene {
  public:
-  // Errors: kEnvironment where MuJoCo refuses the model, with its words.
+  // Errors: those of MakeModel; kEnvironment where MuJoCo refuses the model, with its words.
   static Expected<CompiledScene> Compile(const SceneConfig& config);
 
   // Moves the objects: T_WO of every one. Lights and geoms follow.

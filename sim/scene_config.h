@@ -1,6 +1,8 @@
-// What a scene file (scenes/*.toml) says: camera, objects, motion, the paper's experiment.
+// What a scene file (scenes/*.toml) says: room, lights, camera, objects, motion, the paper's
+// experiment.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,37 +11,48 @@
 
 #include "core/error.h"
 #include "core/types.h"
+#include "sim/camera_path.h"
+#include "sim/light_rig.h"
+#include "sim/model_catalogue.h"
+#include "sim/object_motion.h"
+#include "sim/room_model.h"
+#include "sim/sensor_config.h"
 
 namespace tsdfpp {
 
-// The camera looks at `target` from a smooth path around the table's vertical axis through it. Keys
-// are spread evenly over the frames; natural cubic splines join them.
-struct CameraPath {
-  Eigen::Vector3d target_W = Eigen::Vector3d::Zero();  // metres
-  std::vector<double> azimuth_deg;  // of the camera seen from the target, from +x towards +y
-  std::vector<double> radius_m;     // horizontal distance from the target
-  std::vector<double> height_m;     // above the table's top
-};
-
-// At rest up to `start_frame`, then along a curve whose tangent the object's front (+x) follows,
-// at rest again from `end_frame` on. The curve starts at the object's own place and heading.
-struct DrivePath {
-  int start_frame = 0;
-  int end_frame = 0;
-  double ramp_s = 1.0;    // time from rest to cruising speed and back
-  std::vector<double> x;  // waypoints after the start, metres, world frame
-  std::vector<double> y;
+// An object that physics moves (physics_bake.h).
+struct ObjectPhysics {
+  double mass_kg = 0.2;
+  double friction = 0.5;             // Coulomb's, on all but objects that have a larger one
+  double rolling_friction_m = 3e-4;  // torque that brakes rolling, a newton of load
+  int start_frame = 1;               // held at its place until then
+  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();  // metres a second, of its middle, then
+  Eigen::Vector3d angular_velocity_W = Eigen::Vector3d::Zero();  // degrees a second, then
 };
 
 struct SceneObject {
   std::string name;
   InstanceId id = kNoInstance;
   std::string semantic_class;
-  std::string model;  // one of ToyModelNames()
-  double x = 0;       // metres, world frame, on the table
+  ModelSpec model;
+  double x = 0;  // metres, world frame, of the model's origin
   double y = 0;
+  double z = kTableTop_m;
   double yaw_deg = 0;  // heading of the object's +x from the world's +x
+  double pitch_deg = 0;
+  double roll_deg = 0;
+  // At most one of these; an object without any rests.
   std::optional<DrivePath> drive;
+  std::vector<Keyframe> keyframes;  // none, or two at least
+  std::optional<ObjectPhysics> physics;
+
+  // Where it is before anything moves: Rz(yaw) Ry(pitch) Rx(roll).
+  Pose T_WO() const;
+};
+
+struct PhysicsSettings {
+  double timestep_s = 0.001;  // rounded down so that a frame has a whole number of steps
+  double friction = 0.3;      // of the room and of objects that physics does not move
 };
 
 struct SceneExperiment {
@@ -52,21 +65,34 @@ struct SceneConfig {
   std::string purpose;  // one sentence
   int frames = 0;       // numbered from 1
   double rate_hz = 30;
+  std::uint64_t seed = 1;  // of all that is drawn when the scene is run: jitter, sensor
   Intrinsics intrinsics;
-  CameraPath camera;
+  CameraConfig camera;
+  RoomSpec room;
+  LightRig lights = DefaultLightRig();
+  PhysicsSettings physics;
+  SensorConfig sensor;
   std::vector<SceneObject> objects;  // ordered by id
   std::optional<SceneExperiment> experiment;
 };
 
-inline constexpr int kFirstFrame = 1;
 // Ids are written to 8-bit masks (facts/datasets.md).
 inline constexpr int kMaxObjectId = 255;
 
-// Errors: kUsage, with the file and line: not TOML, a key that is unknown, missing, of the wrong
-// type or out of range, names or ids given twice, a model that does not exist, a removed object
-// that is not in the scene.
-Expected<SceneConfig> LoadSceneConfig(const std::filesystem::path& path);
-// The same from text; `where` stands for the file's name in messages.
-Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where);
+// Reads a scene. Names of files in it are relative to its folder. A scene with a [random] section
+// (random_scene.h) is drawn with `seed`, another takes `seed` for its own; without a seed the
+// file's `seed` holds (1 where it has none). Errors: kUsage, with the file and line: not TOML, a
+// key that is unknown, missing, of the wrong type or out of range, names or ids given twice, a
+// model that does not exist, a camera outside the room, a removed object that is not in the scene;
+// those of DrawRandomScene; kData where a trajectory that the camera follows is unusable.
+Expected<SceneConfig> LoadSceneConfig(const std::filesystem::path& path,
+                                      std::optional<std::uint64_t> seed = std::nullopt);
+// The same from text; `where` stands for the file's name in messages, `folder` is where the names
+// of files in it start (empty: the working directory).
+Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where,
+                                       const std::filesystem::path& folder = {});
+
+// The scene as a file: ParseSceneConfig(SceneToToml(c)) is c, number by number.
+std::string SceneToToml(const SceneConfig& config);
 
 }  // namespace tsdfpp

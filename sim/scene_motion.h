@@ -1,53 +1,43 @@
-// Where everything is at a frame: scripted, so any frame is known without the ones before it.
+// Where everything is at a frame. What physics moves is simulated first, whole, so that afterwards
+// any frame is known without the ones before it.
 #pragma once
 
+#include <filesystem>
 #include <map>
+#include <optional>
 
+#include "core/error.h"
 #include "core/types.h"
+#include "sim/camera_path.h"
+#include "sim/object_motion.h"
 #include "sim/scene_config.h"
-#include "sim/spline.h"
+#include "sim/trajectory_folder.h"
 
 namespace tsdfpp {
 
-// One object's path over the table.
-class ObjectMotion {
- public:
-  ObjectMotion(const SceneObject& object, double rate_hz);
-
-  // T_WO at a frame (T_WO.translation() is on the table's top, +z up). The driven object never
-  // stands still between its two frames; its speed ramps smoothly (a smoothstep over ramp_s).
-  Pose T_WO(int frame) const;
-  // Length of the whole path in metres, 0 for an object at rest.
-  double length_m() const { return length_m_; }
-
- private:
-  double Distance(int frame) const;
-  double Parameter(double distance_m) const;
-
-  SceneObject object_;
-  double rate_hz_ = 30;
-  double length_m_ = 0;
-  std::optional<CubicSpline> x_;
-  std::optional<CubicSpline> y_;
-  std::vector<double> distance_at_;  // metres along the path at evenly spaced parameters
-  double last_parameter_ = 0;
-};
-
 class SceneMotion {
  public:
-  explicit SceneMotion(const SceneConfig& config);
+  // Bakes the physics of a scene that has some (physics_bake.h). Errors: those of
+  // CameraMotion::Make and BakePhysics.
+  static Expected<SceneMotion> Make(const SceneConfig& config);
+  // All poses, the camera's too, from trajectories written before (trajectory_folder.h); the
+  // scene's own motion is not used. Errors: kData.
+  static Expected<SceneMotion> FromFolder(const SceneConfig& config,
+                                          const std::filesystem::path& folder);
 
-  // T_WC of the camera, looking along +z at the target, x level.
-  Pose T_WC(int frame) const;
+  // T_WC of the camera, looking along +z. Fractions of frames are allowed (sub-frame poses of
+  // motion blur and rolling shutter); poses that were baked or read are interpolated there.
+  Pose T_WC(double frame) const;
   // T_WO of every object, those at rest included.
-  std::map<InstanceId, Pose> T_WO(int frame) const;
+  std::map<InstanceId, Pose> T_WO(double frame) const;
+  // The poses of all frames.
+  PoseTable Table() const;
 
  private:
-  CameraPath path_;
-  CubicSpline azimuth_;
-  CubicSpline radius_;
-  CubicSpline height_;
-  std::map<InstanceId, ObjectMotion> objects_;
+  int frames_ = 0;
+  std::optional<CameraMotion> camera_;          // unless `table_` has it
+  std::map<InstanceId, ObjectMotion> objects_;  // those that `table_` does not have
+  PoseTable table_;                             // baked, or read from a folder
 };
 
 }  // namespace tsdfpp

@@ -4,12 +4,13 @@
 #include <utility>
 
 #include "core/pose_text.h"
+#include "sim/shutter.h"
 
 namespace tsdfpp {
 
 SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& options,
-                                 CompiledScene scene)
-    : config_(config), options_(options), motion_(config), scene_(std::move(scene)) {
+                                 SceneMotion motion, CompiledScene scene)
+    : config_(config), options_(options), motion_(std::move(motion)), scene_(std::move(scene)) {
   info_.name = config.name;
   info_.intrinsics = config.intrinsics;
   info_.first_index = kFirstFrame;
@@ -32,30 +33,63 @@ SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& op
 Expected<std::unique_ptr<SimulatedSource>> SimulatedSource::Open(const SceneConfig& config,
                                                                  const SimOptions& options) {
   TSDFPP_ASSIGN(CompiledScene scene, CompiledScene::Compile(config));
-  std::unique_ptr<SimulatedSource> source(new SimulatedSource(config, options, std::move(scene)));
+  TSDFPP_ASSIGN(SceneMotion motion, options.poses.empty()
+                                        ? SceneMotion::Make(config)
+                                        : SceneMotion::FromFolder(config, options.poses));
+  std::unique_ptr<SimulatedSource> source(
+      new SimulatedSource(config, options, std::move(motion), std::move(scene)));
   // The renderer refers to the scene, which stays where the source is.
-  TSDFPP_ASSIGN(source->renderer_, Renderer::Create(source->scene_, config.intrinsics));
+  TSDFPP_ASSIGN(source->renderer_,
+                Renderer::Create(source->scene_, config.intrinsics, options.render));
   return source;
 }
 
-Expected<Frame> SimulatedSource::Read(int index) {
-  const int last = kFirstFrame + config_.frames - 1;
-  if (index < kFirstFrame || index > last) {
-    return UsageError("frame {} is out of range: scene '{}' has frames {} to {}", index,
-                      config_.name, kFirstFrame, last);
-  }
+Expected<Frame> SimulatedSource::RenderAt(double number) {
   Frame frame;
-  frame.index = index;
-  frame.time_s = (index - kFirstFrame) / config_.rate_hz;
+  frame.time_s = (number - kFirstFrame) / config_.rate_hz;
   frame.intrinsics = config_.intrinsics;
-  frame.T_WC = PoseThroughText(motion_.T_WC(index));
-  for (const auto& [id, T_WO] : motion_.T_WO(index)) frame.T_WO.emplace(id, PoseThroughText(T_WO));
+  frame.T_WC = PoseThroughText(motion_.T_WC(number));
+  for (const auto& [id, T_WO] : motion_.T_WO(number)) {
+    frame.T_WO.emplace(id, PoseThroughText(T_WO));
+  }
   scene_.SetPoses(frame.T_WO);
   TSDFPP_ASSIGN(RenderedImages images, renderer_->Render(frame.T_WC, options_.render_colour));
   frame.colour = std::move(images.colour);
   frame.depth = std::move(images.depth);
   frame.mask = std::move(images.mask);
   return frame;
+}
+
+Expected<SensedFrame> SimulatedSource::ReadSensed(int index) {
+  const int last = kFirstFrame + config_.frames - 1;
+  if (index < kFirstFrame || index > last) {
+    return UsageError("frame {} is out of range: scene '{}' has frames {} to {}", index,
+                      config_.name, kFirstFrame, last);
+  }
+  SensedFrame sensed;
+  const ShutterConfig& shutter = config_.sensor.shutter;
+  std::vector<Frame> sub_frames;
+  if (HasShutter(shutter)) {
+    for (const double at_s : SubFrameTimes(shutter)) {
+      TSDFPP_ASSIGN(Frame sub_frame, RenderAt(index + at_s * config_.rate_hz));
+      sub_frames.push_back(std::move(sub_frame));
+    }
+  }
+  // Rendered last, so that the compiled scene is left in the state of the frame's time stamp.
+  TSDFPP_ASSIGN(sensed.frame, RenderAt(index));
+  sensed.frame.index = index;
+  const Frame truth = sensed.frame;
+  if (!sub_frames.empty()) ApplyShutter(shutter, sub_frames, sensed.frame);
+  TSDFPP_ASSIGN(sensed.truth, ApplySensor(config_.sensor, config_.seed, info_, sensed.frame));
+  sensed.truth.colour = truth.colour;
+  sensed.truth.depth = truth.depth;
+  sensed.truth.mask = truth.mask;
+  return sensed;
+}
+
+Expected<Frame> SimulatedSource::Read(int index) {
+  TSDFPP_ASSIGN(SensedFrame sensed, ReadSensed(index));
+  return std::move(sensed.frame);
 }
 
 Expected<std::unique_ptr<FrameSource>> OpenScene(const std::filesystem::path& toml,

@@ -10,34 +10,54 @@
 #include "sim/scene_builder.h"
 #include "sim/scene_config.h"
 #include "sim/scene_motion.h"
+#include "sim/sensor.h"
 
 namespace tsdfpp {
 
 struct SimOptions {
   // Without it frames have an empty colour image and come several times as fast.
   bool render_colour = true;
+  RenderOptions render{};
+  // Where not empty: a folder of trajectories (trajectory_folder.h) whose poses are rendered, the
+  // camera's too, in place of the scene's own motion and physics.
+  std::filesystem::path poses{};
+};
+
+// What a sensor saw, and what there was.
+struct SensedFrame {
+  Frame frame;
+  SensedTruth truth;  // at the frame's time stamp
 };
 
 class SimulatedSource final : public FrameSource {
  public:
-  // Errors: those of CompiledScene::Compile and Renderer::Create.
+  // Bakes physics. Errors: those of CompiledScene::Compile, Renderer::Create and SceneMotion.
   static Expected<std::unique_ptr<SimulatedSource>> Open(const SceneConfig& config,
                                                          const SimOptions& options);
 
   const SequenceInfo& info() const override { return info_; }
   // Poses are taken through text (core/pose_text.h) and the images are rendered at the poses so
-  // rounded: a frame depends on its number alone. T_WO holds every object, those at rest included.
+  // rounded, then sensed by the scene's sensor: a frame depends on its number alone. T_WO holds
+  // every object, those at rest included.
   Expected<Frame> Read(int index) override;
+  // The same frame with the truth beside it.
+  Expected<SensedFrame> ReadSensed(int index);
   // The compiled meshes: exactly what is rendered.
   Expected<std::vector<TrueModel>> Truth() override { return scene_.TrueModels(); }
 
   const SceneConfig& config() const { return config_; }
   const GlInfo& gl_info() const { return renderer_->gl_info(); }
+  // Of the frame read last.
+  const RenderTimes& render_times() const { return renderer_->times(); }
   // The compiled model and the state of the frame read last.
   CompiledScene& scene() { return scene_; }
+  const SceneMotion& motion() const { return motion_; }
 
  private:
-  SimulatedSource(const SceneConfig& config, const SimOptions& options, CompiledScene scene);
+  SimulatedSource(const SceneConfig& config, const SimOptions& options, SceneMotion motion,
+                  CompiledScene scene);
+  // The true frame at a number, fractions included.
+  Expected<Frame> RenderAt(double number);
 
   SceneConfig config_;
   SimOptions options_;
@@ -47,8 +67,9 @@ class SimulatedSource final : public FrameSource {
   SequenceInfo info_;
 };
 
-// Opens scenes/<name>.toml. Errors: kUsage where the file is missing or wrong (scene_config.h),
-// kEnvironment where the machine cannot render (gl_context.h).
+// Opens scenes/<name>.toml (with a seed of the caller's: LoadSceneConfig, then Open). Errors:
+// kUsage where the file is missing or wrong (scene_config.h), kEnvironment where the machine cannot
+// render (gl_context.h).
 Expected<std::unique_ptr<FrameSource>> OpenScene(const std::filesystem::path& toml,
                                                  const SimOptions& options = {});
 

@@ -1,7 +1,9 @@
 #include "sim/spline.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <cmath>
 #include <utility>
 
 namespace tsdfpp {
@@ -61,6 +63,95 @@ double CubicSpline::Slope(double at) const {
   const double b = 1.0 - a;
   return (values_[i + 1] - values_[i]) / h +
          ((3.0 * b * b - 1.0) * second_[i + 1] - (3.0 * a * a - 1.0) * second_[i]) * h / 6.0;
+}
+
+namespace {
+
+// The weighted harmonic mean of the slopes on both sides of a knot.
+double InnerSlope(double before, double slope_before, double after, double slope_after) {
+  if (!(slope_before * slope_after > 0)) return 0;
+  const double w1 = 2 * after + before;
+  const double w2 = after + 2 * before;
+  return (w1 + w2) / (w1 / slope_before + w2 / slope_after);
+}
+
+// The segment of `at` in knots (two at least), and where in it, 0 to 1.
+std::pair<std::size_t, double> Locate(const std::vector<double>& knots, double at) {
+  const double t = std::clamp(at, knots.front(), knots.back());
+  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, t);
+  const auto i = static_cast<std::size_t>(above - knots.begin()) - 1;
+  return {i, (t - knots[i]) / (knots[i + 1] - knots[i])};
+}
+
+}  // namespace
+
+std::vector<double> RestingSlopes(const std::vector<double>& knots,
+                                  const std::vector<double>& values) {
+  std::vector<double> slopes(knots.size(), 0.0);
+  for (std::size_t i = 1; i + 1 < knots.size(); ++i) {
+    const double before = knots[i] - knots[i - 1];
+    const double after = knots[i + 1] - knots[i];
+    slopes[i] = InnerSlope(before, (values[i] - values[i - 1]) / before, after,
+                           (values[i + 1] - values[i]) / after);
+  }
+  return slopes;
+}
+
+RestingSpline::RestingSpline(std::vector<double> knots, std::vector<double> values)
+    : knots_(std::move(knots)),
+      values_(std::move(values)),
+      slopes_(RestingSlopes(knots_, values_)) {
+  assert(!knots_.empty() && values_.size() == knots_.size());
+}
+
+double RestingSpline::Value(double at) const {
+  if (knots_.size() == 1) return values_.front();
+  const auto [i, u] = Locate(knots_, at);
+  const double h = knots_[i + 1] - knots_[i];
+  const double rise = values_[i + 1] - values_[i];
+  const double smooth = u * u * (3 - 2 * u);
+  return values_[i] + smooth * rise + h * u * (1 - u) * ((1 - u) * slopes_[i] - u * slopes_[i + 1]);
+}
+
+Eigen::Quaterniond FromRotationVector(const Eigen::Vector3d& vector) {
+  const double angle = vector.norm();
+  if (angle == 0) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
+}
+
+Eigen::Vector3d ToRotationVector(const Eigen::Quaterniond& rotation) {
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
+RotationSpline::RotationSpline(std::vector<double> knots, std::vector<Eigen::Quaterniond> values)
+    : knots_(std::move(knots)),
+      values_(std::move(values)),
+      velocities_(knots_.size(), Eigen::Vector3d::Zero()) {
+  assert(!knots_.empty() && values_.size() == knots_.size());
+  for (std::size_t i = 1; i < values_.size(); ++i) {
+    if (values_[i].dot(values_[i - 1]) < 0) values_[i].coeffs() = -values_[i].coeffs();
+  }
+  for (std::size_t i = 1; i + 1 < values_.size(); ++i) {
+    const double before = knots_[i] - knots_[i - 1];
+    const double after = knots_[i + 1] - knots_[i];
+    const Eigen::Vector3d in = ToRotationVector(values_[i - 1].conjugate() * values_[i]) / before;
+    const Eigen::Vector3d out = ToRotationVector(values_[i].conjugate() * values_[i + 1]) / after;
+    for (int k = 0; k < 3; ++k) velocities_[i][k] = InnerSlope(before, in[k], after, out[k]);
+  }
+}
+
+Eigen::Quaterniond RotationSpline::Value(double at) const {
+  if (knots_.size() == 1) return values_.front();
+  const auto [i, u] = Locate(knots_, at);
+  const double third = (knots_[i + 1] - knots_[i]) / 3;
+  std::array<Eigen::Quaterniond, 4> q{
+      values_[i], values_[i] * FromRotationVector(third * velocities_[i]),
+      values_[i + 1] * FromRotationVector(-third * velocities_[i + 1]), values_[i + 1]};
+  for (std::size_t left = 3; left > 0; --left) {
+    for (std::size_t k = 0; k < left; ++k) q[k] = q[k].slerp(u, q[k + 1]);
+  }
+  return q[0].normalized();
 }
 
 }  // namespace tsdfpp

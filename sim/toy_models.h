@@ -2,12 +2,14 @@
 // map of 1 cm voxels can hold it.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/types.h"
 #include "sim/mesh_shapes.h"
+#include "sim/textures.h"
 
 namespace tsdfpp {
 
@@ -18,6 +20,12 @@ struct ModelPart {
   Colour colour{};
   std::string material;
   std::string region;
+  // A picture of the part's own, whose name is `material`; null where `material` is one that all
+  // scenes have (MakeTextures).
+  std::shared_ptr<const TextureImage> picture = nullptr;
+  // Where each triangle's three corners lie in the picture, its first row at v = 0; empty: laid on
+  // by axis (part_geom.h).
+  std::vector<Eigen::Vector2f> corner_uv{};
 };
 
 // How far the lowest point of every toy floats above the ground, so that no face lies in the

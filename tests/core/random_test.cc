@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 namespace tsdfpp {
@@ -58,6 +60,46 @@ TEST(Random, IsUniform) {
   }
   EXPECT_NEAR(sum / (4 * kDraws), 0.5, kMeanTolerance);
   EXPECT_NEAR(squares / (4 * kDraws), 1.0 / 3, kSquareTolerance);
+}
+
+TEST(Random, GaussianIsTheTransformOfTheUniformDraw) {
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    const auto u = UniformDraw(4, 9, i, 2);
+    const auto normal = GaussianDraw(4, 9, i, 2);
+    // Box and Muller backwards: radius and angle of the first pair.
+    const double squares = normal[0] * normal[0] + normal[1] * normal[1];
+    EXPECT_NEAR(1 - std::exp(-squares / 2), u[0], 1e-12);
+    EXPECT_NEAR(std::sin(2 * std::numbers::pi * u[3]) * std::hypot(normal[2], normal[3]), normal[3],
+                1e-12);
+  }
+}
+
+TEST(Random, IsGaussian) {
+  constexpr int kDraws = 100000;
+  constexpr double kCount = 4.0 * kDraws;
+  double sum = 0;
+  double squares = 0;
+  double fourths = 0;
+  double pairs = 0;
+  int beyond_two = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const auto normal = GaussianDraw(11, 0, static_cast<std::uint64_t>(i));
+    for (std::size_t k = 0; k < 4; ++k) {
+      sum += normal[k];
+      squares += normal[k] * normal[k];
+      fourths += std::pow(normal[k], 4);
+      pairs += normal[k] * normal[(k + 1) % 4];
+      beyond_two += normal[k] > 2 ? 1 : 0;
+    }
+  }
+  // Six standard deviations of each mean: of x it is 1, of x^2 sqrt(2), of x^4 sqrt(96), of xy 1.
+  const double six = 6 / std::sqrt(kCount);
+  EXPECT_NEAR(sum / kCount, 0, six);
+  EXPECT_NEAR(squares / kCount, 1, six * std::sqrt(2.0));
+  EXPECT_NEAR(fourths / kCount, 3, six * std::sqrt(96.0));
+  EXPECT_NEAR(pairs / kCount, 0, six);
+  const double tail = std::erfc(std::sqrt(2.0)) / 2;
+  EXPECT_NEAR(beyond_two / kCount, tail, six * std::sqrt(tail));
 }
 
 }  // namespace

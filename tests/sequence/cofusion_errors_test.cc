@@ -66,6 +66,11 @@ auto ChangedInFile(const std::string& file, const std::string& from, const std::
   };
 }
 
+const char* const kNoFormat =
+    "@: not a sequence; expected calibration.txt and colour/ (cofusion), rgb.txt and depth.txt "
+    "(tum), scene_camera.json (bop), a .klg (klg), color/, depth/ and pose/ (scannet), traj.txt "
+    "and results/ (replica), or frame-*.depth.png (7scenes)";
+
 TEST(CofusionErrors, ForeignSet) {
   const cv::Mat small_colour(6, 7, CV_8UC3, cv::Scalar::all(1));
   const cv::Mat large_depth(12, 16, CV_32FC1, cv::Scalar(1));
@@ -75,12 +80,8 @@ TEST(CofusionErrors, ForeignSet) {
   const std::string calibration = "expected fx fy cx cy [width height]";
   const Case cases[] = {
       // The folder.
-      {Remove("calibration.txt"),
-       "@: not a sequence, there is no calibration.txt; expected a Co-Fusion set (calibration.txt, "
-       "colour/, depth_original/, trajectories/gt-cam-0.txt)"},
-      {Remove("colour"),
-       "@: not a sequence, there is no colour/; expected a Co-Fusion set (calibration.txt, "
-       "colour/, depth_original/, trajectories/gt-cam-0.txt)"},
+      {Remove("calibration.txt"), kNoFormat},
+      {Remove("colour"), kNoFormat},
       // The calibration.
       {Text("calibration.txt", "360 360 4"), "@/calibration.txt: 3 numbers, " + calibration},
       {Text("calibration.txt", "360 360 4 3 8"), "@/calibration.txt: 5 numbers, " + calibration},
@@ -91,9 +92,15 @@ TEST(CofusionErrors, ForeignSet) {
       {Text("calibration.txt", "360 -360 4 3"),
        "@/calibration.txt: focal lengths 360 and -360, expected both over 0"},
       {Text("calibration.txt", "360 360 4 3 8.5 6"),
-       "@/calibration.txt: image size 8.5 x 6, expected whole numbers over 0"},
-      {Text("calibration.txt", "360 360 4 3 640 480"),
+       "@/calibration.txt: image size 8.5 x 6, expected whole numbers from 1 to 16384"},
+      {Text("calibration.txt", "360 360 320 240 640 480"),
        "@/colour/Color0001.png: the image is 8x6, expected 640x480 (calibration.txt)"},
+      {Text("calibration.txt", "360 360 4 3"),
+       "@/calibration.txt: focal lengths 360 and 360 do not fit an image 8 pixels wide, expected "
+       "1.6 to 80"},
+      {Text("calibration.txt", "9 9 8 6"),
+       "@/calibration.txt: the principal point (8, 6) is far from the middle of the 8x6 image: "
+       "intrinsics of another resolution"},
       // Colour.
       {Remove("colour/Color0001.png"),
        "@/colour/Color0001.png: no such image, though there are others up to number 2"},
@@ -239,8 +246,8 @@ TEST(CofusionErrors, MissingFolderIsTheUsersFault) {
   const auto file = OpenSequence(folder / "file");
   ASSERT_FALSE(file.has_value());
   EXPECT_EQ(file.error().kind, ErrorKind::kUsage);
-  EXPECT_EQ(file.error().message,
-            (folder / "file").string() + ": is a file, expected the folder of a sequence");
+  EXPECT_EQ(file.error().message, (folder / "file").string() +
+                                      ": is a file, expected the folder of a sequence or a .klg");
 }
 
 }  // namespace

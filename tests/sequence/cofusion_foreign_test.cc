@@ -16,7 +16,7 @@ TEST(CofusionForeign, InfoComesFromTheFilesThemselves) {
   ASSERT_TRUE(source.has_value()) << source.error().message;
   const SequenceInfo& info = (*source)->info();
   EXPECT_EQ(info.name, "room");
-  EXPECT_EQ(info.intrinsics, (Intrinsics{8, 6, 360, 360, 320.5, 240}));
+  EXPECT_EQ(info.intrinsics, (Intrinsics{8, 6, 9, 9, 3.75, 2.5}));
   EXPECT_EQ(info.first_index, 0);
   EXPECT_EQ(info.frame_count, 3);
   EXPECT_EQ(info.rate_hz, 30);
@@ -57,7 +57,7 @@ TEST(CofusionForeign, VariantsAreAccepted) {
   const auto set = folder / "room";
   test::WriteForeignSet(set);
   // Size given, one-channel depth, grey masks, colour with alpha, from number 1 on.
-  ASSERT_TRUE(WriteFile(set / "calibration.txt", "360 360 4 3\t8 6").has_value());
+  ASSERT_TRUE(WriteFile(set / "calibration.txt", "9 9 4 3\t8 6").has_value());
   std::filesystem::remove(set / "colour/Color0000.png");
   test::WriteImage(set / "depth_original/Depth0001.exr", cv::Mat(6, 8, CV_32FC1, cv::Scalar(2)));
   test::WriteImage(set / "mask_id/Mask0001.png", cv::Mat(6, 8, CV_8UC1, cv::Scalar(2)));

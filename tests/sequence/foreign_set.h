@@ -32,7 +32,7 @@ inline void WriteForeignSet(const std::filesystem::path& set) {
   const auto text = [&](const char* file, const std::string& bytes) {
     ASSERT_TRUE(WriteFile(set / file, bytes).has_value());
   };
-  text("calibration.txt", "360.0 360.0 320.5 240\n");
+  text("calibration.txt", "9.0 9.0 3.75 2.5\n");
   text("trajectories/gt-cam-0.txt",
        "0 0 0 0 0 0 0 1\n1 0.5 0 0 0 0 0 1\n2 1 0 0 0 0 0.70710678 0.70710678\n");
   text("trajectories/gt-ship-1.txt", "# one gap\n0 1 2 3 0 0 0 1\n2 1 2 4 0 0 0 1\n");

@@ -14,7 +14,11 @@ using test::SomeGenerator;
 using test::TempFolder;
 
 SequenceRecord SomeRecord() {
-  return {MemorySource().info(), SomeGenerator(), {{"colour/Color0001.png", "00000000000000ff"}}};
+  SequenceRecord record;
+  record.info = MemorySource().info();
+  record.generator = SomeGenerator();
+  record.hashes = {{"colour/Color0001.png", "00000000000000ff"}};
+  return record;
 }
 
 // The values published with the algorithm (isthe.com/chongo/tech/comp/fnv, test vectors).
@@ -62,8 +66,8 @@ TEST(SequenceJson, BadFilesAreNamed) {
   EXPECT_EQ(SentenceAfter("{", "["), "not a JSON object");
   EXPECT_EQ(SentenceAfter("\"generator\": \"tsdfpp\"", "\"generator\": \"other\""),
             "'generator' is not \"tsdfpp\"");
-  EXPECT_EQ(SentenceAfter("\"schema_version\": 1", "\"schema_version\": 2"),
-            "'schema_version' is not 1, the one that this program reads");
+  EXPECT_EQ(SentenceAfter("\"schema_version\": 2", "\"schema_version\": 3"),
+            "'schema_version' is 3, this program reads 1 to 2");
   EXPECT_EQ(SentenceAfter("\"frame_count\": 4", "\"frame_count\": 0"),
             "expected rate_hz and frame_count over 0 and first_index 0 or more");
   for (const auto& [from, to, word] : {std::tuple("\"rate_hz\"", "\"rate\"", "rate_hz"),

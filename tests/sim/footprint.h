@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/types.h"
-#include "sim/toy_models.h"
+#include "sim/model_catalogue.h"
 
 namespace tsdfpp {
 
@@ -17,10 +17,10 @@ inline double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// The convex hull of the toy seen from above, at T_WO (monotone chain).
-inline Outline FootprintOf(std::string_view model, const Pose& T_WO) {
+// The convex hull of the parts seen from above, at T_WO (monotone chain).
+inline Outline FootprintOf(const std::vector<ModelPart>& parts, const Pose& T_WO) {
   std::vector<Eigen::Vector2d> points;
-  for (const ModelPart& part : MakeToy(model)) {
+  for (const ModelPart& part : parts) {
     for (const Eigen::Vector3d& p_O : part.shape.vertices) {
       points.emplace_back((T_WO * p_O).head<2>());
     }
@@ -42,6 +42,10 @@ inline Outline FootprintOf(std::string_view model, const Pose& T_WO) {
     hull.pop_back();
   }
   return hull;
+}
+
+inline Outline FootprintOf(const ModelSpec& model, const Pose& T_WO) {
+  return FootprintOf(MakeModel(model).value(), T_WO);
 }
 
 inline bool Contains(const Outline& outline, const Eigen::Vector2d& p) {

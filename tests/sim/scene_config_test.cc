@@ -116,7 +116,8 @@ TEST(SceneConfig, SaysWhatIsWrongAndWhere) {
       {"name = \"mug\"", "name = \"background\"",
        "'object[1].name' is 'background', which is id 0's name"},
       {"model = \"mug\"", "model = \"teapot\"",
-       "'object[1].model' is 'teapot', expected one of: truck, car, mug, ball, house, blocks"},
+       "'object[1].model' is 'teapot', expected one of: truck, car, mug, ball, house, blocks, "
+       "cube"},
       {"x = 0.1", "x = 1.1",
        "s.toml:20: 'object[0].x' has 1.1, which is off the table: expected -0.8 to 0.8 m"},
       {"end_frame = 9", "end_frame = 2",
@@ -146,6 +147,132 @@ TEST(SceneConfig, SaysWhatIsWrongAndWhere) {
   }
 }
 
+// A cube in the place of the mug, with one line to replace in each test below.
+std::string WithCube(const std::string& lines) {
+  return With(
+      "name = \"mug\"\nid = 2\nclass = \"mug\"\nmodel = \"mug\"\nx = -0.3\ny = 0\n",
+      "name = \"cube\"\nid = 2\nclass = \"block\"\nmodel = \"cube\"\nx = -0.3\ny = 0\n" + lines);
+}
+
+TEST(SceneConfig, SaysWhatIsWrongWithMotions) {
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"keyframe = [{ frame = 2 }]", "'object[1].keyframe' needs two at least"},
+      {"keyframe = [{ frame = 2 }, { frame = 2 }]",
+       "'object[1].keyframe[1].frame' is 2, expected more than the key before it (2)"},
+      {"keyframe = [{ frame = 2 }, { frame = 11 }]",
+       "'object[1].keyframe[1].frame' is 11, expected 1 to 10"},
+      {"keyframe = [{ frame = 2 }, { frame = 4, position = [1, 2] }]",
+       "'object[1].keyframe[1].position' has 2 numbers, expected 3"},
+      {"keyframe = [{ frame = 2 }, { frame = 4, quaternion = [1, 1, 0, 0] }]",
+       "'object[1].keyframe[1].quaternion' has length 1.414"},
+      {"keyframe = [{ frame = 2 }, { frame = 4, quaternion = [0, 0, 1] }]",
+       "'object[1].keyframe[1].quaternion' has 3 numbers, expected 4: x, y, z, w"},
+      {"keyframe = [{ frame = 2 }, { frame = 4, quaternion = [0, 0, 0, 1], rpy_deg = [0, 0, 0] }]",
+       "'object[1].keyframe[1].quaternion' stands beside rpy_deg"},
+      {"keyframe = [{ frame = 2 }, { frame = 4, yaw = 3 }]",
+       "'object[1].keyframe[1].yaw' is not a known key here"},
+      {"keyframe = [{ frame = 2 }, { frame = 4 }]\n[object.physics]\n",
+       "'object[1].name' has more than one of: drive, keyframe, physics"},
+      {"pitch_deg = 3\n[object.drive]\nstart_frame = 1\nend_frame = 9\nx = [0]\ny = [0]",
+       "'object[1].drive' is for objects that stand upright"},
+      {"z = -0.1", "'object[1].z' is -0.1, expected 0 to 2.6"},
+      {"scale = 0", "'object[1].model' cannot be made: "},
+      {"paint = [1, 2]", "'object[1].paint' is no colour"},
+      {"paint = [1, 2, 256]", "'object[1].paint' is no colour"},
+      {"material = \"gold\"", "'object[1].model' cannot be made: "},
+      {"texture_seed = -1", "'object[1].texture_seed' is -1, expected 0 or more"},
+      {"texture_seed = 1.5", "'object[1].texture_seed' is a floating-point number"},
+      {"picture = \"x.png\"", "'object[1].picture' is for models from files only"},
+      {"[object.physics]\nmass_kg = 0", "'object[1].physics.mass_kg' is 0, expected 0.001 to 1000"},
+      {"[object.physics]\nfriction = -1", "'object[1].physics.friction' is -1, expected 0 to 10"},
+      {"[object.physics]\nstart_frame = 0",
+       "'object[1].physics.start_frame' is 0, expected 1 to 10"},
+      {"[object.physics]\nvelocity = [30, 0, 0]",
+       "'object[1].physics.velocity' is 30 m/s, expected 20 at most"},
+      {"[object.physics]\nbounce = 1", "'object[1].physics.bounce' is not a known key here"},
+  };
+  for (const auto& [lines, sentence] : faults) {
+    const std::string fault = FaultOf(WithCube(lines + "\n"));
+    EXPECT_NE(fault.find(sentence), std::string::npos)
+        << "found:    " << fault << "\nexpected: " << sentence;
+  }
+}
+
+TEST(SceneConfig, SaysWhatIsWrongWithCamerasAndRooms) {
+  const std::string arc =
+      "target = [0, 0, 0.74]\nazimuth_deg = [-100, -80]\nradius_m = [1.2, 1.2]\n"
+      "height_m = [0.8, 0.8]\n";
+  const std::string spline = "path = \"spline\"\nkey = ";
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"path = \"helix\"\n",
+       "'camera.path' is 'helix', expected one of: arc, orbit, spline, recorded"},
+      {"path = \"orbit\"\ntarget = [0, 0, 0.7]\nheight_m = 0.5\n", "'camera.radius_m' is missing"},
+      {"path = \"orbit\"\ntarget = [0, 0, 0.7]\nheight_m = 0.5\nradius_m = -1\n",
+       "'camera.radius_m' is -1, expected a positive number"},
+      {"path = \"orbit\"\ntarget = [0, 0, 0.7]\nheight_m = 0.5\nradius_m = 4\n",
+       "'camera.path' and the other keys put the camera at"},
+      {spline + "[{ frame = 1, position = [0, 1, 1], target = [0, 0, 0] }]\n",
+       "'camera.key' needs two at least"},
+      {spline + "[{ frame = 1, position = [0, 0, 1], target = [0, 0, 0] }]\n",
+       "'camera.key[0].target' is straight above or below the position"},
+      {spline + "[{ frame = 3, position = [0, 1, 1], target = [0, 0, 0] }, "
+                "{ frame = 2, position = [0, 1, 1], target = [0, 0, 0] }]\n",
+       "'camera.key[1].frame' is 2, expected more than the key before it (3)"},
+      {"path = \"recorded\"\nfile = \"nowhere.txt\"\nposition = [0, -1, 1]\n"
+       "target = [0, 0, 0.7]\n",
+       "nowhere.txt"},
+      {arc + "[camera.jitter]\nposition_mm = -1\n",
+       "'camera.jitter.position_mm' is -1, expected 0 to 100"},
+      {arc + "[camera.jitter]\nlowest_hz = 5\nhighest_hz = 2\n",
+       "'camera.jitter.highest_hz' is 2, expected more than lowest_hz (5)"},
+      {arc + "[room]\nhalf_x = 1\n", "s.toml: room."},
+      {arc + "[room.wall_texture]\npattern = \"fog\"\n", "s.toml: room.wall_texture"},
+      {arc + "[room]\nroof = false\n", "'room.roof' is not a known key here"},
+      {arc + "[lights]\nambient = 3\n", "s.toml: lights."},
+      {arc + "[physics]\ntimestep_s = 1\n", "'physics.timestep_s' is 1, expected 0.0001 to 0.005"},
+      {arc + "[sensor]\npreset = \"eagle\"\n", "'sensor.preset'"},
+  };
+  for (const auto& [lines, sentence] : faults) {
+    const auto config = ParseSceneConfig(With(arc, lines), "s.toml");
+    ASSERT_FALSE(config.has_value()) << lines;
+    EXPECT_NE(config.error().message.find(sentence), std::string::npos)
+        << "found:    " << config.error().message << "\nexpected: " << sentence;
+  }
+}
+
+// Every scene can be written and read back, and is the same file then.
+TEST(SceneConfig, ScenesSurviveTheirTrip) {
+  for (const char* name : {"toycar3", "mini", "parked", "stack", "contact", "tumble", "thin",
+                           "many", "room", "handheld"}) {
+    const SceneConfig config = LoadScene(name);
+    const std::string text = SceneToToml(config);
+    const auto read = ParseSceneConfig(text, "trip.toml");
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    EXPECT_EQ(SceneToToml(*read), text);
+    EXPECT_EQ(read->intrinsics, config.intrinsics);
+    EXPECT_EQ(read->frames, config.frames);
+    ASSERT_EQ(read->objects.size(), config.objects.size());
+    for (std::size_t i = 0; i < config.objects.size(); ++i) {
+      const ObjectMotion a(config.objects[i], config.rate_hz);
+      const ObjectMotion b(read->objects[i], config.rate_hz);
+      for (int frame = 1; frame <= config.frames; frame += 7) {
+        EXPECT_EQ(a.T_WO(frame).matrix(), b.T_WO(frame).matrix()) << name << " " << i;
+      }
+    }
+  }
+}
+
+// A mesh file is named relative to the scene's own folder.
+TEST(SceneConfig, MeshFilesStartAtTheScenesFolder) {
+  const auto config = ParseSceneConfig(
+      With("model = \"mug\"", "model = \"../meshes/cow.obj\"\nscale = 0.06\nup = \"y\""), "s.toml",
+      "/somewhere/scenes");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  EXPECT_EQ(config->objects[1].model.name, kMeshModel);
+  EXPECT_EQ(config->objects[1].model.file, "/somewhere/meshes/cow.obj");
+  EXPECT_EQ(config->objects[1].model.up, "y");
+}
+
 TEST(SceneConfig, MissingFile) {
   const auto config = LoadSceneConfig("/nowhere/scene.toml");
   ASSERT_FALSE(config.has_value());
@@ -168,14 +295,15 @@ TEST(SceneConfig, StaticIsToycar3AtRest) {
   ASSERT_EQ(still.objects.size(), moving.objects.size());
   for (std::size_t i = 0; i < still.objects.size(); ++i) {
     EXPECT_EQ(still.objects[i].name, moving.objects[i].name);
-    EXPECT_EQ(still.objects[i].model, moving.objects[i].model);
+    EXPECT_EQ(still.objects[i].model.name, moving.objects[i].model.name);
     EXPECT_EQ(still.objects[i].x, moving.objects[i].x);
     EXPECT_EQ(still.objects[i].y, moving.objects[i].y);
     EXPECT_EQ(still.objects[i].yaw_deg, moving.objects[i].yaw_deg);
     EXPECT_FALSE(still.objects[i].drive.has_value());
   }
   EXPECT_EQ(still.intrinsics, moving.intrinsics);
-  EXPECT_EQ(still.camera.azimuth_deg, moving.camera.azimuth_deg);
+  EXPECT_EQ(std::get<ArcPath>(still.camera.path).azimuth_deg,
+            std::get<ArcPath>(moving.camera.path).azimuth_deg);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ double TurnOf(const SceneMotion& motion, InstanceId id, int first, int last) {
 }
 
 TEST(Toycar3, TheCarsTurn) {
-  const SceneMotion motion(LoadScene("toycar3"));
+  const SceneMotion motion = MotionOf(LoadScene("toycar3"));
   constexpr double kLeastTurn_deg = 120;
   EXPECT_GE(TurnOf(motion, kTruck, 1, kReveal), kLeastTurn_deg);
   EXPECT_GE(TurnOf(motion, kCar, 1, kReveal), kLeastTurn_deg);
@@ -37,7 +37,7 @@ TEST(Toycar3, TheCarsTurn) {
 
 TEST(Toycar3, TheCarsRestThenDriveSmoothly) {
   const SceneConfig config = LoadScene("toycar3");
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   constexpr double kSlowest = 0.08;  // metres a second, once under way
   constexpr double kFastest = 0.15;
   constexpr double kSpeedStep = 0.01;   // most that the speed changes in a frame
@@ -76,7 +76,7 @@ TEST(Toycar3, TheCarsRestThenDriveSmoothly) {
 
 TEST(Toycar3, NothingTouchesAndAllStayOnTheTable) {
   const SceneConfig config = LoadScene("toycar3");
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   constexpr double kLeastGap_m = 0.02;
   std::map<InstanceId, Outline> outlines;
   for (int frame = 1; frame <= config.frames; ++frame) {
@@ -103,7 +103,7 @@ TEST(Toycar3, NothingTouchesAndAllStayOnTheTable) {
 TEST(Toycar3, TheCarsCoverTableSeenBareBefore) {
   const SceneConfig config = LoadScene("toycar3");
   const auto source = OpenConfig(config);
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   constexpr double kCell_m = 0.01;
   constexpr double kDepthMargin_m = 0.002;
   constexpr double kLeastSeen = 0.95;  // of the ground below the car
@@ -152,7 +152,7 @@ int PixelsOf(const cv::Mat& mask, InstanceId id) { return cv::countNonZero(mask 
 // One car hides part of the other in the image at some frame before the reveal.
 TEST(Toycar3, OneCarPassesInFrontOfTheOther) {
   const SceneConfig config = LoadScene("toycar3");
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   auto scene = CompiledScene::Compile(config);
   ASSERT_TRUE(scene.has_value()) << scene.error().message;
   auto renderer = Renderer::Create(*scene, config.intrinsics);
@@ -176,12 +176,12 @@ TEST(Toycar3, OneCarPassesInFrontOfTheOther) {
 
 TEST(Toycar3, TheCameraMovesSmoothlyAndSeesTheTable) {
   const SceneConfig config = LoadScene("toycar3");
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   constexpr double kLeastArc_deg = 40;
   constexpr double kLargestStep_m = 0.006;   // a frame
   constexpr double kLargestBend_m = 0.0002;  // change of the step from frame to frame
-  EXPECT_GE(std::abs(config.camera.azimuth_deg.back() - config.camera.azimuth_deg.front()),
-            kLeastArc_deg);
+  const auto& arc = std::get<ArcPath>(config.camera.path);
+  EXPECT_GE(std::abs(arc.azimuth_deg.back() - arc.azimuth_deg.front()), kLeastArc_deg);
   for (int frame = 2; frame < config.frames; ++frame) {
     const Eigen::Vector3d before = motion.T_WC(frame - 1).translation();
     const Eigen::Vector3d here = motion.T_WC(frame).translation();
@@ -202,7 +202,7 @@ TEST(Toycar3, TheCameraMovesSmoothlyAndSeesTheTable) {
 
 TEST(Mini, TheCarMovesAndTurns) {
   const SceneConfig config = LoadScene("mini");
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   const Eigen::Vector3d way = motion.T_WO(config.experiment->reveal_frame).at(1).translation() -
                               motion.T_WO(1).at(1).translation();
   EXPECT_GE(way.norm(), 0.25);
@@ -210,13 +210,15 @@ TEST(Mini, TheCarMovesAndTurns) {
   constexpr double kLeastGap_m = 0.02;
   for (int frame = 1; frame <= config.frames; ++frame) {
     const auto poses = motion.T_WO(frame);
-    EXPECT_GE(Gap(FootprintOf("car", poses.at(1)), FootprintOf("house", poses.at(2))), kLeastGap_m);
+    EXPECT_GE(Gap(FootprintOf(config.objects[0].model, poses.at(1)),
+                  FootprintOf(config.objects[1].model, poses.at(2))),
+              kLeastGap_m);
   }
 }
 
 TEST(Static, NothingMovesButTheCamera) {
   const SceneConfig config = LoadScene("static");
-  const SceneMotion motion(config);
+  const SceneMotion motion = MotionOf(config);
   for (const auto& [id, pose] : motion.T_WO(config.frames)) {
     EXPECT_EQ(pose.matrix(), motion.T_WO(1).at(id).matrix());
   }

@@ -23,6 +23,12 @@ inline std::unique_ptr<SimulatedSource> OpenConfig(const SceneConfig& config,
   return std::move(source.value());
 }
 
+inline SceneMotion MotionOf(const SceneConfig& config) {
+  auto motion = SceneMotion::Make(config);
+  EXPECT_TRUE(motion.has_value()) << motion.error().message;
+  return std::move(motion.value());
+}
+
 // The ray of a pixel in the camera's frame, with z = 1.
 inline Eigen::Vector3d RayOf(const Intrinsics& k, double u, double v) {
   return {(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0};

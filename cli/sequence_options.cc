@@ -1,0 +1,60 @@
+#include "cli/sequence_options.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "cli/command.h"
+#include "eval/open_source.h"
+#include "sequence/calibration.h"
+
+namespace tsdfpp {
+
+void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArguments& arguments) {
+  app.add_option(name, arguments.path, "Sequence (folder or .klg) or scene (.toml)")->required();
+  std::vector<std::string> formats;
+  for (const DatasetFormat format : AllDatasetFormats()) {
+    formats.emplace_back(DatasetFormatName(format));
+  }
+  app.add_option("--dataset", arguments.dataset,
+                 "The sequence's format, where it is not to be detected")
+      ->check(CLI::IsMember(formats));
+  app.add_option("--calibration", arguments.calibration,
+                 "File with fx fy cx cy [width height] in place of the sequence's own; a negative "
+                 "fy is an image whose y axis points up");
+  app.add_option("--depth-units", arguments.depth_units,
+                 "Depth values in one metre, in place of the format's")
+      ->check(AboveZero());
+  app.add_flag("--fixed-camera", arguments.fixed_camera,
+               "Take a camera without poses on disk as one that does not move");
+  app.add_flag("--unchecked", arguments.unchecked,
+               "Do not look for wrong units and inverted poses");
+}
+
+std::string TextOf(const SequenceArguments& arguments) {
+  std::string text = arguments.path;
+  if (!arguments.dataset.empty()) text += " --dataset " + arguments.dataset;
+  if (!arguments.calibration.empty()) text += " --calibration " + arguments.calibration;
+  if (arguments.depth_units > 0) text += fmt::format(" --depth-units {}", arguments.depth_units);
+  if (arguments.fixed_camera) text += " --fixed-camera";
+  if (arguments.unchecked) text += " --unchecked";
+  return text;
+}
+
+Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& arguments) {
+  SequenceOptions options;
+  if (!arguments.dataset.empty()) {
+    TSDFPP_ASSIGN(options.format, DatasetFormatFromName(arguments.dataset));
+  }
+  if (!arguments.calibration.empty()) {
+    TSDFPP_ASSIGN(options.intrinsics, ReadSignedCalibration(arguments.calibration));
+  }
+  if (arguments.depth_units > 0) options.depth_units_per_m = arguments.depth_units;
+  options.fixed_camera = arguments.fixed_camera;
+  options.check = !arguments.unchecked;
+  SequenceNotes notes;
+  TSDFPP_ASSIGN(auto source, OpenSource(arguments.path, options, &notes));
+  for (const std::string& note : notes) spdlog::info(note);
+  return source;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,32 @@
+// The options of every subcommand that opens a sequence.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "core/error.h"
+#include "core/frame_source.h"
+
+namespace tsdfpp {
+
+struct SequenceArguments {
+  std::string path;         // a scene (.toml) or a sequence
+  std::string dataset;      // --dataset
+  std::string calibration;  // --calibration
+  double depth_units = 0;   // --depth-units
+  bool fixed_camera = false;
+  bool unchecked = false;
+};
+
+// Adds the positional argument `name` and the options.
+void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArguments& arguments);
+
+// What was typed, for commands that print how to run them again.
+std::string TextOf(const SequenceArguments& arguments);
+
+// Opens what the arguments name, and logs what the reader assumed. Errors: those of OpenSource; of
+// the calibration's file; kUsage where options for sequences meet a scene.
+Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& arguments);
+
+}  // namespace tsdfpp

@@ -1,0 +1,46 @@
+#include <cstdio>
+
+#include "cli/command.h"
+#include "eval/certify.h"
+
+namespace tsdfpp {
+namespace {
+
+struct Options {
+  std::string sequence;
+  double share = CertifyOptions{}.ray_share;
+  bool all = false;
+};
+
+Expected<CommandResult> RunVerify(const Options& options, const CommonOptions& common) {
+  CertifyOptions certify;
+  certify.ray_share = options.all ? 1 : options.share;
+  Expected<CertifyResult> result;
+  {
+    ProgressBar bar("verify");
+    certify.progress = [&](int done, int total) { bar.Show(done, total); };
+    result = Certify(options.sequence, certify);
+  }
+  if (!result) return tl::unexpected(result.error());
+  CommandResult output{CertifyJson(*result), CertifyText(*result)};
+  if (result->sound()) return output;
+  // What was found is the result; that there is something decides the exit code.
+  std::fputs(common.json ? (output.json.dump(2) + "\n").c_str() : output.text.c_str(), stdout);
+  return DataError("{}: the sequence is not sound, {} findings, the first: {}", options.sequence,
+                   result->findings.size(), FindingText(result->findings.front()));
+}
+
+}  // namespace
+
+Run AddVerify(CLI::App& app, const CommonOptions& common) {
+  auto options = std::make_shared<Options>();
+  app.add_option("SEQ", options->sequence, "Sequence of ours (folder)")->required();
+  CLI::Option* share =
+      app.add_option("--share", options->share, "Share of the frames that are compared with rays")
+          ->check(CLI::Range(0.0, 1.0))
+          ->capture_default_str();
+  app.add_flag("--all", options->all, "Compare all frames with rays")->excludes(share);
+  return [options, &common] { return RunVerify(*options, common); };
+}
+
+}  // namespace tsdfpp

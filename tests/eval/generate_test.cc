@@ -1,0 +1,237 @@
+// Sequences made by several processes, stopped and killed on the way.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/files.h"
+#include "eval/workers.h"
+#include "sequence/sequence_json.h"
+#include "tests/core/temp_folder.h"
+#include "tests/eval/tiny_scene.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using test::RunTsdfpp;
+using test::TempFolder;
+
+// The bytes of every file below a folder.
+std::map<std::string, std::string> Contents(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) {
+      files[entry.path().lexically_relative(folder)] = ReadFile(entry.path()).value();
+    }
+  }
+  return files;
+}
+
+void ExpectSameFiles(const fs::path& a, const fs::path& b) {
+  const auto first = Contents(a);
+  const auto second = Contents(b);
+  EXPECT_GT(first.size(), 10U);
+  std::vector<std::string> differing;
+  for (const auto& [file, bytes] : first) {
+    if (!second.contains(file) || second.at(file) != bytes) differing.push_back(file);
+  }
+  for (const auto& [file, bytes] : second) {
+    if (!first.contains(file)) differing.push_back(file);
+  }
+  EXPECT_EQ(differing, std::vector<std::string>{});
+}
+
+class Generation : public testing::Test {
+ protected:
+  // Enough frames to be in the middle of them when the signal comes.
+  static constexpr int kFrames = 40;
+
+  void SetUp() override { ASSERT_TRUE(WriteFile(scene_, test::TinyScene(kFrames)).has_value()); }
+  test::CommandOutput Generate(const fs::path& out, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{"generate", scene_, "--out", out, "--share", "0"};
+    words.insert(words.end(), more.begin(), more.end());
+    return RunTsdfpp(words, folder_.path());
+  }
+  // Starts the command in a process group of its own.
+  pid_t Start(const fs::path& out) {
+    const pid_t process = fork();
+    if (process == 0) {
+      setpgid(0, 0);
+      const int nowhere = open("/dev/null", O_WRONLY);
+      dup2(nowhere, STDERR_FILENO);
+      dup2(nowhere, STDOUT_FILENO);
+      execl(TSDFPP_COMMAND, TSDFPP_COMMAND, "generate", scene_.c_str(), "--out", out.c_str(),
+            "--share", "0", "--jobs", "2", nullptr);
+      _exit(127);
+    }
+    setpgid(process, process);
+    return process;
+  }
+  // Waits until some frames are noted; false where the process ended before.
+  static bool WaitForFrames(pid_t process, const fs::path& notes, int frames) {
+    while (waitpid(process, nullptr, WNOHANG) == 0) {
+      std::error_code code;
+      int found = 0;
+      for (const auto& entry : fs::directory_iterator(notes, code)) {
+        const std::string name = entry.path().filename();
+        found += entry.path().extension() == ".json" && std::isdigit(name[0]) != 0 ? 1 : 0;
+      }
+      if (found >= frames) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return false;
+  }
+
+  TempFolder folder_;
+  fs::path scene_ = folder_ / "tiny.toml";
+  fs::path whole_ = folder_ / "whole";
+  fs::path out_ = folder_ / "out";
+  fs::path hidden_ = folder_ / ".out.part";
+};
+
+TEST_F(Generation, TheBytesDoNotDependOnTheJobs) {
+  ASSERT_TRUE(WriteFile(scene_, test::TinyScene(5)).has_value());
+  ASSERT_EQ(Generate(whole_, {"--jobs", "1"}).exit_code, 0);
+  ASSERT_EQ(Generate(out_, {"--jobs", "2"}).exit_code, 0);
+  ExpectSameFiles(whole_, out_);
+  ASSERT_EQ(Generate(out_, {"--jobs", "3", "--overwrite"}).exit_code, 0);
+  ExpectSameFiles(whole_, out_);
+  // Nothing hidden is left beside them.
+  for (const auto& entry : fs::directory_iterator(folder_.path())) {
+    EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path();
+  }
+}
+
+TEST_F(Generation, AKilledRunGoesOnWhereItWas) {
+  ASSERT_EQ(Generate(whole_).exit_code, 0);
+  const pid_t process = Start(out_);
+  ASSERT_TRUE(WaitForFrames(process, hidden_ / "notes", 4));
+  kill(-process, SIGKILL);
+  waitpid(process, nullptr, 0);
+  EXPECT_FALSE(fs::exists(out_));
+  ASSERT_TRUE(fs::exists(hidden_ / "set"));
+  // A frame that was damaged since is made again, and so is one whose notes are.
+  ASSERT_TRUE(WriteFile(hidden_ / "set/depth_original/Depth0001.exr", "damaged").has_value());
+  ASSERT_TRUE(WriteFile(hidden_ / "notes/0002.json", "{}").has_value());
+  const auto output = Generate(out_, {"--json"});
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  const auto json = nlohmann::json::parse(output.out, nullptr, false);
+  ASSERT_TRUE(json.is_object()) << output.out;
+  EXPECT_GE(json["resumed_frames"].get<int>(), 2);
+  EXPECT_LT(json["resumed_frames"].get<int>(), kFrames);
+  ExpectSameFiles(whole_, out_);
+  EXPECT_FALSE(fs::exists(hidden_));
+}
+
+TEST_F(Generation, AStoppedRunGoesOnWhereItWas) {
+  ASSERT_EQ(Generate(whole_).exit_code, 0);
+  const pid_t process = Start(out_);
+  ASSERT_TRUE(WaitForFrames(process, hidden_ / "notes", 3));
+  // As a terminal does: to all of the group.
+  kill(-process, SIGINT);
+  int status = 0;
+  ASSERT_EQ(waitpid(process, &status, 0), process);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(WTERMSIG(status), SIGINT);
+  EXPECT_FALSE(fs::exists(out_));
+  ASSERT_EQ(Generate(out_, {"--jobs", "1"}).exit_code, 0);
+  ExpectSameFiles(whole_, out_);
+}
+
+TEST_F(Generation, AnotherSceneBeginsAnew) {
+  const pid_t process = Start(out_);
+  ASSERT_TRUE(WaitForFrames(process, hidden_ / "notes", 3));
+  kill(-process, SIGKILL);
+  waitpid(process, nullptr, 0);
+  ASSERT_TRUE(WriteFile(scene_, test::TinyScene(5)).has_value());
+  const auto output = Generate(out_, {"--json"});
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(nlohmann::json::parse(output.out)["resumed_frames"], 0);
+  ASSERT_EQ(Generate(whole_).exit_code, 0);
+  ExpectSameFiles(whole_, out_);
+}
+
+// Nearer than the near clipping plane the renderer shows what is behind, and rays do not.
+TEST_F(Generation, WhatDoesNotVerifyIsNotPublished) {
+  ASSERT_TRUE(WriteFile(scene_, test::TinyScene(4, 0.24)).has_value());
+  const auto output = Generate(out_);
+  EXPECT_EQ(output.exit_code, 4) << output.out;
+  EXPECT_NE(output.err.find("does not verify"), std::string::npos) << output.err;
+  EXPECT_FALSE(fs::exists(out_));
+  EXPECT_FALSE(fs::exists(hidden_));
+}
+
+TEST_F(Generation, WritesWhatItMeasured) {
+  ASSERT_TRUE(WriteFile(scene_, test::TinyScene(4)).has_value());
+  ASSERT_EQ(Generate(out_, {"--seed", "77"}).exit_code, 0);
+  const auto record = ReadSequenceJson(out_ / "sequence.json");
+  ASSERT_TRUE(record.has_value()) << record.error().message;
+  EXPECT_EQ(record->generator.seed, 77U);
+  ASSERT_TRUE(record->certificate.has_value());
+  EXPECT_EQ(record->certificate->frames, 4);
+  EXPECT_EQ(record->certificate->model.violations, 0);
+  for (const char* file : {"scene.toml", "truth/visibility.csv", "models/car-1.ply"}) {
+    EXPECT_TRUE(record->hashes.contains(file)) << file;
+  }
+}
+
+TEST_F(Generation, ListsTheScenes) {
+  const auto output = RunTsdfpp(
+      {"generate", "--list", "--scenes", TSDFPP_SOURCE_DIR "/scenes", "--json"}, folder_.path());
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  const auto json = nlohmann::json::parse(output.out, nullptr, false);
+  ASSERT_TRUE(json.is_array());
+  const auto toycar3 = std::find_if(json.begin(), json.end(),
+                                    [](const auto& scene) { return scene["name"] == "toycar3"; });
+  ASSERT_NE(toycar3, json.end());
+  EXPECT_EQ((*toycar3)["frames"], 480);
+}
+
+TEST(Workers, LinesComeAndGo) {
+  auto workers = Workers::Start(3, [](Channel& parent) -> Expected<void> {
+    while (const auto line = parent.Receive()) parent.Send(*line + "!");
+    return {};
+  });
+  ASSERT_TRUE(workers.has_value());
+  for (int i = 0; i < 3; ++i) {
+    workers->Send(i, "a");
+    workers->Send(i, "b");
+    workers->Close(i);
+  }
+  std::map<int, std::string> heard;
+  while (true) {
+    const auto next = workers->Next();
+    ASSERT_TRUE(next.has_value()) << next.error().message;
+    if (!*next) break;
+    heard[(*next)->worker] += (*next)->line;
+  }
+  EXPECT_EQ(heard, (std::map<int, std::string>{{0, "a!b!"}, {1, "a!b!"}, {2, "a!b!"}}));
+}
+
+TEST(Workers, ErrorsAndDeathsAreTheParents) {
+  auto failing = Workers::Start(
+      1, [](Channel&) -> Expected<void> { return DataError("frame {} is torn", 7); });
+  auto next = failing->Next();
+  ASSERT_FALSE(next.has_value());
+  EXPECT_EQ(next.error().kind, ErrorKind::kData);
+  EXPECT_EQ(next.error().message, "frame 7 is torn");
+  auto dying = Workers::Start(1, [](Channel&) -> Expected<void> {
+    raise(SIGKILL);
+    return {};
+  });
+  next = dying->Next();
+  ASSERT_FALSE(next.has_value());
+  EXPECT_EQ(next.error().kind, ErrorKind::kEnvironment);
+  EXPECT_NE(next.error().message.find("signal 9"), std::string::npos) << next.error().message;
+}
+
+}  // namespace
+}  // namespace tsdfpp
