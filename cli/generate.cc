@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "cli/command.h"
+#include "core/intrinsics.h"
 #include "eval/scene_page.h"
 #include "sim/scene_list.h"
 
@@ -22,6 +23,7 @@ struct Options {
   bool list = false;
   std::uint64_t seed = 0;
   CLI::Option* seed_given = nullptr;
+  double scale = 1;
   GenerateOptions generate;
 };
 
@@ -102,6 +104,7 @@ Expected<CommandResult> RunGenerate(const Options& options) {
   if (!options.sensor.empty()) {
     TSDFPP_ASSIGN(scene.sensor, SensorPresetNamed(options.sensor));
   }
+  scene.intrinsics = Scaled(scene.intrinsics, options.scale);
   GenerateOptions generate = options.generate;
   generate.out = options.out;
   generate.stop = &stop;
@@ -155,6 +158,9 @@ Run AddGenerate(CLI::App& app, const CommonOptions&) {
   options->seed_given = app.add_option(
       "--seed", options->seed, "Replaces the scene's seed: of random scenes, jitter, sensor");
   app.add_option("--sensor", options->sensor, "Ready-made sensor in place of the scene's own");
+  app.add_option("--scale", options->scale, "Images this many times the scene's size")
+      ->check(CLI::Range(0.05, 4.0))
+      ->capture_default_str();
   app.add_flag("!--no-antialias", options->generate.render.antialias,
                "Colour without multisampling: jagged edges, faster");
   app.add_option("--share", options->generate.ray_share,

@@ -35,6 +35,11 @@ class FrameSource {
   // Errors: kUsage where the number is out of range, kData where a file is missing or unusable,
   // kEnvironment where rendering fails.
   virtual Expected<Frame> Read(int index) = 0;
+  // Whether Read() gives what a sensor with faults made of the frames.
+  virtual bool IsSensed() const { return false; }
+  // The same frame as it was, where Read() gives what a sensor with faults made of it: true depth,
+  // mask and camera pose, for evaluation only; colour as Read()'s. Errors: those of Read().
+  virtual Expected<Frame> ReadTrue(int index) { return Read(index); }
   // The true surfaces, for evaluation only. Error kData where the source has none.
   virtual Expected<std::vector<TrueModel>> Truth() = 0;
 };

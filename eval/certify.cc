@@ -151,7 +151,7 @@ class Certifier {
  private:
   FrameResult CheckFrame(int index, bool with_rays) {
     FrameResult result;
-    const auto frame = source_.Read(index);
+    const auto frame = source_.ReadTrue(index);
     if (!frame) {
       result.report.findings.push_back({"files", "", index, frame.error().message});
       return result;

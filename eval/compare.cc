@@ -109,9 +109,13 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   for (int index = first; index <= result.last_frame; ++index) {
     const auto read_start = std::chrono::steady_clock::now();
     TSDFPP_ASSIGN(const Frame frame, source.Read(index));
+    std::optional<Frame> true_frame;
+    if (source.IsSensed()) {
+      TSDFPP_ASSIGN(true_frame, source.ReadTrue(index));
+    }
     result.read_s += since(read_start);
     if (frame.mask.empty()) return DataError("{}: frame {} has no mask", result.info.name, index);
-    TSDFPP_RETURN_IF_ERROR(result.truth->Observe(frame));
+    TSDFPP_RETURN_IF_ERROR(result.truth->Observe(true_frame ? *true_frame : frame));
     const bool reveal = index == result.reveal_frame;
     const bool evaluate =
         (index - first + 1) % config.every == 0 || index == result.last_frame || reveal;

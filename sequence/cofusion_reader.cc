@@ -92,34 +92,13 @@ class CofusionSource : public FrameSource {
   const SequenceInfo& info() const override { return info_; }
 
   Expected<Frame> Read(int index) override {
-    const int last = info_.first_index + info_.frame_count - 1;
-    if (index < info_.first_index || index > last) {
-      return UsageError("frame {} is out of range, {} has frames {} to {}", index, info_.name,
-                        info_.first_index, last);
-    }
-    Frame frame;
-    frame.index = index;
-    frame.time_s = (index - info_.first_index) / info_.rate_hz;
-    frame.intrinsics = info_.intrinsics;
-    const cv::Size size(info_.intrinsics.width, info_.intrinsics.height);
-    TSDFPP_ASSIGN(frame.colour, ReadColour(folder_ / cofusion::ColourFile(index), size));
-    TSDFPP_ASSIGN(frame.depth, ReadDepth(folder_ / cofusion::DepthFile(index), size));
-    if (has_masks_) {
-      TSDFPP_ASSIGN(frame.mask, ReadMask(folder_ / cofusion::MaskFile(index), size));
-    }
-    const auto camera = camera_.find(index);
-    if (camera == camera_.end()) {
-      return DataError("{}: no camera pose for frame {}",
-                       (folder_ / cofusion::kCameraTrajectory).string(), index);
-    }
-    frame.T_WC = camera->second;
-    for (const auto& [id, trajectory] : objects_) {
-      if (const auto pose = trajectory.find(index); pose != trajectory.end()) {
-        frame.T_WO.emplace(id, pose->second);
-      }
-    }
-    return frame;
+    return ReadFrame(index, sensed_depth_, sensed_masks_, sensed_camera_);
   }
+
+  bool IsSensed() const override {
+    return sensed_depth_ || sensed_masks_ || !sensed_camera_.empty();
+  }
+  Expected<Frame> ReadTrue(int index) override { return ReadFrame(index, false, false, {}); }
 
   Expected<std::vector<TrueModel>> Truth() override {
     const fs::path models = folder_ / cofusion::kModels;
@@ -157,6 +136,44 @@ class CofusionSource : public FrameSource {
   }
 
  private:
+  Expected<Frame> ReadFrame(int index, bool sensed_depth, bool sensed_mask,
+                            const Trajectory& sensed_camera) const {
+    const int last = info_.first_index + info_.frame_count - 1;
+    if (index < info_.first_index || index > last) {
+      return UsageError("frame {} is out of range, {} has frames {} to {}", index, info_.name,
+                        info_.first_index, last);
+    }
+    Frame frame;
+    frame.index = index;
+    frame.time_s = (index - info_.first_index) / info_.rate_hz;
+    frame.intrinsics = info_.intrinsics;
+    const cv::Size size(info_.intrinsics.width, info_.intrinsics.height);
+    TSDFPP_ASSIGN(frame.colour, ReadColour(folder_ / cofusion::ColourFile(index), size));
+    TSDFPP_ASSIGN(frame.depth, ReadDepth(folder_ / (sensed_depth ? cofusion::SensedDepthFile(index)
+                                                                 : cofusion::DepthFile(index)),
+                                         size));
+    if (has_masks_) {
+      TSDFPP_ASSIGN(frame.mask, ReadMask(folder_ / (sensed_mask ? cofusion::SensedMaskFile(index)
+                                                                : cofusion::MaskFile(index)),
+                                         size));
+    }
+    const auto camera = camera_.find(index);
+    if (camera == camera_.end()) {
+      return DataError("{}: no camera pose for frame {}",
+                       (folder_ / cofusion::kCameraTrajectory).string(), index);
+    }
+    frame.T_WC = camera->second;
+    if (const auto sensed = sensed_camera.find(index); sensed != sensed_camera.end()) {
+      frame.T_WC = sensed->second;
+    }
+    for (const auto& [id, trajectory] : objects_) {
+      if (const auto pose = trajectory.find(index); pose != trajectory.end()) {
+        frame.T_WO.emplace(id, pose->second);
+      }
+    }
+    return frame;
+  }
+
   Expected<void> ReadTrajectories() {
     TSDFPP_ASSIGN(camera_, ReadTrajectory(folder_ / cofusion::kCameraTrajectory));
     for (const std::string& name : FileNames(folder_ / cofusion::kTrajectories)) {
@@ -193,6 +210,11 @@ class CofusionSource : public FrameSource {
     for (const auto& [file, hash] : record.hashes) {
       if (file.starts_with(std::string(cofusion::kModels) + "/")) expected_models_.push_back(file);
       if (file.starts_with(std::string(cofusion::kMask) + "/")) has_masks_ = true;
+      if (file.starts_with(std::string(cofusion::kSensedDepth) + "/")) sensed_depth_ = true;
+      if (file == cofusion::SensedMaskFile(info_.first_index)) sensed_masks_ = true;
+      if (file == cofusion::kSensedCameraTrajectory) {
+        TSDFPP_ASSIGN(sensed_camera_, ReadTrajectory(folder_ / file));
+      }
     }
     return {};
   }
@@ -233,7 +255,10 @@ class CofusionSource : public FrameSource {
   fs::path folder_;
   SequenceInfo info_;
   bool has_masks_ = false;
+  bool sensed_depth_ = false;
+  bool sensed_masks_ = false;
   Trajectory camera_;
+  Trajectory sensed_camera_;  // empty where it is the true one
   std::map<InstanceId, Trajectory> objects_;
   std::vector<ObjectInfo> found_;             // of the trajectories
   std::vector<std::string> expected_models_;  // of sequence.json

@@ -14,6 +14,9 @@ namespace tsdfpp {
 // Hz; the objects are those of the trajectories (the class is the name), plus any other id that a
 // mask holds, named "object<id>"; there is no reveal plan. Without mask_id/ frames carry no mask.
 //
+// Where a sequence of ours was made by a sensor with faults, Read() gives what it saw
+// (depth_noise/, mask_noise/, sensed-cam-0.txt) and ReadTrue() the truth. Other sets give
+// depth_original/ in both.
 // Read() gives depth as it is on disk (Frame says which values are invalid) and time_s = (index -
 // first_index) / rate; an object without a pose at a frame is absent from T_WO. Its errors: kUsage
 // for a frame out of range; kData, naming the file, for an image that is missing, cannot be

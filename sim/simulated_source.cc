@@ -8,6 +8,19 @@
 
 namespace tsdfpp {
 
+namespace {
+
+// Colour is as sensed: there is no other on disk (eval/generate.h).
+Frame TrueFrame(const SensedFrame& sensed) {
+  Frame frame = sensed.frame;
+  frame.depth = sensed.truth.depth;
+  frame.mask = sensed.truth.mask;
+  frame.T_WC = sensed.truth.T_WC;
+  return frame;
+}
+
+}  // namespace
+
 SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& options,
                                  SceneMotion motion, CompiledScene scene)
     : config_(config), options_(options), motion_(std::move(motion)), scene_(std::move(scene)) {
@@ -89,7 +102,16 @@ Expected<SensedFrame> SimulatedSource::ReadSensed(int index) {
 
 Expected<Frame> SimulatedSource::Read(int index) {
   TSDFPP_ASSIGN(SensedFrame sensed, ReadSensed(index));
+  last_true_.reset();
+  if (IsSensed()) last_true_ = TrueFrame(sensed);
   return std::move(sensed.frame);
+}
+
+Expected<Frame> SimulatedSource::ReadTrue(int index) {
+  if (!IsSensed()) return Read(index);
+  if (last_true_ && last_true_->index == index) return *std::exchange(last_true_, std::nullopt);
+  TSDFPP_ASSIGN(const SensedFrame sensed, ReadSensed(index));
+  return TrueFrame(sensed);
 }
 
 Expected<std::unique_ptr<FrameSource>> OpenScene(const std::filesystem::path& toml,

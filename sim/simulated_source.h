@@ -42,6 +42,9 @@ class SimulatedSource final : public FrameSource {
   Expected<Frame> Read(int index) override;
   // The same frame with the truth beside it.
   Expected<SensedFrame> ReadSensed(int index);
+  bool IsSensed() const override { return !(config_.sensor == SensorConfig{}); }
+  // Renders nothing where the frame was the last one that Read() gave.
+  Expected<Frame> ReadTrue(int index) override;
   // The compiled meshes: exactly what is rendered.
   Expected<std::vector<TrueModel>> Truth() override { return scene_.TrueModels(); }
 
@@ -65,6 +68,7 @@ class SimulatedSource final : public FrameSource {
   CompiledScene scene_;
   std::unique_ptr<Renderer> renderer_;
   SequenceInfo info_;
+  std::optional<Frame> last_true_;  // of the frame that Read() gave last, where it differs
 };
 
 // Opens scenes/<name>.toml (with a seed of the caller's: LoadSceneConfig, then Open). Errors:

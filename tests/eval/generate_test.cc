@@ -9,11 +9,14 @@
 #include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <thread>
 
 #include "core/files.h"
 #include "eval/workers.h"
+#include "sequence/open_sequence.h"
 #include "sequence/sequence_json.h"
+#include "sim/simulated_source.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/tiny_scene.h"
 
@@ -181,6 +184,41 @@ TEST_F(Generation, WritesWhatItMeasured) {
   for (const char* file : {"scene.toml", "truth/visibility.csv", "models/car-1.ply"}) {
     EXPECT_TRUE(record->hashes.contains(file)) << file;
   }
+}
+
+// What the sensor gave is what is mapped, from memory as from the disk; the truth stays beside it.
+TEST_F(Generation, WhatTheSensorGaveComesBackFromDisk) {
+  const fs::path out = folder_ / "sensed";
+  ASSERT_EQ(Generate(out, {"--sensor", "kinect+masks_severe+pose_drift_strong"}).exit_code, 0);
+  SceneConfig scene = LoadSceneConfig(scene_).value();
+  scene.sensor = SensorPresetNamed("kinect+masks_severe+pose_drift_strong").value();
+  const auto streamed = SimulatedSource::Open(scene, {}).value();
+  const auto stored = OpenSequence(out).value();
+  ASSERT_TRUE(streamed->IsSensed());
+  ASSERT_TRUE(stored->IsSensed());
+  const auto same = [](const cv::Mat& a, const cv::Mat& b) {
+    return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
+  };
+  int other_depth = 0;
+  int other_mask = 0;
+  int other_pose = 0;
+  for (const int index : {1, 7, 20, kFrames}) {
+    const Frame a = streamed->Read(index).value();
+    const Frame b = stored->Read(index).value();
+    EXPECT_TRUE(same(a.depth, b.depth) && same(a.mask, b.mask) && same(a.colour, b.colour));
+    EXPECT_EQ(a.T_WC.matrix(), b.T_WC.matrix());
+    const Frame true_a = streamed->ReadTrue(index).value();
+    const Frame true_b = stored->ReadTrue(index).value();
+    EXPECT_TRUE(same(true_a.depth, true_b.depth) && same(true_a.mask, true_b.mask));
+    EXPECT_EQ(true_a.T_WC.matrix(), true_b.T_WC.matrix());
+    other_depth += same(a.depth, true_a.depth) ? 0 : 1;
+    other_mask += same(a.mask, true_a.mask) ? 0 : 1;
+    other_pose += a.T_WC.matrix() == true_a.T_WC.matrix() ? 0 : 1;
+  }
+  EXPECT_EQ(other_depth, 4);
+  EXPECT_GE(other_mask, 1);
+  EXPECT_GE(other_pose, 3);  // drift begins at the first frame
+  EXPECT_EQ(RunTsdfpp({"verify", out, "--share", "0"}, folder_.path()).exit_code, 0);
 }
 
 TEST_F(Generation, ListsTheScenes) {
