@@ -51,6 +51,7 @@ Expected<Steps> MeasureFrame(SimulatedSource& source, int index, bool write,
   steps["draw colour + shadows"] = times.colour_ms;
   steps["read back"] = times.read_back_ms;
   steps["convert"] = times.convert_ms;
+  steps["mend slivers"] = times.mend_ms;
   if (write) {
     std::map<std::string, std::string> files;
     double at = WallMilliseconds();

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <limits>
 #include <thread>
 
 #include "cli/command.h"
@@ -149,14 +150,16 @@ Expected<CommandResult> RunGenerate(const Options& options) {
 Run AddGenerate(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
   options->generate.jobs = 0;
-  app.add_option("SCENE", options->scene, "Scene file (.toml)");
-  app.add_option("--out", options->out, "Folder of the new sequence");
+  CLI::Option* scene = app.add_option("SCENE", options->scene, "Scene file (.toml)");
+  CLI::Option* out = app.add_option("--out", options->out, "Folder of the new sequence");
   app.add_flag("--overwrite", options->generate.overwrite, "Replace an earlier sequence of ours");
   app.add_option("--jobs", options->generate.jobs,
                  "Processes that render; one a core by default. The bytes do not depend on it")
       ->check(CLI::Range(1, 256));
   options->seed_given = app.add_option(
       "--seed", options->seed, "Replaces the scene's seed: of random scenes, jitter, sensor");
+  // TOML's integers end there, and the seed is written into scene.toml.
+  options->seed_given->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()));
   app.add_option("--sensor", options->sensor, "Ready-made sensor in place of the scene's own");
   app.add_option("--scale", options->scale, "Images this many times the scene's size")
       ->check(CLI::Range(0.05, 4.0))
@@ -167,11 +170,19 @@ Run AddGenerate(CLI::App& app, const CommonOptions&) {
                  "Share of the frames that are compared with rays before the sequence is published")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  app.add_flag("--list", options->list, "List the scenes of --scenes and what they are for");
+  CLI::Option* list =
+      app.add_flag("--list", options->list, "List the scenes of --scenes and what they are for");
+  CLI::Option* page =
+      app.add_option("--page", options->page,
+                     "Write scenes.md with pictures of the scenes of --scenes into this folder");
+  list->excludes(page);
+  for (CLI::Option* other : {scene, out}) {
+    list->excludes(other);
+    page->excludes(other);
+  }
   app.add_option("--scenes", options->scenes, "Folder that --list and --page look at")
-      ->capture_default_str();
-  app.add_option("--page", options->page,
-                 "Write scenes.md with pictures of the scenes of --scenes into this folder");
+      ->capture_default_str()
+      ->excludes(scene);
   return [options] { return RunGenerate(*options); };
 }
 

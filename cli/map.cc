@@ -1,10 +1,12 @@
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "cli/command.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "eval/map_output.h"
 #include "eval/open_source.h"
+#include "sequence/sequence_json.h"
 
 namespace tsdfpp {
 namespace {
@@ -46,6 +48,9 @@ Expected<CommandResult> RunMap(const Options& options) {
                       info.first_index, last);
   }
   TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
+  if (IsOurSequence(options.out)) {
+    return UsageError("--out '{}' is a sequence, expected another folder", options.out);
+  }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
 
   Pipeline pipeline(config, info.objects);
@@ -61,6 +66,11 @@ Expected<CommandResult> RunMap(const Options& options) {
       times.Add(pipeline.Process(frame));
       bar.Show(index - info.first_index + 1, until - info.first_index + 1);
     }
+  }
+  if (config.poses == PoseSource::kGiven && info.objects.size() > 1 &&
+      pipeline.trajectories().empty()) {
+    spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
+                 options.source.path);
   }
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);

@@ -10,6 +10,7 @@
 #include "core/files.h"
 #include "eval/compare_report.h"
 #include "eval/pictures.h"
+#include "sequence/sequence_json.h"
 
 namespace tsdfpp {
 namespace {
@@ -88,6 +89,9 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   result.config = config;
   TSDFPP_ASSIGN(result.last_frame, LastFrame(result.info, config.until));
   if (config.every < 1) return UsageError("--every is {}, expected 1 or more", config.every);
+  if (IsOurSequence(out)) {
+    return UsageError("--out '{}' is a sequence, expected another folder", out.string());
+  }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(out));
   TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source));
   result.truth = std::make_unique<SceneTruth>(std::move(truth));

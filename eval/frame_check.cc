@@ -17,6 +17,9 @@ constexpr double kUnitTolerance = 0.01;
 // Where an edge runs through a pixel, the renderer's grid for vertices (1/256 pixel) may show a
 // surface just beyond its end: a point off its model by that shift, stretched by the incidence.
 constexpr double kEdgeReach_m = 1e-3;
+constexpr float kStep_m = 5e-3F;
+// A pose that is off shows in more pixels.
+constexpr std::int64_t kFewPixels = 3;
 constexpr double kMaxIncidence_deg = 80;
 
 // Does one of the eight neighbours show another object?
@@ -25,6 +28,18 @@ bool IsBesideAnother(const cv::Mat& mask, const cv::Point& at) {
   for (int v = std::max(0, at.y - 1); v <= std::min(mask.rows - 1, at.y + 1); ++v) {
     for (int u = std::max(0, at.x - 1); u <= std::min(mask.cols - 1, at.x + 1); ++u) {
       if (mask.at<InstanceId>(v, u) != id) return true;
+    }
+  }
+  return false;
+}
+
+// Does the depth of one of the eight neighbours leave the pixel's by a step: an edge of one object
+// before another part of it?
+bool IsBesideStep(const cv::Mat& depth, const cv::Point& at) {
+  const float z = depth.at<float>(at);
+  for (int v = std::max(0, at.y - 1); v <= std::min(depth.rows - 1, at.y + 1); ++v) {
+    for (int u = std::max(0, at.x - 1); u <= std::min(depth.cols - 1, at.x + 1); ++u) {
+      if (std::abs(depth.at<float>(v, u) - z) > kStep_m) return true;
     }
   }
   return false;
@@ -196,7 +211,8 @@ FrameReport FrameCheck::Check(const Frame& frame) const {
           (T_OC.linear() * entry.points_C[i].cast<double>().normalized()).cast<float>();
       const bool grazing = std::abs(nearest.normal[i].dot(ray_O)) < least_cosine;
       if (distance > kModelLimit_m && distance <= kEdgeReach_m &&
-          (grazing || IsBesideAnother(frame.mask, entry.pixels[i]))) {
+          (grazing || IsBesideAnother(frame.mask, entry.pixels[i]) ||
+           IsBesideStep(frame.depth, entry.pixels[i]))) {
         report.model.Exclude(1);
         continue;
       }
@@ -242,9 +258,9 @@ FrameReport FrameCheck::Check(const Frame& frame) const {
     const ObjectInfo& object = surfaces_.at(id)->model().info;
     add("pose", cofusion::TrajectoryFile(object),
         fmt::format(
-            "{} pixels of '{}' lie up to {} off its model (limit {}) and no others: its pose "
-            "is not this frame's",
-            o.count, object.name, millimetres(o.worst_m), millimetres(kModelLimit_m)));
+            "{} pixels of '{}' lie up to {} off its model (limit {}) and no others: {}", o.count,
+            object.name, millimetres(o.worst_m), millimetres(kModelLimit_m),
+            o.count <= kFewPixels ? "the depth there is wrong" : "its pose is not this frame's"));
     return report;
   }
   add("pose", cofusion::kCameraTrajectory,

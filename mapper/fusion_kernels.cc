@@ -4,14 +4,16 @@
 
 #include "core/types.h"
 
-// One pass of this file an instruction set; the machine's best is chosen at run time. All give the
-// same bits: only correctly rounded operations, none of them contracted.
+// One pass of this file an instruction set; the machine's best is chosen at run time. On x86-64 all
+// give the same bits: only correctly rounded operations, none contracted
+// (cmake/TsdfppTarget.cmake).
 #ifndef TSDFPP_MAPPER_FUSION_KERNELS_ONCE
 #define TSDFPP_MAPPER_FUSION_KERNELS_ONCE
 namespace tsdfpp {
 namespace {
 
-// table[pixel], or table[0] where there is no pixel. Plain loads: the machines' gathers are slower.
+// table[pixel], or table[0] where there is no pixel. Plain loads: from a frame, which no cache
+// holds, gathers took longer.
 template <typename T>
 void Read(const T* table, const std::int32_t* pixel, T* out) {
   for (int i = 0; i < kBlockVoxels; ++i) out[i] = table[pixel[i] < 0 ? 0 : pixel[i]];
@@ -32,13 +34,11 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr float kNearest_m = 0.05F;  // voxels closer to the camera's plane are not in view
-
 void Project(const KernelFrame& frame, const float* T_CL, float voxel, const Index3& first_voxel,
              float* out_z, float* out_scale, std::int32_t* out_pixel) {
   const hn::ScalableTag<float> df;
   const hn::RebindToSigned<decltype(df)> di;
-  // Copies, which the stores cannot be thought to change.
+  // Local copies: for all that the compiler knows, the stores alias the arguments.
   const Index3 first = first_voxel;
   std::array<float, 12> m;
   std::copy(T_CL, T_CL + 12, m.begin());

@@ -10,6 +10,8 @@
 
 namespace tsdfpp {
 
+inline constexpr float kNearest_m = 0.05F;  // voxels closer to the camera's plane are not in view
+
 struct DepthAndLabel {
   float depth;  // metres, 0 where invalid
   std::int32_t label;
@@ -26,9 +28,9 @@ struct KernelFrame {
 
 // What a frame says of the voxels of a block.
 struct BlockObservation {
-  std::array<float, kBlockVoxels> distance;  // s, metres
+  std::array<float, kBlockVoxels> distance;  // s, metres; meaningless without a pixel
   Lanes pixel;  // row-major pixel, or -1 where not in view or s < -back
-  Lanes label;  // of that pixel
+  Lanes label;  // of that pixel, meaningless without one
 };
 
 // Projects the voxels of the block whose lowest voxel is `first` and reads what the frame has
@@ -54,7 +56,7 @@ struct FusionResult {
 
 // Fuses the observations into the block. `in_band` marks the voxels that took one in band;
 // `contradicted` those that see another label and hold a solid in front of its surface
-// (only where any_contradicted).
+//.
 FusionResult FuseVoxels(const KernelFrame& frame, const FusionRule& rule,
                         const BlockObservation& observation, TsdfBlock& block, Lanes& in_band,
                         Lanes& contradicted);

@@ -10,8 +10,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr float kNearest_m = 0.05F;  // voxels closer to the camera's plane are not in view
-constexpr int kTile_px = 32;         // about the size of a block in the image
+constexpr int kTile_px = 32;  // about the size of a block in the image
 constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
 constexpr std::size_t kBlocksPerTask = 512;
 
@@ -30,12 +29,13 @@ std::uint32_t TileOf(const FrameView& frame, const CameraFromLattice& T_CL, cons
     c[r] = m[0] * centre_L.x() + m[1] * centre_L.y() + m[2] * centre_L.z() + m[3];
   }
   const float radius = 3.5F * 1.7321F * voxel * 1.01F;
-  if (c.z() + radius < kNearest_m) return kOutOfView;
+  // Written so that a camera pose that is not a number sees nothing.
+  if (!(c.z() + radius >= kNearest_m)) return kOutOfView;
   const float slack = 1.0F;  // pixels, for rounding to the nearest one
   const auto outside = [&](float normal_xy, float normal_z, float offset) {
     // normal_xy * x + normal_z * z >= 0 inside, up to the normal's length
-    return normal_xy * offset + normal_z * c.z() <
-           -radius * std::sqrt(normal_xy * normal_xy + normal_z * normal_z);
+    return !(normal_xy * offset + normal_z * c.z() >=
+             -radius * std::sqrt(normal_xy * normal_xy + normal_z * normal_z));
   };
   const float left = (-slack - frame.cx) / frame.fx;
   const float right = (static_cast<float>(frame.width) + slack - frame.cx) / frame.fx;
@@ -48,7 +48,7 @@ std::uint32_t TileOf(const FrameView& frame, const CameraFromLattice& T_CL, cons
   const float z = std::max(c.z(), kNearest_m);
   const auto tile = [](float pixel, int size) {
     const float last = static_cast<float>(size - 1);
-    return static_cast<std::uint32_t>(std::clamp(pixel, 0.0F, last)) / kTile_px;
+    return static_cast<std::uint32_t>(std::min(std::max(0.0F, pixel), last)) / kTile_px;
   };
   const auto per_row = static_cast<std::uint32_t>((frame.width + kTile_px - 1) / kTile_px);
   return tile(frame.fy * c.y() / z + frame.cy, frame.height) * per_row +
@@ -71,6 +71,7 @@ FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
       intrinsics(frame.intrinsics),
       T_WC(frame.T_WC) {
   const cv::Size size(width, height);
+  Require(width > 0 && height > 0);
   Require(frame.depth.type() == CV_32FC1 && frame.depth.size() == size);
   Require(labels.type() == CV_16UC1 && labels.size() == size);
   Require(frame.colour.type() == CV_8UC3 && frame.colour.size() == size);

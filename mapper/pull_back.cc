@@ -178,8 +178,8 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
   InterpolateCounted(values, points, candidate.data(), out.distance.data());
   any = false;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    const float distance = out.distance[i];
-    const bool defined = candidate[i] != 0 && distance == distance;
+    const float distance = candidate[i] != 0 ? out.distance[i] : kUnobserved;
+    const bool defined = distance == distance;
     const bool covers =
         defined && ((distance < 0 && distance >= -back) || InCrossedCube(cubes.crossed, points, i));
     out.covered[i] = covers ? -1 : 0;

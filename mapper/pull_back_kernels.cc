@@ -1,6 +1,7 @@
 #include "mapper/pull_back_kernels.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 // One pass of this file an instruction set (see fusion_kernels.cc).
 #undef HWY_TARGET_INCLUDE
@@ -13,6 +14,9 @@ namespace tsdfpp::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr std::int64_t kFarthestVoxel = 1 << 30;
+static_assert(kPatchSide == 16);  // shifts by 4 and 8, rows of 16 bits
 
 void Points(const std::array<double, 12>& T, double voxel_m, const Index3& first,
             PulledPoints& points) {
@@ -45,14 +49,20 @@ void Points(const std::array<double, 12>& T, double voxel_m, const Index3& first
       highest[axis] = hn::Max(highest[axis], corner);
     }
   }
-  const auto low = [&](std::size_t axis) {
-    return hn::GetLane(hn::MinOfLanes(di, lowest[axis])) - 1;
-  };
-  const auto high = [&](std::size_t axis) {
-    return hn::GetLane(hn::MaxOfLanes(di, highest[axis])) + 1;
-  };
-  points.low = {low(0), low(1), low(2)};
-  points.high = {high(0), high(1), high(2)};
+  std::array<int, 3> low{};
+  std::array<int, 3> high{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t least = hn::GetLane(hn::MinOfLanes(di, lowest[axis]));
+    const std::int64_t most = hn::GetLane(hn::MaxOfLanes(di, highest[axis]));
+    // A pose that scales, or is not a number, is its maker's error.
+    if (most - least > kPatchSide - 3 || least < -kFarthestVoxel || most > kFarthestVoxel) {
+      std::abort();
+    }
+    low[axis] = static_cast<int>(least) - 1;
+    high[axis] = static_cast<int>(most) + 1;
+  }
+  points.low = {low[0], low[1], low[2]};
+  points.high = {high[0], high[1], high[2]};
   const hn::ScalableTag<std::int32_t> dw;
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(dw)) {
     const auto x = hn::Sub(hn::LoadU(dw, &base[0][i]), hn::Set(dw, points.low.x));

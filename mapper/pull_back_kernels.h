@@ -10,7 +10,7 @@
 namespace tsdfpp {
 
 // A cube of voxels around a block that was pulled back: by a rigid motion a block's voxels span at
-// most 14 lowest corners an axis; one more corner on either side.
+// most 14 lowest corners an axis (7 sqrt(3) < 13); one more corner on either side.
 inline constexpr int kPatchSide = 16;
 inline constexpr int kPatchVoxels = kPatchSide * kPatchSide * kPatchSide;
 using PatchValues = std::array<float, kPatchVoxels>;  // x fastest, then y, then z

@@ -34,7 +34,7 @@ struct TsdfBlock {
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
-  BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see UpdateCover
+  BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
 
   // Brings observed, negative and band in line with the values; true where one of them changed.
   // `back` in metres.

@@ -103,7 +103,13 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   bool with_mask = false;
   bool has_poses = false;
   for (int i = 0; i < info.frame_count; ++i) {
-    TSDFPP_ASSIGN(const Frame frame, source.Read(info.first_index + i));
+    TSDFPP_ASSIGN(Frame frame, source.Read(info.first_index + i));
+    if (source.IsSensed() && format == DatasetFormat::kBop) {
+      // Its masks and poses are annotations.
+      TSDFPP_ASSIGN(const Frame true_frame, source.ReadTrue(frame.index));
+      frame.mask = true_frame.mask;
+      frame.T_WC = true_frame.T_WC;
+    }
     if (i == 0) with_mask = !frame.mask.empty();
     has_poses |= !frame.T_WO.empty();
     TSDFPP_RETURN_IF_ERROR(CheckFrame(frame, info, format, with_mask));
@@ -116,6 +122,12 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   TSDFPP_RETURN_IF_ERROR(writer->Finish(report));
   SayWhatIsLost(info, format, has_models, has_poses, writer->loss(), writer->depth_units_per_m(),
                 report);
+  if (source.IsSensed()) {
+    report.left_out.emplace_back(
+        format == DatasetFormat::kBop
+            ? "the masks and camera poses that the sensor gave: BOP's are the true ones"
+            : "the truth: depth, masks and camera poses are those that the sensor gave");
+  }
   TSDFPP_RETURN_IF_ERROR(staging.TakeThePlace());
   return report;
 }

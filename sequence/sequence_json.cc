@@ -163,4 +163,9 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
   }
 }
 
+bool IsOurSequence(const std::filesystem::path& folder) {
+  std::error_code code;
+  return std::filesystem::exists(folder / "sequence.json", code);
+}
+
 }  // namespace tsdfpp

@@ -58,6 +58,9 @@ struct SequenceRecord {
 std::uint64_t Fnv1a64(std::string_view bytes);
 std::string HashText(std::string_view bytes);
 
+// Whether the folder holds a sequence.json.
+bool IsOurSequence(const std::filesystem::path& folder);
+
 std::string SequenceToJson(const SequenceRecord& record);
 
 // Errors: kData, naming file and field: not JSON, another generator or schema version, a field that

@@ -142,7 +142,8 @@ void DrawDrop(Draws& draws, const RandomSceneConfig& config, Candidate& candidat
   physics.mass_kg = draws.In(0.05, 0.4);
   physics.friction = draws.In(0.3, 0.8);
   physics.start_frame = kFirstFrame + static_cast<int>(draws.Next() * config.frames / 3);
-  physics.velocity_W = Eigen::Vector3d(draws.In(-0.2, 0.2), draws.In(-0.2, 0.2), 0);
+  // Braces: drawn in this order by every compiler.
+  physics.velocity_W = Eigen::Vector3d{draws.In(-0.2, 0.2), draws.In(-0.2, 0.2), 0};
   object.physics = physics;
 }
 
@@ -159,7 +160,7 @@ Expected<Candidate> DrawModel(Draws& draws, const RandomSceneConfig& config, std
   if (info->solid) {
     object.model.scale = 1;
     object.model.size_m =
-        Eigen::Vector3d(draws.In(config.size_m), draws.In(config.size_m), draws.In(config.size_m));
+        Eigen::Vector3d{draws.In(config.size_m), draws.In(config.size_m), draws.In(config.size_m)};
   }
   const auto index = static_cast<std::uint64_t>(id);
   object.model.seed = seed + index;
@@ -218,9 +219,10 @@ bool DrawPlace(Draws& draws, const RandomSceneConfig& config, const CameraMotion
 CameraConfig DrawCamera(Draws& draws, const RandomSceneConfig& config) {
   CameraConfig camera;
   const std::string path = draws.Of(config.camera_paths);
-  const Eigen::Vector3d target(draws.In(-0.05, 0.05), draws.In(-0.05, 0.05), kTableTop_m);
+  const Eigen::Vector3d target{draws.In(-0.05, 0.05), draws.In(-0.05, 0.05), kTableTop_m};
   const double azimuth_deg = draws.In(config.camera_azimuth_deg);
-  const double sweep_deg = draws.In(config.camera_sweep_deg) * (draws.Chance(0.5) ? 1 : -1);
+  const double sweep = draws.In(config.camera_sweep_deg);
+  const double sweep_deg = draws.Chance(0.5) ? sweep : -sweep;
   const std::array<double, 3> radius{draws.In(config.camera_radius_m),
                                      draws.In(config.camera_radius_m),
                                      draws.In(config.camera_radius_m)};
@@ -241,7 +243,7 @@ CameraConfig DrawCamera(Draws& draws, const RandomSceneConfig& config) {
       const auto k = static_cast<std::size_t>(i);
       CameraKey key;
       key.frame = kFirstFrame + (config.frames - 1) * i / 2;
-      key.target_W = target + Eigen::Vector3d(draws.In(-0.06, 0.06), draws.In(-0.06, 0.06), 0);
+      key.target_W = target + Eigen::Vector3d{draws.In(-0.06, 0.06), draws.In(-0.06, 0.06), 0};
       key.position_W = target + Eigen::Vector3d(radius[k] * std::cos(angle),
                                                 radius[k] * std::sin(angle), height[k]);
       spline.keys.push_back(key);

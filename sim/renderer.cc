@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sim/mujoco_guard.h"
+#include "sim/sliver_pixels.h"
 
 namespace tsdfpp {
 namespace {
@@ -204,6 +205,9 @@ Expected<RenderedImages> Renderer::Render(const Pose& T_WC, bool with_colour) {
     }
   }
   times_.convert_ms += MillisecondsSince(read);
+  const auto converted = Clock::now();
+  times_.mended_pixels = MendSliverPixels(scene_, intrinsics_, T_WC, images.depth, images.mask);
+  times_.mend_ms = MillisecondsSince(converted);
   if (with_colour) {
     cv::Mat bottom_up(intrinsics_.height, intrinsics_.width, CV_8UC3);
     TSDFPP_RETURN_IF_ERROR(Draw(colour_context_, false, bottom_up.data, nullptr));

@@ -29,6 +29,8 @@ struct RenderTimes {
   double colour_ms = 0;     // colour and shadows drawn
   double read_back_ms = 0;  // both copied from GL
   double convert_ms = 0;    // to metres, instance ids, rows top-down
+  double mend_ms = 0;       // pixels of slivers cast again (sliver_pixels.h)
+  int mended_pixels = 0;
 };
 
 // Pixel centres are integers: pixel (u, v) shows the ray ((u - cx) / fx, (v - cy) / fy, 1).
