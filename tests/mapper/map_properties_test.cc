@@ -1,5 +1,6 @@
 // What must hold of the maps whatever their values are: lists, copies, poses, threads, removals.
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 #include <tbb/global_control.h>
 
 #include <iostream>
@@ -117,6 +118,23 @@ TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
     EXPECT_GT(now.size(), 100000U);
     if (threads == 1) bytes = now;
     EXPECT_TRUE(now == bytes) << threads << " threads";
+  }
+}
+
+TEST_P(EveryMethod, InstructionSetsDoNotChangeABit) {
+  std::string bytes;
+  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
+    const std::int64_t target = left & -left;
+    hwy::SetSupportedTargetsForTest(target);
+    ASSERT_EQ(hwy::SupportedTargets(), target);
+    const auto map = MakeMap(GetParam(), ToyConfig());
+    Drive(*map, 3);
+    map->Remove(kTray);
+    const std::string now = SnapshotOf(*map, ToyIds());
+    hwy::SetSupportedTargetsForTest(0);
+    EXPECT_GT(now.size(), 100000U);
+    if (bytes.empty()) bytes = now;
+    EXPECT_TRUE(now == bytes) << hwy::TargetName(target);
   }
 }
 
