@@ -127,10 +127,22 @@ std::vector<Explanation> Explanations(std::optional<double> units_per_m) {
   return all;
 }
 
-// Frames with enough motion between them to tell: the first later one that is turned by 4 degrees
-// or moved by 5 cm, if it is not turned by more than 30 degrees. Beginnings are spread evenly.
-std::vector<std::pair<std::size_t, std::size_t>> MovedPairs(const std::vector<Pose>& T_WC) {
-  constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+struct Motion {
+  double angle = 0;  // radians
+  double distance_m = 0;
+};
+// Depth in a wrong unit agrees with itself over a short way round what is looked at; over a longer
+// one it does not. Small motion tells where frames that are far apart have little in common.
+constexpr Motion kWide{15 * kDegree, 0.3};
+constexpr Motion kNarrow{4 * kDegree, 0.05};
+constexpr std::size_t kFewestPairs = 2;
+
+// Frames with enough motion between them to tell: the first later one that is turned or moved by
+// `least`, if it is not turned by more than 30 degrees. Beginnings are spread evenly.
+std::vector<std::pair<std::size_t, std::size_t>> MovedPairs(const std::vector<Pose>& T_WC,
+                                                            const Motion& least) {
   constexpr std::size_t kPairs = 4;
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   for (std::size_t k = 0; k < kPairs; ++k) {
@@ -139,12 +151,34 @@ std::vector<std::pair<std::size_t, std::size_t>> MovedPairs(const std::vector<Po
     for (std::size_t j = i + 1; j < T_WC.size(); ++j) {
       const Pose motion = T_WC[i].inverse() * T_WC[j];
       const double angle = Eigen::AngleAxisd(motion.linear()).angle();
-      if (angle < 4 * kDegree && motion.translation().norm() < 0.05) continue;
+      if (angle < least.angle && motion.translation().norm() < least.distance_m) continue;
       if (angle < 30 * kDegree) pairs.emplace_back(i, j);
       break;
     }
   }
   return pairs;
+}
+
+// Errors: kData where the frames agree far better if something is read in another way.
+Expected<void> CheckAgreement(const std::vector<Pair>& pairs, const std::string& name,
+                              std::optional<double> units_per_m) {
+  constexpr long kFewestPixels = 500;
+  long compared = 0;
+  const double as_it_is = Agreement(pairs, AsItIs(), compared);
+  double best = 0;
+  Explanation likeliest;
+  for (const Explanation& explanation : Explanations(units_per_m)) {
+    compared = 0;
+    const double share = Agreement(pairs, explanation, compared);
+    if (compared < kFewestPixels || share <= best) continue;
+    best = share;
+    likeliest = explanation;
+  }
+  if (best < kClearShare || best < kClearRatio * as_it_is) return {};
+  return DataError(
+      "{}: the {} ({:.0f} % of the depth agrees between frames that way, {:.0f} % as "
+      "it is)",
+      name, likeliest.sentence, 100 * best, 100 * as_it_is);
 }
 
 }  // namespace
@@ -186,33 +220,20 @@ Expected<void> CheckFrames(FrameSource& source, const std::vector<Pose>& T_WC,
     const Frame* first = read(0);
     if (first != nullptr) TSDFPP_RETURN_IF_ERROR(CheckRange(*first, info.name, *units_per_m));
   }
-  std::vector<Pair> pairs;
-  for (const auto& [i, j] : MovedPairs(T_WC)) {
-    const Frame* from = read(i);
-    const Frame* to = read(j);
-    if (from == nullptr || to == nullptr) continue;
-    if (units_per_m) TSDFPP_RETURN_IF_ERROR(CheckRange(*from, info.name, *units_per_m));
-    pairs.push_back({from, to});
+  for (const Motion& least : {kWide, kNarrow}) {
+    std::vector<Pair> pairs;
+    for (const auto& [i, j] : MovedPairs(T_WC, least)) {
+      const Frame* from = read(i);
+      const Frame* to = read(j);
+      if (from == nullptr || to == nullptr) continue;
+      if (units_per_m) TSDFPP_RETURN_IF_ERROR(CheckRange(*from, info.name, *units_per_m));
+      pairs.push_back({from, to});
+    }
+    if (pairs.size() >= kFewestPairs) {
+      TSDFPP_RETURN_IF_ERROR(CheckAgreement(pairs, info.name, units_per_m));
+    }
   }
-  constexpr long kFewestPixels = 500;
-  constexpr std::size_t kFewestPairs = 2;
-  if (pairs.size() < kFewestPairs) return {};
-  long compared = 0;
-  const double as_it_is = Agreement(pairs, AsItIs(), compared);
-  double best = 0;
-  Explanation likeliest;
-  for (const Explanation& explanation : Explanations(units_per_m)) {
-    compared = 0;
-    const double share = Agreement(pairs, explanation, compared);
-    if (compared < kFewestPixels || share <= best) continue;
-    best = share;
-    likeliest = explanation;
-  }
-  if (best < kClearShare || best < kClearRatio * as_it_is) return {};
-  return DataError(
-      "{}: the {} ({:.0f} % of the depth agrees between frames that way, {:.0f} % as "
-      "it is)",
-      info.name, likeliest.sentence, 100 * best, 100 * as_it_is);
+  return {};
 }
 
 }  // namespace tsdfpp
