@@ -11,6 +11,7 @@
 #include <map>
 #include <vector>
 
+#include "bench/median.h"
 #include "core/files.h"
 #include "sequence/image_files.h"
 #include "sim/simulated_source.h"
@@ -29,12 +30,6 @@ double WallMilliseconds() {
   return std::chrono::duration<double, std::milli>(
              std::chrono::steady_clock::now().time_since_epoch())
       .count();
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The steps of one frame, milliseconds by name.

@@ -6,21 +6,12 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "bench/median.h"
 #include "bench/open3d_peer.h"
 #include "eval/open_source.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {
-namespace {
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
-
 Expected<void> RunSideBySide(const SideBySideOptions& options) {
   TSDFPP_ASSIGN(auto source, OpenSource(options.scene));
   const SequenceInfo& info = source->info();

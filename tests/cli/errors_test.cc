@@ -138,6 +138,20 @@ TEST_F(CommandErrors, Arguments) {
   ExpectError({"compare", scene_, "--out", out_, "--every", "0"}, kUsage, {"--every", "0"});
 }
 
+TEST_F(CommandErrors, WhatGenerateWouldIgnoreOrCouldNotReadAgain) {
+  ExpectError({"generate", scene_, "--out", out_, "--seed", "-1"}, 2, {"--seed", "-1"});
+  ExpectError({"generate", "--list", scene_}, 2, {"--list"});
+  ExpectError({"generate", "--list", "--page", out_}, 2, {"--list", "--page"});
+}
+
+TEST_F(CommandErrors, ASequenceIsNoPlaceForResults) {
+  const std::string sequence = Generate();
+  const std::vector<std::string> before = Below(sequence);
+  ExpectError({"map", sequence, "--out", sequence}, 2, {sequence, "is a sequence"});
+  ExpectError({"compare", sequence, "--out", sequence}, 2, {sequence, "is a sequence"});
+  EXPECT_EQ(Below(sequence), before);
+}
+
 TEST_F(CommandErrors, MissingScene) {
   for (const char* command : {"generate", "map", "compare"}) {
     ExpectError({command, folder_ / "none.toml", "--out", out_}, kUsage, {"none.toml"});
