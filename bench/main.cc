@@ -50,6 +50,9 @@ int main(int argc, char** argv) {
   rendering->add_option("--repeats", render.repeats, "Of each frame; the fastest counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  rendering->add_option("--jobs", render.jobs, "Processes side by side that the rate is of")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   const auto done =
       rendering->parsed() ? tsdfpp::RunRenderBench(render) : tsdfpp::RunSideBySide(options);
