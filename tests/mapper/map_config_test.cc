@@ -131,8 +131,8 @@ TEST(MapConfigTest, TomlFaultsNameFileAndKey) {
 }
 
 TEST(MethodTest, NamesAreThereAndBack) {
-  const std::vector<std::string> names = {"tsdf", "tsdf/min", "tsdf++", "tsdf++/literal",
-                                          "tsdf++/anchored", "volumes"};
+  const std::vector<std::string> names = {"tsdf",           "tsdf/min",        "tsdf++",
+                                          "tsdf++/literal", "tsdf++/anchored", "volumes"};
   ASSERT_EQ(AllMethods().size(), names.size());
   for (const std::string& name : names) {
     const auto method = MethodFromName(name);
