@@ -41,10 +41,10 @@ CornerRows RowsOf(const UpperNeighbours& blocks, BlockMask TsdfBlock::*mask) {
 }
 
 // Fills `crossed` and its box; false where no cube is crossed.
-bool FindCrossed(const UpperNeighbours& blocks, RayBlock& out) {
+bool FindCrossed(const UpperNeighbours& blocks, CrossedCubes& out) {
   const CornerRows negative = RowsOf(blocks, &TsdfBlock::negative);
   const CornerRows observed = RowsOf(blocks, &TsdfBlock::observed);
-  out.crossed = {};
+  out.bits = {};
   out.low = {kBlockSide, kBlockSide, kBlockSide};
   out.high = {0, 0, 0};
   std::uint32_t columns = 0;
@@ -66,7 +66,7 @@ bool FindCrossed(const UpperNeighbours& blocks, RayBlock& out) {
       const std::uint32_t row = all & any_negative & any_positive & 0xFFU;
       if (row == 0) continue;
       columns |= row;
-      out.crossed[2 * z + (y >> 2U)] |= row << (8 * (y & 3U));
+      out.bits[2 * z + (y >> 2U)] |= row << (8 * (y & 3U));
       out.low[1] = std::min(out.low[1], static_cast<std::uint8_t>(y));
       out.high[1] = std::max(out.high[1], static_cast<std::uint8_t>(y + 1));
       out.low[2] = std::min(out.low[2], static_cast<std::uint8_t>(z));
@@ -125,7 +125,7 @@ class LatticeView {
                        [&](const Eigen::Vector3d& side) { return side.dot(middle) >= -radius; });
   }
 
-  BlockFootprint FootprintOf(const RayBlock& block) const {
+  BlockFootprint FootprintOf(const Index3& block, const CrossedCubes& cubes) const {
     constexpr double kNearestCorner_m = 1e-3;
     constexpr double kMargin_pixels = 0.01;  // of rounding
     double near = 1e30;
@@ -136,11 +136,10 @@ class LatticeView {
     double v_high = -1e30;
     for (unsigned i = 0; i < 8; ++i) {
       const auto along = [&](unsigned axis, int index) {
-        return index * kBlockSide + ((i >> axis & 1U) != 0 ? block.high[axis] : block.low[axis]);
+        return index * kBlockSide + ((i >> axis & 1U) != 0 ? cubes.high[axis] : cubes.low[axis]);
       };
       const Eigen::Vector3d p_C =
-          rotation_ * Eigen::Vector3d(along(0, block.index.x), along(1, block.index.y),
-                                      along(2, block.index.z)) +
+          rotation_ * Eigen::Vector3d(along(0, block.x), along(1, block.y), along(2, block.z)) +
           translation_;
       near = std::min(near, p_C.z());
       far = std::max(far, p_C.z());
@@ -201,56 +200,57 @@ RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& 
         candidates.begin() + static_cast<std::ptrdiff_t>(first), candidates.end(),
         [](const Candidate& a, const Candidate& b) { return a.entry->index < b.entry->index; });
   }
-  // Found by runs of candidates, joined in their order.
-  struct Found {
-    std::vector<RayBlock> blocks;
-    std::vector<BlockFootprint> footprints;
+  // First the crossed cubes, then, for the blocks that have some, the distances.
+  const auto neighbours_of = [&](const Candidate& candidate) {
+    UpperNeighbours blocks{candidate.entry->block.get()};
+    for (int k = 1; k < 8; ++k) {
+      blocks[At(k)] = volumes[candidate.volume].grid->Find(candidate.entry->index +
+                                                           Index3{k & 1, (k >> 1) & 1, k >> 2});
+    }
+    return blocks;
   };
-  std::vector<Found> runs((candidates.size() + kBlocksPerTask - 1) / kBlocksPerTask);
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, runs.size(), 1),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        RayBlock block;
-        for (std::size_t r = range.begin(); r != range.end(); ++r) {
-          const std::size_t end = std::min(candidates.size(), (r + 1) * kBlocksPerTask);
-          for (std::size_t i = r * kBlocksPerTask; i < end; ++i) {
-            const auto& [number, entry] = candidates[i];
-            const RayVolume& volume = volumes[number];
-            UpperNeighbours blocks{};
-            bool any_negative = false;
-            for (int k = 0; k < 8; ++k) {
-              blocks[At(k)] =
-                  k == 0 ? entry->block.get()
-                         : volume.grid->Find(entry->index + Index3{k & 1, (k >> 1) & 1, k >> 2});
-              any_negative =
-                  any_negative || (blocks[At(k)] != nullptr && blocks[At(k)]->AnyNegative());
-            }
-            if (!any_negative || !FindCrossed(blocks, block)) continue;
-            block.index = entry->index;
-            block.volume = number;
-            const BlockFootprint footprint = views[number].FootprintOf(block);
-            if (footprint.u_high < footprint.u_low || footprint.v_high < footprint.v_low) continue;
-            const Index3 first = VoxelAt(block.index, 0);
-            block.contested =
-                contested &&
-                contested(volume, first + Index3{block.low[0], block.low[1], block.low[2]},
-                          first + Index3{block.high[0], block.high[1], block.high[2]});
-            CopyDistances(blocks, block);
-            runs[r].blocks.push_back(block);
-            runs[r].footprints.push_back(footprint);
-          }
-        }
-      },
-      tbb::simple_partitioner());
+  const auto for_each_candidate = [&](const auto& function) {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, candidates.size(), kBlocksPerTask),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
+        },
+        tbb::simple_partitioner());
+  };
+  std::vector<CrossedCubes> crossed(candidates.size());
+  std::vector<BlockFootprint> footprints(candidates.size());
+  for_each_candidate([&](std::size_t i) {
+    const UpperNeighbours blocks = neighbours_of(candidates[i]);
+    const bool any_negative = std::any_of(blocks.begin(), blocks.end(), [](const TsdfBlock* b) {
+      return b != nullptr && b->AnyNegative();
+    });
+    if (!any_negative || !FindCrossed(blocks, crossed[i])) return;
+    footprints[i] = views[candidates[i].volume].FootprintOf(candidates[i].entry->index, crossed[i]);
+  });
+  constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
   RayBlocks found;
-  std::size_t count = 0;
-  for (const Found& run : runs) count += run.blocks.size();
-  found.blocks.reserve(count);
-  found.footprints.reserve(count);
-  for (const Found& run : runs) {
-    found.blocks.insert(found.blocks.end(), run.blocks.begin(), run.blocks.end());
-    found.footprints.insert(found.footprints.end(), run.footprints.begin(), run.footprints.end());
+  std::vector<std::uint32_t> number(candidates.size(), kOutOfView);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const BlockFootprint& footprint = footprints[i];
+    if (footprint.u_high < footprint.u_low || footprint.v_high < footprint.v_low) continue;
+    number[i] = static_cast<std::uint32_t>(found.footprints.size());
+    found.footprints.push_back(footprint);
   }
+  found.blocks = std::make_unique_for_overwrite<RayBlock[]>(found.footprints.size());
+  for_each_candidate([&](std::size_t i) {
+    if (number[i] == kOutOfView) return;
+    const auto& [volume, entry] = candidates[i];
+    RayBlock& block = found.blocks[number[i]];
+    block.index = entry->index;
+    block.volume = volume;
+    block.cubes = crossed[i];
+    const Index3 first = VoxelAt(block.index, 0);
+    const auto& [low, high, bits] = block.cubes;
+    block.contested =
+        contested && contested(volumes[volume], first + Index3{low[0], low[1], low[2]},
+                               first + Index3{high[0], high[1], high[2]});
+    CopyDistances(neighbours_of(candidates[i]), block);
+  });
   return found;
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "mapper/tsdf_block.h"
@@ -22,13 +23,17 @@ struct RayVolume {
 // Corners along an axis of a block's cubes.
 inline constexpr int kCorners = kBlockSide + 1;
 
+struct CrossedCubes {
+  std::array<std::uint8_t, 3> low{};     // the box that holds them, x, y, z
+  std::array<std::uint8_t, 3> high{};    // one above
+  std::array<std::uint32_t, 16> bits{};  // 64 z + 8 y + x: the cube named by that voxel is crossed
+};
+
 struct RayBlock {
   Index3 index;
   std::uint32_t volume = 0;  // its number among the volumes
   bool contested = false;    // whether a surface here may be hidden by what another object claims
-  std::array<std::uint8_t, 3> low{};        // the box of the crossed cubes, x, y, z
-  std::array<std::uint8_t, 3> high{};       // one above
-  std::array<std::uint32_t, 16> crossed{};  // bit 64 z + 8 y + x: the cube of that voxel is crossed
+  CrossedCubes cubes;
   std::array<float, kCorners * kCorners * kCorners> distance;  // metres, [z][y][x]
 };
 
@@ -48,7 +53,10 @@ struct RayCamera {
 };
 
 struct RayBlocks {
-  std::vector<RayBlock> blocks;  // by volume, then in the order of its grid's index
+  std::size_t size() const { return footprints.size(); }
+  const RayBlock& operator[](std::size_t i) const { return blocks[i]; }
+
+  std::unique_ptr<RayBlock[]> blocks;  // by volume, then in the order of its grid's index
   std::vector<BlockFootprint> footprints;
 };
 

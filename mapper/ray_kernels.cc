@@ -56,8 +56,19 @@ struct Axis {
   VF last;
 };
 
-bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
-          const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
+// Of a block's sixteen words the one that each lane names: they fit into the widest registers.
+VI WordsAt(const std::int32_t* words, VI index) {
+  const DI di;
+#if HWY_MAX_BYTES >= 64 && HWY_TARGET != HWY_SCALAR
+  if (hn::Lanes(di) == 16) {
+    return hn::TableLookupLanes(hn::LoadU(di, words), hn::IndicesFromVec(di, index));
+  }
+#endif
+  return hn::GatherIndex(di, words, index);
+}
+
+float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
+           const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
   const DF df;
   const DI di;
   const VF zero = hn::Zero(df);
@@ -69,9 +80,9 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
   const std::array<int, 3> first{block.index.x * kBlockSide, block.index.y * kBlockSide,
                                  block.index.z * kBlockSide};
   for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<float>(lattice.origin[a] - first[a]);
-  const auto* words = reinterpret_cast<const std::int32_t*>(block.crossed.data());
+  const auto* words = reinterpret_cast<const std::int32_t*>(block.cubes.bits.data());
   const float* distance = block.distance.data();
-  bool any_taken = false;
+  VF farthest = zero;
 
   for (std::size_t i = 0; i < kTilePixels; i += hn::Lanes(df)) {
     const VF best = hn::LoadU(df, hits.depth.data() + i);
@@ -84,8 +95,8 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
       axis.origin = hn::Set(df, origin[a]);
       axis.direction = hn::LoadU(df, rays.direction[a].data() + i);
       axis.inverse = hn::LoadU(df, rays.inverse[a].data() + i);
-      const VF low = hn::Mul(hn::Sub(hn::Set(df, block.low[a]), axis.origin), axis.inverse);
-      const VF high = hn::Mul(hn::Sub(hn::Set(df, block.high[a]), axis.origin), axis.inverse);
+      const VF low = hn::Mul(hn::Sub(hn::Set(df, block.cubes.low[a]), axis.origin), axis.inverse);
+      const VF high = hn::Mul(hn::Sub(hn::Set(df, block.cubes.high[a]), axis.origin), axis.inverse);
       t = hn::Max(t, hn::Min(low, high));
       end = hn::Min(end, hn::Max(low, high));
     };
@@ -93,10 +104,13 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
     enter(y, 1);
     enter(z, 2);
     MF active = hn::Lt(t, end);
-    if (hn::AllFalse(df, active)) continue;
+    if (hn::AllFalse(df, active)) {
+      farthest = hn::Max(farthest, best);
+      continue;
+    }
     const auto begin = [&](Axis& axis, std::size_t a) {
-      axis.low = hn::Set(df, block.low[a]);
-      axis.last = hn::Set(df, static_cast<float>(block.high[a]) - 1.0F);
+      axis.low = hn::Set(df, block.cubes.low[a]);
+      axis.last = hn::Set(df, static_cast<float>(block.cubes.high[a]) - 1.0F);
       const VF at = hn::Add(axis.origin, hn::Mul(axis.direction, hn::IfThenElse(active, t, zero)));
       const VF inside = hn::Min(hn::Max(at, axis.low), axis.last);
       axis.cell = hn::ConvertTo(df, hn::ConvertTo(di, inside));
@@ -118,7 +132,7 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
       const VI place = hn::ConvertTo(di, hn::Add(hn::Add(hn::Mul(z.cell, hn::Set(df, 64.0F)),
                                                          hn::Mul(y.cell, hn::Set(df, 8.0F))),
                                                  x.cell));
-      const VI word = hn::GatherIndex(di, words, hn::ShiftRight<5>(place));
+      const VI word = WordsAt(words, hn::ShiftRight<5>(place));
       const VI bit = hn::And(hn::Shr(word, hn::And(place, hn::Set(di, 31))), hn::Set(di, 1));
       const MF crossed = hn::And(active, hn::RebindMask(df, hn::Ne(bit, hn::Zero(di))));
       const MF moving = hn::AndNot(crossed, active);
@@ -208,7 +222,7 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
           };
           // Newton's steps where they stay between what is known to be outside and inside.
           VF s = chord();
-          for (int round = 0; round < 2; ++round) {
+          for (int round = 0; round < 1; ++round) {
             const VF g = value(s);
             const MF in = hn::Lt(g, zero);
             high = hn::IfThenElse(in, s, high);
@@ -233,7 +247,6 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
               hn::Sqrt(hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz)));
           const VF scale = hn::Div(one, hn::Max(norm, hn::Set(df, 1e-20F)));
           const MF taken = hn::And(hit, hn::Lt(depth, hn::LoadU(df, hits.depth.data() + i)));
-          any_taken = any_taken || !hn::AllFalse(df, taken);
           const auto keep = [&](VF now, float* stored) {
             hn::StoreU(hn::IfThenElse(taken, now, hn::LoadU(df, stored)), df, stored);
           };
@@ -264,8 +277,9 @@ bool Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice
       t = hn::IfThenElse(stepping, hn::Max(t, leave), t);
       active = hn::AndNot(hn::And(stepping, hn::Ge(t, end)), active);
     }
+    farthest = hn::Max(farthest, hn::LoadU(df, hits.depth.data() + i));
   }
-  return any_taken;
+  return hn::GetLane(hn::MaxOfLanes(df, farthest));
 }
 
 }  // namespace
@@ -288,6 +302,7 @@ TileOrder::TileOrder() {
     }
     x[i] = static_cast<std::uint8_t>(column);
     y[i] = static_cast<std::uint8_t>(row);
+    place[kTileSide * row + column] = static_cast<std::uint8_t>(i);
   }
 }
 
@@ -300,8 +315,8 @@ void FillTileRays(const LatticeRays& lattice, int u, int v, TileRays& rays) {
   HWY_DYNAMIC_DISPATCH(FillRays)(lattice, u, v, rays);
 }
 
-bool CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
-                      const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
+float CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
+                       const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
   return HWY_DYNAMIC_DISPATCH(Cast)(block, number, lattice, rays, voxel, from, hits);
 }
 

@@ -19,6 +19,7 @@ struct TileOrder {
   TileOrder();
   std::array<std::uint8_t, kTilePixels> x{};
   std::array<std::uint8_t, kTilePixels> y{};
+  std::array<std::uint8_t, kTilePixels> place{};  // i of column x and row y, at 16 y + x
 };
 const TileOrder& OrderOfTile();
 
@@ -50,9 +51,9 @@ struct TileHits {
 
 // Casts the tile's rays through the block's crossed cubes: where a ray passes from outside to
 // inside at a depth of at least `from` and less than what it has met so far, that is its first such
-// point in this block, and `hits` takes it. `number` is the block's. False where `hits` is as
-// before.
-bool CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
-                      const TileRays& rays, float voxel, const TileValues& from, TileHits& hits);
+// point in this block, and `hits` takes it. `number` is the block's. Returns the largest
+// depth in `hits`.
+float CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
+                       const TileRays& rays, float voxel, const TileValues& from, TileHits& hits);
 
 }  // namespace tsdfpp

@@ -64,7 +64,7 @@ TileLists ListTiles(const RayBlocks& blocks, const Intrinsics& camera) {
     }
   };
   // In the order of depth, so that each tile's list is.
-  std::vector<std::uint64_t> order(blocks.blocks.size());
+  std::vector<std::uint64_t> order(blocks.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     const BlockFootprint& footprint = blocks.footprints[i];
     order[i] =
@@ -84,12 +84,7 @@ TileLists ListTiles(const RayBlocks& blocks, const Intrinsics& camera) {
   return lists;
 }
 
-// Positive floats are ordered as their bits.
-float Farthest(const TileValues& depth) {
-  std::int32_t farthest = 0;
-  for (const float d : depth) farthest = std::max(farthest, std::bit_cast<std::int32_t>(d));
-  return std::bit_cast<float>(farthest);
-}
+float Farthest(const TileValues& depth) { return *std::max_element(depth.begin(), depth.end()); }
 
 class Caster {
  public:
@@ -108,6 +103,9 @@ class Caster {
         lattices_.push_back(RaysIn(volume, camera_, pass.voxel_m));
       }
       lattice_of_.push_back(share ? world_ : static_cast<int>(lattices_.size()) - 1);
+    }
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      id_of_block_.push_back(pass.volumes[blocks_[i].volume].id);
     }
     world_rays_ = RaysIn({}, camera_, 1.0);
     for (int k = 0; k < options.surfaces; ++k) {
@@ -130,6 +128,7 @@ class Caster {
   RayBlocks blocks_;
   TileLists tiles_;
   int world_ = -1;
+  std::vector<InstanceId> id_of_block_;
   std::vector<LatticeRays> lattices_;
   std::vector<int> lattice_of_;  // of each volume
   LatticeRays world_rays_;       // in metres
@@ -166,6 +165,7 @@ class Caster::Tile {
  private:
   void Reset(TileHits& hits) const {
     hits.depth.fill(kInfinite);
+    for (TileValues& component : hits.normal) component.fill(0);
     hits.block.fill(-1);
   }
 
@@ -177,15 +177,15 @@ class Caster::Tile {
     return rays_[At(lattice)];
   }
 
-  bool Through(std::uint32_t number, const TileValues& from, TileHits& hits) {
-    const RayBlock& block = c_.blocks_.blocks[number];
+  float Through(std::uint32_t number, const TileValues& from, TileHits& hits) {
+    const RayBlock& block = c_.blocks_[number];
     const int lattice = c_.lattice_of_[block.volume];
     return CastThroughBlock(block, static_cast<std::int32_t>(number), c_.lattices_[At(lattice)],
                             RaysOf(lattice), voxel_, from, hits);
   }
 
   InstanceId IdOf(const TileHits& hits, std::size_t i) const {
-    return c_.pass_.volumes[c_.blocks_.blocks[static_cast<std::size_t>(hits.block[i])].volume].id;
+    return c_.id_of_block_[static_cast<std::size_t>(hits.block[i])];
   }
 
   // Pixel i's point at a depth, in the world, metres.
@@ -214,7 +214,7 @@ class Caster::Tile {
     float farthest = Farthest(hits.depth);
     for (const std::uint32_t number : list) {
       if (c_.blocks_.footprints[number].near_m >= farthest) break;
-      const RayBlock& block = c_.blocks_.blocks[number];
+      const RayBlock& block = c_.blocks_[number];
       const TileValues* from = &from_;
       if (k > 0) {
         const InstanceId id = c_.pass_.volumes[block.volume].id;
@@ -230,20 +230,18 @@ class Caster::Tile {
         if (!any) continue;
         from = &from_left_;
       }
-      const bool taken =
+      farthest =
           block.contested ? ThroughContested(number, *from, k, hits) : Through(number, *from, hits);
-      if (taken) farthest = Farthest(hits.depth);
     }
   }
 
   // Surfaces that are hidden are passed through.
-  bool ThroughContested(std::uint32_t number, const TileValues& from, std::size_t k,
-                        TileHits& hits) {
+  float ThroughContested(std::uint32_t number, const TileValues& from, std::size_t k,
+                         TileHits& hits) {
     const float past = 0.05F * voxel_;  // goes on behind a hidden surface
-    const InstanceId id = c_.pass_.volumes[c_.blocks_.blocks[number].volume].id;
+    const InstanceId id = c_.pass_.volumes[c_.blocks_[number].volume].id;
     trial_.depth = hits.depth;
-    if (!Through(number, from, trial_)) return false;
-    bool taken = false;
+    Through(number, from, trial_);
     for (bool again = true; again;) {
       again = false;
       trial_from_.fill(kInfinite);
@@ -259,14 +257,13 @@ class Caster::Tile {
           again = true;
           continue;
         }
-        taken = true;
         hits.depth[i] = depth;
         hits.block[i] = static_cast<std::int32_t>(number);
         for (std::size_t a = 0; a < 3; ++a) hits.normal[a][i] = trial_.normal[a][i];
       }
-      if (again) again = Through(number, trial_from_, trial_);
+      if (again) Through(number, trial_from_, trial_);
     }
-    return taken;
+    return Farthest(hits.depth);
   }
 
   void CastEachAlone(std::span<const std::uint32_t> list) {
@@ -276,11 +273,10 @@ class Caster::Tile {
       float farthest = kInfinite;
       bool any = false;
       for (const std::uint32_t number : list) {
-        if (c_.blocks_.blocks[number].volume != volume) continue;
+        if (c_.blocks_[number].volume != volume) continue;
         if (c_.blocks_.footprints[number].near_m >= farthest) break;
-        if (!Through(number, from_, trial_)) continue;
         any = true;
-        farthest = Farthest(trial_.depth);
+        farthest = Through(number, from_, trial_);
       }
       if (any) Compete();
     }
@@ -302,7 +298,7 @@ class Caster::Tile {
 
   // The mean over the corners with a colour, weighted by the trilinear coefficients.
   Colour ColourOf(std::size_t i, const TileHits& hits) {
-    const std::uint32_t volume = c_.blocks_.blocks[static_cast<std::size_t>(hits.block[i])].volume;
+    const std::uint32_t volume = c_.blocks_[static_cast<std::size_t>(hits.block[i])].volume;
     const int lattice = c_.lattice_of_[volume];
     const TileRays& rays = RaysOf(lattice);
     Eigen::Vector3d q;
@@ -339,22 +335,42 @@ class Caster::Tile {
     const TileHits& hits = surfaces_[k];
     RaySurface& out = c_.surfaces_[k];
     const Intrinsics& camera = c_.camera_.intrinsics;
-    for (std::size_t i = 0; i < kTilePixels; ++i) {
-      const int u = u_ + order.x[i];
-      const int v = v_ + order.y[i];
-      if (u >= camera.width || v >= camera.height) continue;
-      const bool hit = hits.block[i] >= 0;
-      out.depth.ptr<float>(v)[u] = hit ? hits.depth[i] : 0;
-      float* normal = out.normal.ptr<float>(v) + 3 * u;
-      for (std::size_t a = 0; a < 3; ++a) normal[a] = hit ? hits.normal[a][i] : 0;
-      InstanceId id = kNoInstance;
-      if (hit) {
-        id = c_.pass_.label ? c_.pass_.label(PointAt(i, hits.depth[i])) : IdOf(hits, i);
+    const int columns = std::min(kTileSide, camera.width - u_);
+    const int rows = std::min(kTileSide, camera.height - v_);
+    for (int y = 0; y < rows; ++y) {
+      float* depth = out.depth.ptr<float>(v_ + y) + u_;
+      float* normal = out.normal.ptr<float>(v_ + y) + 3 * u_;
+      std::uint16_t* id = out.id.ptr<std::uint16_t>(v_ + y) + u_;
+      for (int x = 0; x < columns; ++x) {
+        const std::size_t i = order.place[At(kTileSide * y + x)];
+        const bool hit = hits.block[i] >= 0;
+        *depth++ = hit ? hits.depth[i] : 0;
+        for (const TileValues& component : hits.normal) *normal++ = component[i];
+        *id++ = hit ? IdOf(hits, i) : kNoInstance;
       }
-      out.id.ptr<std::uint16_t>(v)[u] = id;
-      if (!c_.options_.colour) continue;
-      const Colour colour = hit ? ColourOf(i, hits) : Colour{};
-      std::copy(colour.begin(), colour.end(), out.colour.ptr<std::uint8_t>(v) + 3 * u);
+    }
+    if (c_.pass_.label) WriteLabels(hits, columns, rows, out.id);
+    if (c_.options_.colour) WriteColours(hits, columns, rows, out.colour);
+  }
+
+  void WriteLabels(const TileHits& hits, int columns, int rows, cv::Mat& ids) const {
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < columns; ++x) {
+        const std::size_t i = OrderOfTile().place[At(kTileSide * y + x)];
+        if (hits.block[i] < 0) continue;
+        ids.ptr<std::uint16_t>(v_ + y)[u_ + x] = c_.pass_.label(PointAt(i, hits.depth[i]));
+      }
+    }
+  }
+
+  void WriteColours(const TileHits& hits, int columns, int rows, cv::Mat& colours) {
+    for (int y = 0; y < rows; ++y) {
+      std::uint8_t* out = colours.ptr<std::uint8_t>(v_ + y) + 3 * u_;
+      for (int x = 0; x < columns; ++x) {
+        const std::size_t i = OrderOfTile().place[At(kTileSide * y + x)];
+        const Colour colour = hits.block[i] >= 0 ? ColourOf(i, hits) : Colour{};
+        for (const std::uint8_t level : colour) *out++ = level;
+      }
     }
   }
 
