@@ -1,4 +1,5 @@
-// tsdfpp_bench side-by-side | render [options], or Google Benchmark's own options for the kernels.
+// tsdfpp_bench side-by-side | rays | render [options], or Google Benchmark's own options for the
+// kernels.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <string_view>
 #include <thread>
 
+#include "bench/rays.h"
 #include "bench/render.h"
 #include "bench/side_by_side.h"
 
@@ -22,7 +24,7 @@ int main(int argc, char** argv) {
     execv("/proc/self/exe", argv);
   }
   const std::string_view word = argc < 2 ? "" : argv[1];
-  if (word != "side-by-side" && word != "render") {
+  if (word != "side-by-side" && word != "render" && word != "rays") {
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();
@@ -53,9 +55,30 @@ int main(int argc, char** argv) {
   rendering->add_option("--jobs", render.jobs, "Processes side by side that the rate is of")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  tsdfpp::RaysBenchOptions rays;
+  CLI::App* casting = app.add_subcommand(
+      "rays", "Ray casting beside Open3D's VoxelBlockGrid, and what more ids cost");
+  casting->add_option("--scene", rays.scene, "Scene or sequence")->capture_default_str();
+  casting->add_option("--profile", rays.profile, "paper or close")->capture_default_str();
+  casting->add_option("--frames", rays.frames, "Frames from the first on")
+      ->check(CLI::Range(8, 1000))
+      ->capture_default_str();
+  casting->add_option("--every", rays.every, "Frames between casts")
+      ->check(CLI::Range(1, 8))
+      ->capture_default_str();
+  casting->add_option("--repeats", rays.repeats, "Of each cast; the fastest counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  casting->add_option("--threads", rays.threads, "Threads")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  casting->add_option("--limit", rays.limit_s, "Seconds that Open3D's process may take")
+      ->check(CLI::Range(1.0, 1e5))
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const auto done =
-      rendering->parsed() ? tsdfpp::RunRenderBench(render) : tsdfpp::RunSideBySide(options);
+  const auto done = rendering->parsed() ? tsdfpp::RunRenderBench(render)
+                    : casting->parsed() ? tsdfpp::RunRaysBench(rays)
+                                        : tsdfpp::RunSideBySide(options);
   if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());
     return static_cast<int>(done.error().kind);

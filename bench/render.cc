@@ -4,13 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <map>
 #include <vector>
 
+#include "bench/clocks.h"
 #include "bench/median.h"
 #include "core/files.h"
 #include "eval/workers.h"
@@ -19,19 +18,6 @@
 
 namespace tsdfpp {
 namespace {
-
-// All threads of the process: what a frame costs, whoever else uses the machine.
-double CpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-double WallMilliseconds() {
-  return std::chrono::duration<double, std::milli>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 // The steps of one frame, milliseconds by name.
 using Steps = std::map<std::string, double>;

@@ -62,7 +62,7 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
   app.add_option("--out", options->out, "Output folder")->required();
   app.add_option("--methods", options->methods,
                  "Maps to compare, by commas: tsdf, tsdf/min, tsdf++, tsdf++/literal, "
-                 "tsdf++/anchored")
+                 "tsdf++/anchored, volumes")
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();

@@ -106,7 +106,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--method", options->method,
-                 "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored")
+                 "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored, volumes")
       ->capture_default_str();
   app.add_option("--segmentation", options->segmentation, "Where masks come from")
       ->check(CLI::IsMember({"gt"}))

@@ -226,6 +226,16 @@ TriangleMesh AnchoredMap::SceneMesh() const {
   return LayeredMap::SceneMesh();
 }
 
+std::vector<RaySurface> AnchoredMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                              const RayCastOptions& options) const {
+  RefreshIndex();
+  if (options.surfaces <= layers_) return LayeredMap::CastRays(camera, T_WC, options);
+  // Beyond K objects the lists do not say who comes next.
+  RayCastOptions listed = options;
+  listed.surfaces = layers_;
+  return CastByRemoval(*this, LayeredMap::CastRays(camera, T_WC, listed), camera, T_WC, options);
+}
+
 std::vector<Listing> AnchoredMap::ListAt(const Eigen::Vector3i& voxel) const {
   RefreshIndex();
   std::vector<Listing> listings;

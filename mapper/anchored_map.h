@@ -18,6 +18,8 @@ class AnchoredMap final : public LayeredMap {
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
   TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
 
  protected:
   InstanceId ActiveAt(const Index3& voxel) const override;

@@ -12,6 +12,8 @@ class LayeredMap : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
 

@@ -8,6 +8,7 @@
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
+#include "mapper/ray_pass.h"
 
 namespace tsdfpp {
 namespace {
@@ -151,7 +152,7 @@ TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
                                   : ExtractMesh(volume->second.grid, config_.voxel());
 }
 
-TriangleMesh LiteralMap::SceneMesh() const {
+TsdfGrid LiteralMap::ActiveField() const {
   TsdfGrid field;
   for (const auto* entry : lists_.Sorted()) {
     auto block = std::make_unique<TsdfBlock>();
@@ -168,14 +169,34 @@ TriangleMesh LiteralMap::SceneMesh() const {
     block->UpdateMasks(config_.back());
     field.Add(entry->index, std::move(block));
   }
-  TriangleMesh mesh = ExtractMesh(field, config_.voxel());
+  return field;
+}
+
+InstanceId LiteralMap::ActiveNear(const Eigen::Vector3f& point) const {
+  const Index3 v = NearestVoxel(point, config_.voxel());
+  const ListBlock* lists = lists_.Find(BlockOf(v));
+  const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
+  return id == kNoInstance ? kBackground : id;
+}
+
+std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                             const RayCastOptions& options) const {
+  const TsdfGrid field = ActiveField();
+  RayPass pass;
+  pass.voxel_m = config_.voxel_m;
+  pass.volumes.push_back({kBackground, &field, Pose::Identity(), true});
+  pass.label = [&](const Eigen::Vector3f& point_W) { return ActiveNear(point_W); };
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
+}
+
+TriangleMesh LiteralMap::SceneMesh() const {
+  TriangleMesh mesh = ExtractMesh(ActiveField(), config_.voxel());
   mesh.face_ids.reserve(mesh.triangles.size());
   for (const auto& t : mesh.triangles) {
-    const Index3 v = NearestVoxel(
-        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F, config_.voxel());
-    const ListBlock* lists = lists_.Find(BlockOf(v));
-    const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
-    mesh.face_ids.push_back(id == kNoInstance ? kBackground : id);
+    mesh.face_ids.push_back(
+        ActiveNear((mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F));
   }
   return mesh;
 }

@@ -19,6 +19,8 @@ class LiteralMap final : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
@@ -43,6 +45,10 @@ class LiteralMap final : public MapRepresentation {
   void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
   void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
   void Unlist(InstanceId id);
+  // What the active objects say at each voxel.
+  TsdfGrid ActiveField() const;
+  // The active object of the voxel nearest to a point (metres), the background where there is none.
+  InstanceId ActiveNear(const Eigen::Vector3f& point) const;
 
   MapConfig config_;
   ObjectVolumes volumes_;

@@ -8,6 +8,7 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/ray_cast.h"
 
 namespace tsdfpp {
 
@@ -60,6 +61,11 @@ class MapRepresentation {
 
   // The visible scene: coloured, with face_ids.
   virtual TriangleMesh SceneMesh() const = 0;
+
+  // The map seen from a pose: options.surfaces images, the visible scene first. The n-th surface
+  // along a ray is the first one of the map without the objects of the n - 1 before it.
+  virtual std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                           const RayCastOptions& options) const = 0;
 
   // The object's voxel at an index of its lattice; nothing where it is unobserved. One field: the
   // voxel if it is labelled so.

@@ -11,6 +11,7 @@
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
+#include "mapper/ray_pass.h"
 
 namespace tsdfpp {
 namespace {
@@ -205,12 +206,27 @@ TriangleMesh SingleFieldMap::SceneMesh() const {
   for (const auto& t : mesh.triangles) {
     const Eigen::Vector3f centroid =
         (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F;
-    const Index3 v = NearestVoxel(centroid, config_.voxel());
-    const LabelBlock* labels = labels_.Find(BlockOf(v));
-    const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
-    mesh.face_ids.push_back(id == kNoInstance ? kBackground : id);
+    mesh.face_ids.push_back(LabelNear(centroid));
   }
   return mesh;
+}
+
+std::vector<RaySurface> SingleFieldMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                                 const RayCastOptions& options) const {
+  RayPass pass;
+  pass.voxel_m = config_.voxel_m;
+  pass.volumes.push_back({kBackground, &field_, Pose::Identity(), true});
+  pass.label = [&](const Eigen::Vector3f& point_W) { return LabelNear(point_W); };
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
+}
+
+InstanceId SingleFieldMap::LabelNear(const Eigen::Vector3f& point) const {
+  const Index3 v = NearestVoxel(point, config_.voxel());
+  const LabelBlock* labels = labels_.Find(BlockOf(v));
+  const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
+  return id == kNoInstance ? kBackground : id;
 }
 
 TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {

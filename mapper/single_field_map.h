@@ -23,6 +23,8 @@ class SingleFieldMap final : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
@@ -45,6 +47,8 @@ class SingleFieldMap final : public MapRepresentation {
   void FuseBlock(const FrameView& frame, const BlockObservation& observation, TsdfBlock& block,
                  LabelBlock& labels) const;
   void Vacate(InstanceId id);
+  // The label of the voxel nearest to a point (metres), the background's where it has none.
+  InstanceId LabelNear(const Eigen::Vector3f& point) const;
   template <typename Function>
   void ForEachVoxel(const Function& function) const;
 

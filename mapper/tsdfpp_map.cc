@@ -201,6 +201,15 @@ InstanceId TsdfppMap::ActiveAt(const Index3& voxel) const {
   return (*lists)[static_cast<std::size_t>(PlaceInBlock(voxel) * layers_)].id;
 }
 
+std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                            const RayCastOptions& options) const {
+  if (!config_.relist_on_removal) return LayeredMap::CastRays(camera, T_WC, options);
+  // A removal lists objects that the lists do not know of.
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(*this, LayeredMap::CastRays(camera, T_WC, first), camera, T_WC, options);
+}
+
 std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
   std::vector<Listing> listings;
   const ListBlock* lists = index_.Find(BlockOf(ToIndex3(voxel)));

@@ -45,7 +45,7 @@ std::string MethodTestName(const ::testing::TestParamInfo<Method>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Methods, ObjectMeshTest,
                          ::testing::Values(Method::kTsdfpp, Method::kTsdfppAnchored,
-                                           Method::kTsdfppLiteral),
+                                           Method::kTsdfppLiteral, Method::kVolumes),
                          MethodTestName);
 INSTANTIATE_TEST_SUITE_P(Methods, EveryMesh, ::testing::ValuesIn(AllMethods()), MethodTestName);
 

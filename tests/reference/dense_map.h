@@ -64,7 +64,7 @@ std::unique_ptr<DenseMap> MakeDenseMap(Method method, const MapConfig& config, c
 std::unique_ptr<DenseMap> MakeDenseTsdf(const MapConfig& config, const Box& box, bool keep_minimum);
 std::unique_ptr<DenseMap> MakeDenseTsdfpp(const MapConfig& config, const Box& box);
 std::unique_ptr<DenseMap> MakeDenseLiteral(const MapConfig& config, const Box& box);
-std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box);
+std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box, int layers);
 
 // A voxel as the interface gives it.
 std::optional<VoxelValue> AsValue(const DenseVoxel& voxel);
