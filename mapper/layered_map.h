@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/scene_parts.h"
 #include "mapper/volume_fusion.h"
 
 namespace tsdfpp {
@@ -12,6 +13,7 @@ class LayeredMap : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
 
@@ -33,6 +35,12 @@ class LayeredMap : public MapRepresentation {
 
   MapConfig config_;
   ObjectVolumes volumes_;
+
+ private:
+  MeshWork UpdateObjectMesh(InstanceId id) const;
+  void FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const;
+
+  mutable std::map<InstanceId, PlacedMesh> meshes_;
 };
 
 // The observed voxels of a grid, sorted by (z, y, x).
