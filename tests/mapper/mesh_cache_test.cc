@@ -113,7 +113,7 @@ TEST(MeshCache, FollowsAnyChangeOfAGrid) {
   Dice dice(3);
   TsdfGrid grid = RandomGrid(dice, 20, true);
   GridMesh cache;
-  for (int step = 0; step < 60; ++step) {
+  for (int step = 0; step < 300; ++step) {
     const int changes = 1 + dice.Whole(3);
     for (int i = 0; i < changes; ++i) {
       const int what = dice.Whole(5);
@@ -121,12 +121,17 @@ TEST(MeshCache, FollowsAnyChangeOfAGrid) {
       TsdfBlock& some =
           *entries[static_cast<std::size_t>(dice.Whole(static_cast<int>(entries.size())))].block;
       if (what == 0) {
-        FillAtRandom(grid.FindOrAdd(RandomBlock(dice)), dice, dice.Whole(2) == 0);
+        for (int k = 0; k < 3; ++k) {
+          FillAtRandom(grid.FindOrAdd(RandomBlock(dice)), dice, dice.Whole(2) == 0);
+        }
       } else if (what == 1) {  // values, but no sign
         for (float& distance : some.distance) distance *= 0.9F;
         some.UpdateMasks(kBack_m);
       } else if (what == 2) {  // a single voxel
-        const int place = dice.Whole(kBlockVoxels);
+        // Most of them at a corner of the block, which seven others read.
+        const bool corner = dice.Whole(3) > 0;
+        const int place = corner ? 7 * dice.Whole(2) + 56 * dice.Whole(2) + 448 * dice.Whole(2)
+                                 : dice.Whole(kBlockVoxels);
         if (dice.Whole(2) == 0) {
           some.Clear(place);
         } else {
@@ -237,6 +242,27 @@ TEST_P(KeptMeshes, AreThoseFromScratchAfterAnyEvents) {
     }
     EXPECT_GT(map->SceneMesh().triangles.size(), 100U);
   }
+}
+
+// The ball is born far from the table and moved into it, where half of it is hidden.
+TEST(HiddenTriangles, AreThoseOfWhereAnObjectStandsNow) {
+  Scene scene = TableOnly();
+  const Eigen::Vector3d birthplace(3.1, -2.2, 1.3);
+  AddBall(scene, birthplace);
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  for (const Eigen::Vector3d& target : {Eigen::Vector3d::Zero().eval(), birthplace}) {
+    const Frame frame = reference::Render(
+        scene, reference::LookAt(target + Eigen::Vector3d(0.3, 0.1, 0.45), target));
+    for (const auto& [id, T_WO] : frame.T_WO) map->SetObjectPose(id, T_WO);
+    map->Fuse(frame, frame.mask);
+  }
+  map->SetObjectPose(kBall, MakePose(0.4, {0, 0.3, 1}, {0.02, 0.01, kTableTop_m - 0.03}));
+  const std::size_t shown = map->SceneMesh().triangles.size();
+  EXPECT_LT(shown, AllObjectsMesh(*map).triangles.size()) << "nothing is hidden";
+  EXPECT_TRUE(TrianglesOf(map->SceneMesh()) == VisibleTriangles(*map));
+  map->SetObjectPose(kBall, scene.T_WO.at(kBall));
+  EXPECT_GT(map->SceneMesh().triangles.size(), shown);
+  EXPECT_TRUE(TrianglesOf(map->SceneMesh()) == VisibleTriangles(*map));
 }
 
 TEST_P(KeptMeshes, AreCountedAndNotCopied) {
