@@ -181,6 +181,12 @@ TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
   EXPECT_EQ(sign.changed, 1U);
   EXPECT_LE(sign.remade, 27U);
   EXPECT_GE(sign.remade, 8U);
+  EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kVoxel_m)));
+
+  middle.Clear(0);
+  middle.UpdateMasks(kBack_m);
+  cache.Update(grid, kVoxel_m);
+  EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kVoxel_m)));
 }
 
 // All meshes of a map against those of a copy, which starts without kept meshes.
