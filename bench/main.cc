@@ -1,4 +1,5 @@
-// tsdfpp_bench side-by-side | render [options], or Google Benchmark's own options for the kernels.
+// tsdfpp_bench side-by-side | render | mesh [options], or Google Benchmark's own options for the
+// kernels.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <string_view>
 #include <thread>
 
+#include "bench/mesh.h"
 #include "bench/render.h"
 #include "bench/side_by_side.h"
 
@@ -22,7 +24,7 @@ int main(int argc, char** argv) {
     execv("/proc/self/exe", argv);
   }
   const std::string_view word = argc < 2 ? "" : argv[1];
-  if (word != "side-by-side" && word != "render") {
+  if (word != "side-by-side" && word != "render" && word != "mesh" && word != "voxel-block-grid") {
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();
@@ -50,9 +52,25 @@ int main(int argc, char** argv) {
   rendering->add_option("--repeats", render.repeats, "Of each frame; the fastest counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  tsdfpp::MeshBenchOptions mesh;
+  CLI::App* meshing = app.add_subcommand("mesh", "Meshing and memory beside Open3D's two volumes");
+  CLI::App* grid = app.add_subcommand("voxel-block-grid", "What mesh runs in a process of its own");
+  for (CLI::App* command : {meshing, grid}) {
+    command->add_option("--scene", mesh.scene, "Scene or sequence")->capture_default_str();
+    command->add_option("--profile", mesh.profile, "paper or close")->capture_default_str();
+    command->add_option("--voxel", mesh.voxel_m, "Voxel size, metres")->capture_default_str();
+    command->add_option("--frames", mesh.frames, "Frames from the first on")
+        ->check(CLI::Range(16, 100000))
+        ->capture_default_str();
+    command->add_option("--threads", mesh.threads, "Number of threads")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+  }
   CLI11_PARSE(app, argc, argv);
-  const auto done =
-      rendering->parsed() ? tsdfpp::RunRenderBench(render) : tsdfpp::RunSideBySide(options);
+  const auto done = rendering->parsed() ? tsdfpp::RunRenderBench(render)
+                    : meshing->parsed() ? tsdfpp::RunMeshBench(mesh)
+                    : grid->parsed()    ? tsdfpp::RunVoxelBlockGrid(mesh)
+                                        : tsdfpp::RunSideBySide(options);
   if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());
     return static_cast<int>(done.error().kind);

@@ -59,10 +59,19 @@ TriangleMesh LayeredMap::ObjectMesh(InstanceId id) const {
 MeshWork LayeredMap::UpdateMeshes() const {
   std::erase_if(meshes_, [&](const auto& mesh) { return !volumes_.contains(mesh.first); });
   MeshWork work;
+  for (const auto& [id, volume] : volumes_) work += UpdateObjectMesh(id);
+  // Who is active where changes only with a volume, a pose or the objects that there are.
+  bool is_same = hidden_among_.size() == meshes_.size();
+  for (const auto& [id, object] : meshes_) {
+    const auto then = hidden_among_.find(id);
+    is_same = is_same && then != hidden_among_.end() && then->second == object.version;
+  }
+  if (is_same) return work;
   std::map<InstanceId, BlockBox> reach;
-  for (const auto& [id, volume] : volumes_) {
-    work += UpdateObjectMesh(id);
-    reach.emplace(id, ReachOf(meshes_.at(id), config_.voxel_m));
+  hidden_among_.clear();
+  for (const auto& [id, object] : meshes_) {
+    hidden_among_.emplace(id, object.version);
+    reach.emplace(id, ReachOf(object, config_.voxel_m));
   }
   FindHiddenTriangles(reach);
   return work;

@@ -41,6 +41,8 @@ class LayeredMap : public MapRepresentation {
   void FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const;
 
   mutable std::map<InstanceId, PlacedMesh> meshes_;
+  // Versions of the meshes when their hidden triangles were last looked up.
+  mutable std::map<InstanceId, std::uint64_t> hidden_among_;
 };
 
 // The observed voxels of a grid, sorted by (z, y, x).

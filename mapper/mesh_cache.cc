@@ -51,15 +51,15 @@ void GridMesh::MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t 
   for (const std::size_t place : offsets) Mark(part.around[place], what, list);
 }
 
-// Makes `owned_` and `order_` those of the grid's blocks.
-void GridMesh::MatchBlocks(const TsdfGrid& grid) {
+// Makes `owned_` and `order_` those of the grid's blocks; returns how many were erased.
+std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   const auto& entries = grid.entries();
   std::size_t same = 0;
   while (same < owned_.size() && same < entries.size() &&
          owned_[same]->index == entries[same].index) {
     ++same;
   }
-  if (same == owned_.size() && same == entries.size()) return;
+  if (same == owned_.size() && same == entries.size()) return 0;
 
   // Blocks were added behind, or some were erased, or this is another grid.
   struct Spare {
@@ -93,8 +93,10 @@ void GridMesh::MatchBlocks(const TsdfGrid& grid) {
   for (const Spare& spare : spares) {
     if (spare.part != nullptr) spare.part->revision = kGone;
   }
+  std::size_t erased = 0;
   for (const Spare& spare : spares) {
     if (spare.part == nullptr) continue;
+    ++erased;
     for (MeshPart* part : spare.part->around) {
       if (part == nullptr || part->revision == kGone) continue;
       Mark(part, kCubes, cubes_todo_);
@@ -111,6 +113,7 @@ void GridMesh::MatchBlocks(const TsdfGrid& grid) {
   keys_.resize(sorted.size());
   for (std::size_t i = 0; i < sorted.size(); ++i) std::tie(keys_[i], order_[i]) = sorted[i];
   Link();
+  return erased;
 }
 
 // Tells each part which ones are around it. The nine rows of blocks along x that surround a part
@@ -187,8 +190,9 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
 
 MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
   MeshWork work;
-  MatchBlocks(grid);
+  const std::size_t erased = MatchBlocks(grid);
   MarkChanged(grid, work);
+  work.changed += erased;
 
   std::vector<std::uint8_t> changed(cubes_todo_.size());
   ForEachInParallel(cubes_todo_.size(),

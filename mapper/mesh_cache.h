@@ -12,7 +12,7 @@ namespace tsdfpp {
 // What an update of cached meshes had to do, in blocks.
 struct MeshWork {
   std::size_t blocks = 0;   // that there are
-  std::size_t changed = 0;  // whose values changed since the last update, new ones included
+  std::size_t changed = 0;  // whose values changed since the last update, new and erased ones too
   std::size_t remade = 0;   // whose vertices or triangles were made again
 
   MeshWork& operator+=(const MeshWork& other) {
@@ -46,7 +46,7 @@ class GridMesh {
  private:
   using Parts = std::vector<MeshPart*>;
 
-  void MatchBlocks(const TsdfGrid& grid);
+  std::size_t MatchBlocks(const TsdfGrid& grid);
   void Link();
   void Mark(MeshPart* part, std::uint32_t what, Parts& list);
   template <typename Offsets>

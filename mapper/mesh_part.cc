@@ -1,5 +1,6 @@
 #include "mapper/mesh_part.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "mapper/marching_cubes.h"
@@ -53,26 +54,32 @@ std::uint64_t JoinFour(const UpperMasks& masks, std::size_t z, const Join& join)
   return join(rows, AtNextY(rows, next_rows));
 }
 
-// Bits set in a byte below bit x.
-unsigned CountBelow(std::uint64_t slice, unsigned row, unsigned x) {
-  constexpr auto kCounts = [] {
-    std::array<std::uint8_t, 256> counts{};
-    for (unsigned i = 0; i < counts.size(); ++i) {
-      counts[i] = static_cast<std::uint8_t>(std::popcount(i));
-    }
-    return counts;
-  }();
-  return kCounts[(slice >> (8 * row)) & ((1U << x) - 1)];
+constexpr auto kBitCounts = [] {
+  std::array<std::uint8_t, 256> counts{};
+  for (unsigned i = 0; i < counts.size(); ++i) {
+    counts[i] = static_cast<std::uint8_t>(std::popcount(i));
+  }
+  return counts;
+}();
+
+// The bits of each byte counted, all eight at once.
+std::uint64_t CountInBytes(std::uint64_t bits) {
+  bits -= (bits >> 1U) & 0x5555555555555555ULL;
+  bits = (bits & 0x3333333333333333ULL) + ((bits >> 2U) & 0x3333333333333333ULL);
+  return (bits + (bits >> 4U)) & 0x0F0F0F0F0F0F0F0FULL;
 }
 
 // The number of the vertex on the edge (x, y, z, axis) in the part.
-unsigned NumberOf(const MeshPart& part, unsigned x, unsigned y, unsigned z, unsigned axis) {
-  unsigned number = part.row_start[8 * z + y];
-  for (unsigned a = 0; a < 3; ++a) {
-    const std::uint64_t slice = part.edges[a][z];
-    number += CountBelow(slice, y, x);
-    if (a < axis) number += static_cast<unsigned>(slice >> (8 * y + x)) & 1U;
-  }
+inline unsigned NumberOf(const MeshPart& part, unsigned x, unsigned y, unsigned z, unsigned axis) {
+  const auto row_of = [&](std::size_t a) {
+    return static_cast<unsigned>(part.edges[a][z] >> (8 * y)) & 0xFFU;
+  };
+  const std::array<unsigned, 3> row{row_of(0), row_of(1), row_of(2)};
+  const unsigned below = (1U << x) - 1;
+  unsigned number = part.row_start[8 * z + y] + kBitCounts[row[0] & below] +
+                    kBitCounts[row[1] & below] + kBitCounts[row[2] & below];
+  if (axis > 0) number += (row[0] >> x) & 1U;
+  if (axis > 1) number += (row[1] >> x) & 1U;
   return number;
 }
 
@@ -159,16 +166,28 @@ bool FindEdges(MeshPart& part) {
   if (edges == part.edges) return false;
   part.edges = edges;
   unsigned count = 0;
-  for (unsigned row = 0; row < part.row_start.size(); ++row) {
-    part.row_start[row] = static_cast<std::uint16_t>(count);
-    for (const BlockMask& mask : edges) count += CountBelow(mask[row >> 3U], row & 7U, 8);
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    const std::uint64_t rows =
+        CountInBytes(edges[0][z]) + CountInBytes(edges[1][z]) + CountInBytes(edges[2][z]);
+    const std::uint64_t up_to = rows * kFirstColumn;  // at most 192 in a slice: no byte overflows
+    for (std::size_t y = 0; y < kBlockSide; ++y) {
+      part.row_start[8 * z + y] =
+          static_cast<std::uint16_t>(count + (y == 0 ? 0 : (up_to >> (8 * (y - 1))) & 0xFFU));
+    }
+    count += static_cast<unsigned>(up_to >> 56U);
   }
+  part.vertex_count = static_cast<std::uint16_t>(count);
   return true;
 }
 
 void MakeVertices(MeshPart& part, float voxel) {
-  part.positions.clear();
-  part.colours.clear();
+  // Exactly as large as needed, because what is kept stays.
+  if (part.positions.size() != part.vertex_count) {
+    part.positions = std::vector<Eigen::Vector3f>(part.vertex_count);
+    part.colours = std::vector<Colour>(part.vertex_count);
+  }
+  if (part.vertex_count == 0) return;
+  std::size_t number = 0;
   const TsdfBlock& block = *part.block;
   for (int z = 0; z < kBlockSide; ++z) {
     const std::array<std::uint64_t, 3> edges{part.edges[0][At(z)], part.edges[1][At(z)],
@@ -199,15 +218,16 @@ void MakeVertices(MeshPart& part, float voxel) {
           colour[c] = TsdfBlock::Level(static_cast<std::uint16_t>(
               static_cast<float>(c0[c]) * (1 - t) + static_cast<float>(c1[c]) * t));
         }
-        part.positions.push_back(position * voxel);
-        part.colours.push_back(colour);
+        part.positions[number] = position * voxel;
+        part.colours[number++] = colour;
       }
     }
   }
 }
 
 void MakeTriangles(MeshPart& part) {
-  part.triangles.clear();
+  thread_local std::vector<std::array<std::uint16_t, 3>> made;
+  made.clear();
   const UpperMasks negative = UpperMasksOf(part, &MeshPart::negative);
   const auto& table = FlatTable();
   for (unsigned z = 0; z < kBlockSide; ++z) {
@@ -250,9 +270,14 @@ void MakeTriangles(MeshPart& part) {
         const std::uint16_t a = vertex_of(triangles.corners[i]);
         const std::uint16_t b = vertex_of(triangles.corners[i + 1]);
         const std::uint16_t c = vertex_of(triangles.corners[i + 2]);
-        part.triangles.push_back({a, b, c});
+        made.push_back({a, b, c});
       }
     }
+  }
+  if (part.triangles.size() == made.size()) {
+    std::copy(made.begin(), made.end(), part.triangles.begin());
+  } else {
+    part.triangles = std::vector<std::array<std::uint16_t, 3>>(made.begin(), made.end());
   }
 }
 

@@ -24,6 +24,7 @@ struct MeshPart {
 
   std::array<BlockMask, 3> edges{};                     // by axis: those with a vertex
   std::array<std::uint16_t, 64> row_start{};            // vertices before the row 8 z + y of voxels
+  std::uint16_t vertex_count = 0;                       // on all edges
   std::vector<Eigen::Vector3f> positions;               // metres, in the lattice's frame
   std::vector<Colour> colours;                          // of the vertices
   std::vector<std::array<std::uint16_t, 3>> triangles;  // NearVertex each

@@ -142,6 +142,7 @@ MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_
   T_WL = T_WL_now;
   lattice_is_world = is_world_now;
   const MeshWork work = mesh.Update(grid, voxel);
+  if (moved || work.changed > 0 || work.remade > 0) version = NewRevision();
   ForEachPart(mesh.parts(), [&](MeshPart& part) {
     if (part.is_placed && !moved) return;
     part.is_placed = true;

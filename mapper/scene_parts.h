@@ -14,6 +14,7 @@ struct PlacedMesh {
   GridMesh mesh;
   Pose T_WL = Pose::Identity();
   bool lattice_is_world = true;
+  std::uint64_t version = 0;  // a new one after each update that found a change
 
   // Brings the mesh in line with the grid and stands it at T_WL.
   MeshWork Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now, bool is_world_now);
