@@ -221,9 +221,9 @@ InstanceId AnchoredMap::ActiveAt(const Index3& voxel) const {
   return (*ids)[static_cast<std::size_t>(PlaceInBlock(voxel) * layers_)];
 }
 
-TriangleMesh AnchoredMap::SceneMesh() const {
+MeshWork AnchoredMap::UpdateMeshes() const {
   RefreshIndex();
-  return LayeredMap::SceneMesh();
+  return LayeredMap::UpdateMeshes();
 }
 
 std::vector<RaySurface> AnchoredMap::CastRays(const Intrinsics& camera, const Pose& T_WC,

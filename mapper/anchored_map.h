@@ -17,9 +17,9 @@ class AnchoredMap final : public LayeredMap {
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
-  TriangleMesh SceneMesh() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
 
  protected:
   InstanceId ActiveAt(const Index3& voxel) const override;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/scene_parts.h"
 #include "mapper/volume_fusion.h"
 
 namespace tsdfpp {
@@ -14,6 +15,7 @@ class LayeredMap : public MapRepresentation {
   TriangleMesh SceneMesh() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
 
@@ -35,6 +37,14 @@ class LayeredMap : public MapRepresentation {
 
   MapConfig config_;
   ObjectVolumes volumes_;
+
+ private:
+  MeshWork UpdateObjectMesh(InstanceId id) const;
+  void FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const;
+
+  mutable std::map<InstanceId, PlacedMesh> meshes_;
+  // Versions of the meshes when their hidden triangles were last looked up.
+  mutable std::map<InstanceId, std::uint64_t> hidden_among_;
 };
 
 // The observed voxels of a grid, sorted by (z, y, x).

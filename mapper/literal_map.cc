@@ -5,10 +5,10 @@
 
 #include "mapper/allocation.h"
 #include "mapper/layered_map.h"
-#include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
+#include "mapper/scene_parts.h"
 
 namespace tsdfpp {
 namespace {
@@ -62,12 +62,14 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
     if (pixel < 0 || observation.distance[i] > config_.front()) continue;
     const InstanceId observed = frame.label[pixel];
     Entry& active = task.lists->active[i];
+    const InstanceId before = active.id;
     if (active.id == observed) {
       if (active.confidence < config_.confidence_cap) ++active.confidence;
     } else if (active.id == kNoInstance || --active.confidence <= 0) {
       active = {observed, 1};
       if (task.lists->inactive[i].id == observed) task.lists->inactive[i] = {};
     }
+    if (active.id != before) task.lists->revision = NewRevision();
     auto& targets = task.targets;
     const auto at = std::lower_bound(targets.begin(), targets.end(), active.id);
     if (at == targets.end() || *at != active.id) targets.insert(at, active.id);
@@ -104,6 +106,7 @@ void LiteralMap::Unlist(InstanceId id) {
     ListBlock& lists = *entry.block;
     for (std::size_t i = 0; i < kBlockVoxels; ++i) {
       if (lists.active[i].id == id) {
+        lists.revision = NewRevision();
         lists.active[i] = lists.inactive[i];
         lists.inactive[i] = {};
       } else if (lists.inactive[i].id == id) {
@@ -122,6 +125,7 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
   for (const auto& entry : volume.grid.entries()) {
     ListBlock& lists = lists_.FindOrAdd(entry.index);
+    lists.revision = NewRevision();
     for (int place = 0; place < kBlockVoxels; ++place) {
       if (!Bit(entry.block->observed, place)) continue;
       Entry& active = lists.active[At(place)];
@@ -148,28 +152,59 @@ Pose LiteralMap::ObjectLattice(InstanceId) const { return Pose::Identity(); }
 
 TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
   const auto volume = volumes_.find(id);
-  return volume == volumes_.end() ? TriangleMesh{}
-                                  : ExtractMesh(volume->second.grid, config_.voxel());
+  if (volume == volumes_.end()) return {};
+  GridMesh& mesh = object_meshes_[id];
+  mesh.Update(volume->second.grid, config_.voxel());
+  return Join({{&mesh}});
 }
 
-TsdfGrid LiteralMap::ActiveField() const {
-  TsdfGrid field;
-  for (const auto* entry : lists_.Sorted()) {
-    auto block = std::make_unique<TsdfBlock>();
-    for (const auto& [id, volume] : volumes_) {
-      const TsdfBlock* of = volume.grid.Find(entry->index);
-      if (of == nullptr) continue;
-      for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-        if (entry->block->active[i].id != id) continue;
-        block->distance[i] = of->distance[i];
-        block->weight[i] = of->weight[i];
-        block->SetColour(i, of->FixedColourAt(i), of->colour_count[i]);
-      }
-    }
-    block->UpdateMasks(config_.back());
-    field.Add(entry->index, std::move(block));
+// Brings the field of the active objects' values in line with lists and volumes.
+void LiteralMap::UpdateActiveField() const {
+  TsdfGrid& field = active_.field;
+  for (const auto& entry : lists_.entries()) {
+    field.FindOrAdd(entry.index);
+    active_.made_from.FindOrAdd(entry.index);
   }
-  return field;
+  const auto& lists = lists_.entries();
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, lists.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const ListBlock& list = *lists[i].block;
+          std::vector<std::uint64_t> from{list.revision};
+          std::vector<const TsdfBlock*> of;
+          for (const auto& [id, volume] : volumes_) {
+            of.push_back(volume.grid.Find(lists[i].index));
+            from.push_back(of.back() == nullptr ? 0 : of.back()->revision);
+          }
+          std::vector<std::uint64_t>& made_from = *active_.made_from.Find(lists[i].index);
+          if (from == made_from) continue;
+          made_from = std::move(from);
+          TsdfBlock block;
+          auto source = of.begin();
+          for (const auto& [id, volume] : volumes_) {
+            const TsdfBlock* values = *source++;
+            if (values == nullptr) continue;
+            for (std::size_t k = 0; k < kBlockVoxels; ++k) {
+              if (list.active[k].id != id) continue;
+              block.distance[k] = values->distance[k];
+              block.weight[k] = values->weight[k];
+              block.SetColour(k, values->FixedColourAt(k), values->colour_count[k]);
+            }
+          }
+          block.UpdateMasks(config_.back());
+          *field.Find(lists[i].index) = block;
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+MeshWork LiteralMap::UpdateMeshes() const {
+  UpdateActiveField();
+  const MeshWork work = active_.mesh.Update(active_.field, config_.voxel());
+  LabelTriangles(active_.mesh,
+                 [&](const Eigen::Vector3f& centroid) { return ActiveNear(centroid); });
+  return work;
 }
 
 InstanceId LiteralMap::ActiveNear(const Eigen::Vector3f& point) const {
@@ -181,10 +216,10 @@ InstanceId LiteralMap::ActiveNear(const Eigen::Vector3f& point) const {
 
 std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
                                              const RayCastOptions& options) const {
-  const TsdfGrid field = ActiveField();
+  UpdateActiveField();
   RayPass pass;
   pass.voxel_m = config_.voxel_m;
-  pass.volumes.push_back({kBackground, &field, Pose::Identity(), true});
+  pass.volumes.push_back({kBackground, &active_.field, Pose::Identity(), true});
   pass.label = [&](const Eigen::Vector3f& point_W) { return ActiveNear(point_W); };
   RayCastOptions first = options;
   first.surfaces = 1;
@@ -192,13 +227,8 @@ std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pos
 }
 
 TriangleMesh LiteralMap::SceneMesh() const {
-  TriangleMesh mesh = ExtractMesh(ActiveField(), config_.voxel());
-  mesh.face_ids.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
-    mesh.face_ids.push_back(
-        ActiveNear((mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F));
-  }
-  return mesh;
+  UpdateMeshes();
+  return Join({{&active_.mesh}});
 }
 
 std::optional<VoxelValue> LiteralMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {
@@ -242,6 +272,8 @@ MapMemory LiteralMap::Memory() const {
     memory.blocks += volume.grid.size();
     memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
   }
+  memory.mesh_bytes = active_.field.size() * sizeof(TsdfBlock) + active_.mesh.Bytes();
+  for (const auto& [id, mesh] : object_meshes_) memory.mesh_bytes += mesh.Bytes();
   return memory;
 }
 

@@ -21,6 +21,7 @@ class LiteralMap final : public MapRepresentation {
   TriangleMesh SceneMesh() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
@@ -35,6 +36,16 @@ class LiteralMap final : public MapRepresentation {
   struct ListBlock {
     std::array<Entry, kBlockVoxels> active{};
     std::array<Entry, kBlockVoxels> inactive{};
+    std::uint64_t revision = 0;  // a new one whenever an active id changes
+  };
+  // What the scene is meshed from: at each voxel the values of the object that is active there. A
+  // copy starts empty.
+  struct ActiveField {
+    ActiveField() = default;
+    ActiveField(const ActiveField&) {}
+    TsdfGrid field;
+    BlockGrid<std::vector<std::uint64_t>> made_from;  // revisions of the lists and of each volume
+    GridMesh mesh;
   };
   struct Task {
     Index3 index;
@@ -45,14 +56,15 @@ class LiteralMap final : public MapRepresentation {
   void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
   void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
   void Unlist(InstanceId id);
-  // What the active objects say at each voxel.
-  TsdfGrid ActiveField() const;
   // The active object of the voxel nearest to a point (metres), the background where there is none.
   InstanceId ActiveNear(const Eigen::Vector3f& point) const;
+  void UpdateActiveField() const;
 
   MapConfig config_;
   ObjectVolumes volumes_;
   BlockGrid<ListBlock> lists_;
+  mutable ActiveField active_;
+  mutable std::map<InstanceId, GridMesh> object_meshes_;
 };
 
 }  // namespace tsdfpp

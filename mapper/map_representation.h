@@ -8,6 +8,7 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/mesh_cache.h"
 #include "mapper/ray_cast.h"
 
 namespace tsdfpp {
@@ -27,8 +28,9 @@ struct Listing {
 };
 
 struct MapMemory {
-  std::size_t blocks = 0;  // of voxel data and of lists
-  std::size_t bytes = 0;   // of those blocks and their tables
+  std::size_t blocks = 0;      // of voxel data and of lists
+  std::size_t bytes = 0;       // of those blocks and their tables
+  std::size_t mesh_bytes = 0;  // besides: of the meshes kept since one was asked for
 };
 
 class MapRepresentation {
@@ -54,6 +56,13 @@ class MapRepresentation {
 
   // T_WL, where an object's lattice is now in the world; the identity for methods that move values.
   virtual Pose ObjectLattice(InstanceId id) const = 0;
+
+  // Meshes are kept by block, and a block is meshed again only after a change in it or next to it.
+  // So meshing, though const, is not for two threads at once; a copy of the map starts without.
+
+  // Brings the kept meshes in line with the map, as SceneMesh() does before it puts them together;
+  // says how much there was to do since the last mesh. Methods that keep none do nothing.
+  virtual MeshWork UpdateMeshes() const { return {}; }
 
   // The whole surface of one object, hidden parts included, in the world at its current pose,
   // coloured. One-field methods give the triangles labelled so.
@@ -82,6 +91,9 @@ class MapRepresentation {
 
   virtual MapMemory Memory() const = 0;
 };
+
+// All objects with their hidden parts, by increasing id: ObjectMesh of each, with face_ids.
+TriangleMesh AllObjectsMesh(const MapRepresentation& map);
 
 // The config must be valid (MapConfig::Validate).
 std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& config);

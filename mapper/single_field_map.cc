@@ -8,10 +8,10 @@
 
 #include "mapper/allocation.h"
 #include "mapper/layered_map.h"
-#include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
+#include "mapper/scene_parts.h"
 
 namespace tsdfpp {
 namespace {
@@ -54,14 +54,15 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
           if (!ObserveBlock(view, T_CW, index, config_.voxel(), config_.back(), observation)) {
             continue;
           }
-          FuseBlock(view, observation, *blocks[i].block, *labels_.Find(index));
-          blocks[i].block->UpdateMasks(config_.back());
+          if (FuseBlock(view, observation, *blocks[i].block, *labels_.Find(index))) {
+            blocks[i].block->UpdateMasks(config_.back());
+          }
         }
       },
       tbb::simple_partitioner());
 }
 
-void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
+bool SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
                                TsdfBlock& block, LabelBlock& labels) const {
   Lanes in_band;
   Lanes contradicted;
@@ -71,13 +72,13 @@ void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& o
   rule.weight_cap = static_cast<float>(config_.weight_cap);
   const FusionResult result =
       FuseVoxels(frame.kernel, rule, observation, block, in_band, contradicted);
-  if (!result.any_in_band) return;
-  if (VoteLabels(observation, in_band, config_.confidence_cap, labels.id.data(),
-                 labels.confidence.data())) {
+  if (result.any_in_band && VoteLabels(observation, in_band, config_.confidence_cap,
+                                       labels.id.data(), labels.confidence.data())) {
     for (const InstanceId id : labels.id) {
       if (id != kNoInstance) labels.ever |= EverBit(id);
     }
   }
+  return result.any_taken;
 }
 
 void SingleFieldMap::Vacate(InstanceId id) {
@@ -200,15 +201,15 @@ std::vector<InstanceId> SingleFieldMap::Objects() const {
 
 Pose SingleFieldMap::ObjectLattice(InstanceId) const { return Pose::Identity(); }
 
+MeshWork SingleFieldMap::UpdateMeshes() const {
+  const MeshWork work = mesh_.Update(field_, config_.voxel());
+  LabelTriangles(mesh_, [&](const Eigen::Vector3f& centroid) { return LabelNear(centroid); });
+  return work;
+}
+
 TriangleMesh SingleFieldMap::SceneMesh() const {
-  TriangleMesh mesh = ExtractMesh(field_, config_.voxel());
-  mesh.face_ids.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
-    const Eigen::Vector3f centroid =
-        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F;
-    mesh.face_ids.push_back(LabelNear(centroid));
-  }
-  return mesh;
+  UpdateMeshes();
+  return Join({{&mesh_}});
 }
 
 std::vector<RaySurface> SingleFieldMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
@@ -271,8 +272,10 @@ std::vector<Eigen::Vector3i> SingleFieldMap::ListedVoxels() const {
 }
 
 MapMemory SingleFieldMap::Memory() const {
-  return {field_.size(), field_.size() * (sizeof(TsdfBlock) + sizeof(LabelBlock)) +
-                             field_.TableBytes() + labels_.TableBytes()};
+  return {field_.size(),
+          field_.size() * (sizeof(TsdfBlock) + sizeof(LabelBlock)) + field_.TableBytes() +
+              labels_.TableBytes(),
+          mesh_.Bytes()};
 }
 
 }  // namespace tsdfpp

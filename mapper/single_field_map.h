@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/mesh_cache.h"
 #include "mapper/tsdf_block.h"
 #include "mapper/volume_fusion.h"
 
@@ -25,6 +26,7 @@ class SingleFieldMap final : public MapRepresentation {
   TriangleMesh SceneMesh() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
@@ -44,7 +46,8 @@ class SingleFieldMap final : public MapRepresentation {
                       InstanceId id) const {
     return labels.id[i] == id && block.weight[i] > 0 && block.distance[i] <= config_.voxel();
   }
-  void FuseBlock(const FrameView& frame, const BlockObservation& observation, TsdfBlock& block,
+  // True where a voxel changed.
+  bool FuseBlock(const FrameView& frame, const BlockObservation& observation, TsdfBlock& block,
                  LabelBlock& labels) const;
   void Vacate(InstanceId id);
   // The label of the voxel nearest to a point (metres), the background's where it has none.
@@ -57,6 +60,7 @@ class SingleFieldMap final : public MapRepresentation {
   TsdfGrid field_;
   BlockGrid<LabelBlock> labels_;  // the same blocks
   std::map<InstanceId, Pose> T_WO_;
+  mutable GridMesh mesh_;
 };
 
 }  // namespace tsdfpp

@@ -25,6 +25,10 @@ using Lanes = std::array<std::int32_t, kBlockVoxels>;
 
 using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
 
+// A number that no call in this process has returned before, above 0. Only its being new means
+// anything: it depends on threads.
+std::uint64_t NewRevision();
+
 struct TsdfBlock {
   std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
   std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
@@ -36,8 +40,13 @@ struct TsdfBlock {
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
 
-  // Brings observed, negative and band in line with the values; true where one of them changed.
-  // `back` in metres.
+  // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
+  // changes values gives the block a new one (UpdateMasks does), which is how the cached meshes see
+  // it.
+  std::uint64_t revision = 0;
+
+  // Brings observed, negative and band in line with the values, and gives the block a new revision;
+  // true where one of the masks changed. `back` in metres.
   bool UpdateMasks(float back);
   bool AnyNegative() const {
     std::uint64_t any = 0;
