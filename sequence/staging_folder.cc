@@ -141,7 +141,7 @@ Expected<void> StagingFolder::Lock() {
   // A file beside the hidden folder, so that it stays where it is when folders are renamed.
   const fs::path path = Sibling("lock");
   // The children of a process that was killed follow it in a moment.
-  constexpr int kTries = 40;
+  constexpr int kTries = 200;
   constexpr useconds_t kPause_us = 50000;
   for (int i = 0; i < kTries; ++i) {
     const int descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
