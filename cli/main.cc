@@ -25,7 +25,7 @@ int RunCommand(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(name, help);
     command->add_flag("--json", common.json, "Print the result as JSON on stdout");
     command->add_option("--threads", common.threads, "Worker threads; all cores by default")
-        ->check(CLI::Range(1, 1024));
+        ->check(tsdfpp::WholeBetween(1, 1024));
     runs[command] = function(*command, common);
   };
   add("doctor", "Say what this machine has and what is missing", tsdfpp::AddDoctor);
@@ -45,7 +45,9 @@ int RunCommand(int argc, char** argv) {
     const std::string what = app.get_subcommands().empty() && !unknown.empty()
                                  ? "'" + unknown.front() + "' is no subcommand or option"
                                  : error.what();
-    std::fprintf(stderr, "tsdfpp: %s (see tsdfpp --help)\n", what.c_str());
+    const auto used = app.get_subcommands();
+    const std::string command = used.empty() ? "tsdfpp" : "tsdfpp " + used.front()->get_name();
+    std::fprintf(stderr, "tsdfpp: %s (see %s --help)\n", what.c_str(), command.c_str());
     return static_cast<int>(ErrorKind::kUsage);
   }
   std::unique_ptr<tbb::global_control> limit;

@@ -38,6 +38,9 @@ Expected<CommandResult> RunMap(const Options& options) {
                       options.map.layers, options.method);
   }
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
+  if (!options.remove.empty() && SplitList(options.remove).empty()) {
+    return UsageError("--remove '{}' names no object", options.remove);
+  }
 
   TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
   const SequenceInfo& info = source->info();
@@ -109,7 +112,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored, volumes")
       ->capture_default_str();
   app.add_option("--segmentation", options->segmentation, "Where masks come from")
-      ->check(CLI::IsMember({"gt"}))
+      ->check(OneOf({"gt"}))
       ->capture_default_str();
   app.add_option("--poses", options->poses, "Object poses: gt (given) or icp (tracked)")
       ->capture_default_str();
@@ -125,7 +128,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
-  app.add_option("--out", options->out, "Output folder")->required();
+  app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
   return [options] { return RunMap(*options); };
 }
 
