@@ -6,6 +6,7 @@
 #include <bit>
 #include <set>
 
+#include "mapper/freeing.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -79,6 +80,7 @@ void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
+  const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   std::set<InstanceId> changed_ids;
   for (const FusedBlock& block : fused) changed_ids.insert(block.id);
@@ -107,6 +109,7 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
       dirty_.push_back(block.index);
     }
   }
+  freeing.FreeEmpty(fused, volumes_);
   RefreshIndex();
 }
 
@@ -169,14 +172,18 @@ void AnchoredMap::RefreshIndex() const {
         }
       },
       tbb::simple_partitioner());
+  std::vector<Index3> emptied;
   for (std::size_t i = 0; i < dirty_.size(); ++i) {
     IndexBlock* block = index_.Find(dirty_[i]);
-    if (block != nullptr) {
+    if (block != nullptr && computed[i].empty()) {
+      emptied.push_back(dirty_[i]);
+    } else if (block != nullptr) {
       *block = std::move(computed[i]);
     } else if (!computed[i].empty()) {
       index_.FindOrAdd(dirty_[i]) = std::move(computed[i]);
     }
   }
+  index_.Erase(emptied);
   dirty_.clear();
 }
 

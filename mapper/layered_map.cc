@@ -108,6 +108,11 @@ TriangleMesh LayeredMap::SceneMesh() const {
   return scene;
 }
 
+const TsdfGrid* LayeredMap::GridOf(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  return volume == volumes_.end() ? nullptr : &volume->second.grid;
+}
+
 std::optional<VoxelValue> LayeredMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {
   const auto volume = volumes_.find(id);
   if (volume == volumes_.end()) return std::nullopt;

@@ -13,6 +13,7 @@ class LayeredMap : public MapRepresentation {
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
 
  protected:

@@ -20,6 +20,7 @@ class LiteralMap final : public MapRepresentation {
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
@@ -33,6 +34,7 @@ class LiteralMap final : public MapRepresentation {
   struct ListBlock {
     std::array<Entry, kBlockVoxels> active{};
     std::array<Entry, kBlockVoxels> inactive{};
+    bool IsEmpty() const;
   };
   struct Task {
     Index3 index;
@@ -42,7 +44,10 @@ class LiteralMap final : public MapRepresentation {
 
   void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
   void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
-  void Unlist(InstanceId id);
+  // The list blocks in which the object was listed.
+  std::vector<Index3> Unlist(InstanceId id);
+  // Frees those of these list blocks whose lists are all empty.
+  void FreeEmptyLists(const std::vector<Index3>& blocks);
 
   MapConfig config_;
   ObjectVolumes volumes_;

@@ -8,6 +8,7 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/tsdf_block.h"
 
 namespace tsdfpp {
 
@@ -64,6 +65,10 @@ class MapRepresentation {
   // The object's voxel at an index of its lattice; nothing where it is unobserved. One field: the
   // voxel if it is labelled so.
   virtual std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const = 0;
+
+  // The stored voxels of the object, in its lattice (that of all, for one field); nullptr where the
+  // map has none. Valid until the map changes.
+  virtual const TsdfGrid* GridOf(InstanceId id) const = 0;
 
   // The objects listed at a global voxel, the active one first.
   virtual std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const = 0;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "mapper/allocation.h"
+#include "mapper/freeing.h"
 #include "mapper/layered_map.h"
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
@@ -31,6 +32,7 @@ std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
 void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const auto world = [](InstanceId) { return Pose::Identity(); };
+  const std::size_t blocks_before = field_.size();
   for (const auto& [id, indices] : BlocksAlongRays(view, config_, world)) {
     for (const Index3& index : indices) {
       field_.FindOrAdd(index);
@@ -58,6 +60,8 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
         }
       },
       tbb::simple_partitioner());
+  // A frame makes no voxel unobserved; it may have made blocks in vain.
+  FreeEmpty(EmptyFrom(field_, blocks_before, [](const TsdfBlock& b) { return !b.AnyObserved(); }));
 }
 
 void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
@@ -79,7 +83,17 @@ void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& o
   }
 }
 
-void SingleFieldMap::Vacate(InstanceId id) {
+void SingleFieldMap::FreeEmpty(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    if (!field_.Find(index)->AnyObserved()) empty.push_back(index);
+  }
+  field_.Erase(empty);
+  labels_.Erase(empty);
+}
+
+std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : labels_.entries()) {
     LabelBlock& labels = *entry.block;
     if ((labels.ever & EverBit(id)) == 0) continue;
@@ -92,12 +106,15 @@ void SingleFieldMap::Vacate(InstanceId id) {
       labels.confidence[i] = 0;
       changed = true;
     }
-    if (changed) block.UpdateMasks(config_.back());
+    if (!changed) continue;
+    block.UpdateMasks(config_.back());
+    blocks.push_back(entry.index);
   }
+  return blocks;
 }
 
 void SingleFieldMap::Remove(InstanceId id) {
-  Vacate(id);
+  FreeEmpty(Vacate(id));
   T_WO_.erase(id);
 }
 
@@ -122,7 +139,7 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
     source.Add(entry->index, std::move(block));
     source_labels.FindOrAdd(entry->index) = *entry->block;
   }
-  Vacate(id);
+  const std::vector<Index3> left = Vacate(id);
 
   const VoxelReader reader(source);
   const Pose T_inverse = T_rel.inverse();
@@ -172,6 +189,7 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
     }
     if (block != nullptr) block->UpdateMasks(config_.back());
   }
+  FreeEmpty(left);
 }
 
 template <typename Function>
@@ -221,6 +239,8 @@ TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {
   mesh.face_ids.clear();
   return mesh;
 }
+
+const TsdfGrid* SingleFieldMap::GridOf(InstanceId) const { return &field_; }
 
 std::optional<VoxelValue> SingleFieldMap::ValueAt(InstanceId id,
                                                   const Eigen::Vector3i& voxel) const {

@@ -24,6 +24,7 @@ class SingleFieldMap final : public MapRepresentation {
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
@@ -44,7 +45,10 @@ class SingleFieldMap final : public MapRepresentation {
   }
   void FuseBlock(const FrameView& frame, const BlockObservation& observation, TsdfBlock& block,
                  LabelBlock& labels) const;
-  void Vacate(InstanceId id);
+  // Makes the object's voxels unobserved and unlabelled; returns their blocks.
+  std::vector<Index3> Vacate(InstanceId id);
+  // Frees those of these blocks that have no observed voxel.
+  void FreeEmpty(const std::vector<Index3>& blocks);
   template <typename Function>
   void ForEachVoxel(const Function& function) const;
 

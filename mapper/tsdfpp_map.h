@@ -29,10 +29,14 @@ class TsdfppMap final : public LayeredMap {
 
   ListBlock& ListsOf(const Index3& block);
   VoxelList ListOf(ListBlock& lists, int place) const;
-  void Deactivate(InstanceId id);
+  // The blocks of the index that lost a listing.
+  std::vector<Index3> Deactivate(InstanceId id);
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
-  void ApplyGroup(const Group& group, const std::vector<FusedBlock>& fused,
+  // Frees those of these blocks whose lists are all empty.
+  void FreeEmptyLists(const std::vector<Index3>& blocks);
+  bool IsEmpty(const ListBlock& lists) const;
+  void ApplyGroup(Group& group, const std::vector<FusedBlock>& fused,
                   const std::vector<CoverChange>& changes);
 
   int layers_;

@@ -40,6 +40,7 @@ class DenseAnchored : public DenseMap {
     index_.reset();
     for (auto& [id, volume] : volumes_) {
       FuseObject(id, View(frame, labels, ObjectLattice(id), config_), config_, volume, nullptr);
+      volume.FreeEmptyBlocks();
     }
   }
 

@@ -66,6 +66,7 @@ class DenseTsdfpp : public DenseMap {
         DropOverflow(list);
       }
     });
+    for (auto& [id, volume] : volumes_) volume.FreeEmptyBlocks();
   }
 
   void Remove(InstanceId id) override {
