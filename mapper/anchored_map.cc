@@ -7,6 +7,7 @@
 #include <set>
 
 #include "mapper/freeing.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -66,16 +67,22 @@ void AnchoredMap::AddReach(InstanceId id) const {
   }
 }
 
+void AnchoredMap::PlaceLattice(ObjectVolume& volume) {
+  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
+  volume.T_WL =
+      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
+}
+
 void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!volume.T_WO_birth) volume.T_WO_birth = T_WO;
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
   AddReach(id);
-  volume.lattice_is_world = SameNumbers(*volume.T_WO_birth, T_WO);
-  volume.T_WL = volume.lattice_is_world ? Pose::Identity() : T_WO * volume.T_WO_birth->inverse();
+  PlaceLattice(volume);
   reach_.erase(id);
   moved_.push_back(id);
+  CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
@@ -111,6 +118,7 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   }
   freeing.FreeEmpty(fused, volumes_);
   RefreshIndex();
+  CheckInDebugBuilds(*this);
 }
 
 // Whether another object may be listed in this block of the index.
@@ -133,6 +141,7 @@ void AnchoredMap::Remove(InstanceId id) {
   volumes_.erase(id);
   reach_.erase(id);
   RefreshIndex();
+  CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::RefreshIndex() const {

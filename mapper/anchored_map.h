@@ -10,13 +10,19 @@ class AnchoredMap final : public LayeredMap {
  public:
   AnchoredMap(const MapConfig& config, int layers);
 
+  Method method() const override { return Method::kTsdfppAnchored; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
+  std::optional<std::string> FindFault() const override;
+  Expected<void> Load(const Sections& sections) override;
   TriangleMesh SceneMesh() const override;
 
  protected:
@@ -27,6 +33,8 @@ class AnchoredMap final : public LayeredMap {
   using IndexBlock = std::vector<InstanceId>;
   struct Participants;
 
+  // Where the lattice is, from the poses at birth and now.
+  static void PlaceLattice(ObjectVolume& volume);
   // Recomputes the index where `dirty_` says that its inputs changed. Logically const: the index is
   // a function of volumes and poses.
   void RefreshIndex() const;

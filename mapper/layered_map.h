@@ -8,6 +8,7 @@ namespace tsdfpp {
 
 class LayeredMap : public MapRepresentation {
  public:
+  const MapConfig& config() const override { return config_; }
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
@@ -15,6 +16,9 @@ class LayeredMap : public MapRepresentation {
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
+  void Save(Sections& sections) const override;
+  // Covers are not up to date.
+  Expected<void> Load(const Sections& sections) override;
 
  protected:
   explicit LayeredMap(const MapConfig& config) : config_(config) {}
@@ -31,6 +35,9 @@ class LayeredMap : public MapRepresentation {
   static std::vector<Index3> ChangedMasks(const std::vector<FusedBlock>& fused, InstanceId id);
 
   MapMemory VolumeMemory() const;
+  // FindFault() of the volumes; adds their blocks to `blocks`. Covers are those of volumes whose
+  // lattice is the world's.
+  std::optional<std::string> FindVolumeFault(bool with_covers, std::size_t& blocks) const;
 
   MapConfig config_;
   ObjectVolumes volumes_;

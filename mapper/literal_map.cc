@@ -6,6 +6,7 @@
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
 #include "mapper/layered_map.h"
+#include "mapper/map_invariants.h"
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
@@ -55,6 +56,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   for_each_task([&](Task& task) { FuseActive(view, T_CW, task); });
   // A frame empties no list; it may have made blocks in vain.
   lists_.Erase(EmptyFrom(lists_, blocks_before, [](const ListBlock& b) { return b.IsEmpty(); }));
+  CheckInDebugBuilds(*this);
 }
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
@@ -141,7 +143,13 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   const std::vector<Index3> left = Unlist(id);
   volume.grid =
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
-  for (const auto& entry : volume.grid.entries()) {
+  Activate(id);
+  FreeEmptyLists(left);
+  CheckInDebugBuilds(*this);
+}
+
+void LiteralMap::Activate(InstanceId id) {
+  for (const auto& entry : volumes_.at(id).grid.entries()) {
     ListBlock& lists = lists_.FindOrAdd(entry.index);
     for (int place = 0; place < kBlockVoxels; ++place) {
       if (!Bit(entry.block->observed, place)) continue;
@@ -150,12 +158,12 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
       active = {id, static_cast<std::int16_t>(config_.moved_confidence)};
     }
   }
-  FreeEmptyLists(left);
 }
 
 void LiteralMap::Remove(InstanceId id) {
   FreeEmptyLists(Unlist(id));
   volumes_.erase(id);
+  CheckInDebugBuilds(*this);
 }
 
 std::vector<InstanceId> LiteralMap::Objects() const {

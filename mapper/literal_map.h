@@ -11,9 +11,14 @@ class LiteralMap final : public MapRepresentation {
  public:
   explicit LiteralMap(const MapConfig& config) : config_(config) {}
 
+  Method method() const override { return Method::kTsdfppLiteral; }
+  const MapConfig& config() const override { return config_; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
@@ -25,6 +30,9 @@ class LiteralMap final : public MapRepresentation {
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
+  std::optional<std::string> FindFault() const override;
+  void Save(Sections& sections) const override;
+  Expected<void> Load(const Sections& sections) override;
 
  private:
   struct Entry {
@@ -46,6 +54,8 @@ class LiteralMap final : public MapRepresentation {
   void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
   // The list blocks in which the object was listed.
   std::vector<Index3> Unlist(InstanceId id);
+  // Lists the object first wherever it is observed.
+  void Activate(InstanceId id);
   // Frees those of these list blocks whose lists are all empty.
   void FreeEmptyLists(const std::vector<Index3>& blocks);
 

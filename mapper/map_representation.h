@@ -8,6 +8,7 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/section_file.h"
 #include "mapper/tsdf_block.h"
 
 namespace tsdfpp {
@@ -35,6 +36,9 @@ class MapRepresentation {
  public:
   virtual ~MapRepresentation() = default;
 
+  virtual Method method() const = 0;
+  virtual const MapConfig& config() const = 0;
+
   // Paper III-E. The first pose given to an object is its pose at birth and moves nothing; nor does
   // one whose numbers equal the last. Objects must be given in increasing id within a frame.
   virtual void SetObjectPose(InstanceId id, const Pose& T_WO) = 0;
@@ -45,6 +49,19 @@ class MapRepresentation {
 
   // Takes the object out of the map; unknown ids change nothing.
   virtual void Remove(InstanceId id) = 0;
+
+  // Gives an object another id: its values, listings, votes and poses are then the new one's, and
+  // the places in lists stay, but for an index that is a function of volumes and poses, where ties
+  // go by id. Errors: kUsage where `from` is not in the map, `to` is (a pose given is enough), or
+  // one of them is the background or no id; the map is then unchanged.
+  virtual Expected<void> Rename(InstanceId from, InstanceId to) = 0;
+
+  // Puts a volume into the map as a new object whose pose is T_WO, with the volume's lattice at
+  // T_WL; it arrives as if it had moved there (docs/map.md, "Adding an object"). The voxel size
+  // must be the map's, and every block must hold an observed voxel. Errors: kUsage where the id is
+  // in the map (a pose given is enough), the background or no id; the map is then unchanged.
+  virtual Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                             const Pose& T_WO) = 0;
 
   // A deep copy.
   virtual std::unique_ptr<MapRepresentation> Clone() const = 0;
@@ -80,6 +97,18 @@ class MapRepresentation {
   virtual std::vector<Eigen::Vector3i> ListedVoxels() const = 0;
 
   virtual MapMemory Memory() const = 0;
+
+  // The first thing found in what is stored that docs/map.md rules out, in a sentence; nothing
+  // where all is well. Slow (mapper/map_invariants.h).
+  virtual std::optional<std::string> FindFault() const = 0;
+
+  // The map's content as named sections of a file (mapper/map_file.h), always of the same names.
+  virtual void Save(Sections& sections) const = 0;
+
+  // Makes the map the saved one, bit for bit. It must have the same method and settings and be as
+  // MakeMap made it; `sections` have the names that Save() gives them. Errors: kData, a fragment
+  // that says what no map can hold; the map is then unusable.
+  virtual Expected<void> Load(const Sections& sections) = 0;
 };
 
 // The config must be valid (MapConfig::Validate).

@@ -9,6 +9,7 @@
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
 #include "mapper/layered_map.h"
+#include "mapper/map_invariants.h"
 #include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
@@ -62,6 +63,7 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
       tbb::simple_partitioner());
   // A frame makes no voxel unobserved; it may have made blocks in vain.
   FreeEmpty(EmptyFrom(field_, blocks_before, [](const TsdfBlock& b) { return !b.AnyObserved(); }));
+  CheckInDebugBuilds(*this);
 }
 
 void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
@@ -116,6 +118,7 @@ std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
 void SingleFieldMap::Remove(InstanceId id) {
   FreeEmpty(Vacate(id));
   T_WO_.erase(id);
+  CheckInDebugBuilds(*this);
 }
 
 void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -167,29 +170,35 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   };
   for (std::size_t b = 0; b < touched.size(); ++b) {
     if (arrivals[b] == nullptr) continue;
-    const TsdfBlock& arrival = *arrivals[b];
-    TsdfBlock* block = nullptr;
-    LabelBlock* labels = nullptr;
-    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-      if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
-      if (block == nullptr) {
-        block = &field_.FindOrAdd(touched[b]);
-        labels = &labels_.FindOrAdd(touched[b]);
-      }
-      if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
-          std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
-        continue;
-      }
-      block->distance[i] = arrival.distance[i];
-      block->weight[i] = arrival.weight[i];
-      block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
-      labels->id[i] = id;
-      labels->confidence[i] = confidence_at(VoxelAt(touched[b], static_cast<int>(i)));
-      labels->ever |= EverBit(id);
-    }
-    if (block != nullptr) block->UpdateMasks(config_.back());
+    Arrive(id, touched[b], *arrivals[b],
+           [&](std::size_t i) { return confidence_at(VoxelAt(touched[b], static_cast<int>(i))); });
   }
   FreeEmpty(left);
+  CheckInDebugBuilds(*this);
+}
+
+void SingleFieldMap::Arrive(InstanceId id, const Index3& index, const TsdfBlock& arrival,
+                            const std::function<std::uint16_t(std::size_t)>& confidence) {
+  TsdfBlock* block = nullptr;
+  LabelBlock* labels = nullptr;
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
+    if (block == nullptr) {
+      block = &field_.FindOrAdd(index);
+      labels = &labels_.FindOrAdd(index);
+    }
+    if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
+        std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
+      continue;
+    }
+    block->distance[i] = arrival.distance[i];
+    block->weight[i] = arrival.weight[i];
+    block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
+    labels->id[i] = id;
+    labels->confidence[i] = confidence(i);
+    labels->ever |= EverBit(id);
+  }
+  if (block != nullptr) block->UpdateMasks(config_.back());
 }
 
 template <typename Function>

@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "mapper/freeing.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -61,6 +62,7 @@ void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
   Activate(id);
   FreeEmptyLists(left);
+  CheckInDebugBuilds(*this);
 }
 
 std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
@@ -113,6 +115,7 @@ void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   UpdateIndex(fused);
   freeing.FreeEmpty(fused, volumes_);
+  CheckInDebugBuilds(*this);
 }
 
 void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
@@ -236,6 +239,7 @@ void TsdfppMap::Remove(InstanceId id) {
     }
   }
   FreeEmptyLists(blocks);
+  CheckInDebugBuilds(*this);
 }
 
 InstanceId TsdfppMap::ActiveAt(const Index3& voxel) const {

@@ -50,6 +50,15 @@ class DenseAnchored : public DenseMap {
     index_.reset();
   }
 
+  void Rename(InstanceId from, InstanceId to) override {
+    if (const auto found = volumes_.find(from); found != volumes_.end()) {
+      volumes_.insert_or_assign(to, found->second);
+      volumes_.erase(from);
+    }
+    poses_.Rename(from, to);
+    index_.reset();
+  }
+
   Pose ObjectLattice(InstanceId id) const override { return poses_.Lattice(id); }
 
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {

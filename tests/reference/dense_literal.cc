@@ -65,6 +65,19 @@ class DenseLiteral : public DenseMap {
     FreeEmptyListBlocks();
   }
 
+  void Rename(InstanceId from, InstanceId to) override {
+    if (const auto found = volumes_.find(from); found != volumes_.end()) {
+      volumes_.insert_or_assign(to, found->second);
+      volumes_.erase(from);
+    }
+    poses_.Rename(from, to);
+    ForEachVoxel(box_, [&](const Eigen::Vector3i& v) {
+      for (auto* listing : {&pairs_.At(v).active, &pairs_.At(v).inactive}) {
+        if (*listing && (*listing)->id == from) (*listing)->id = to;
+      }
+    });
+  }
+
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {
     const auto found = volumes_.find(id);
     return found == volumes_.end() ? std::nullopt : AsValue(found->second.grid(v));

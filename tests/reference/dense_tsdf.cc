@@ -43,6 +43,13 @@ class DenseTsdf : public DenseMap {
     field_.FreeEmptyBlocks();
   }
 
+  void Rename(InstanceId from, InstanceId to) override {
+    ForEachVoxel(field_.grid.box(), [&](const Eigen::Vector3i& v) {
+      if (owners_(v).label == from) owners_.At(v).label = to;
+    });
+    poses_.Rename(from, to);
+  }
+
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {
     if (owners_(v).label != id) return std::nullopt;
     return AsValue(field_.grid(v));
