@@ -1,11 +1,11 @@
-// Maps a ball in front of a wall from synthetic depth images, moves the ball, asks the map how far
-// its surfaces are, and saves it.
+// Maps a ball in front of a wall from a synthetic depth image, moves the ball, asks the map how far
+// away its surface is, and saves the map.
 #include <iostream>
 
 #include "mapper/map_file.h"
 #include "mapper/map_query.h"
 
-using tsdfpp::Frame, tsdfpp::InstanceId, tsdfpp::MapQuery, tsdfpp::Pose;
+using tsdfpp::Frame, tsdfpp::InstanceId, tsdfpp::Pose;
 
 // A wall (the background) at z = 1 m and a ball (object 1) of radius 0.1 m around (0, 0, 0.7).
 Frame Render() {
@@ -28,19 +28,13 @@ Frame Render() {
 
 int main() {
   const auto map = tsdfpp::MakeMap(tsdfpp::Method::kTsdfppAnchored, {});
-  Pose T_WO = Pose::Identity();
-  T_WO.translation() = Eigen::Vector3d(0, 0, 0.7);
-  for (int i = 0; i < 3; ++i) {
-    const Frame frame = Render();
-    map->SetObjectPose(1, T_WO);
-    map->Fuse(frame, frame.mask);
-  }
-  T_WO.translation().x() += 0.15;
-  map->SetObjectPose(1, T_WO);
-  const auto ball = MapQuery(*map).At(Eigen::Vector3d(0.15, 0, 0.58)).visible;
-  if (!ball) return 1;
-  std::cout << "object " << ball->id << " is " << ball->distance_m << " m away, towards "
-            << -ball->gradient_W.transpose() << "\n";
+  const Frame frame = Render();
+  map->SetObjectPose(1, Pose(Eigen::Translation3d(0, 0, 0.7)));
+  map->Fuse(frame, frame.mask);
+  map->SetObjectPose(1, Pose(Eigen::Translation3d(0.15, 0, 0.7)));
+  const auto ball = tsdfpp::MapQuery(*map).At(Eigen::Vector3d(0.15, 0, 0.58)).visible.value();
+  std::cout << "object " << ball.id << " is " << ball.distance_m << " m away, towards "
+            << -ball.gradient_W.transpose() << "\n";
   const auto saved = tsdfpp::SaveMap("ball.tsdfpp", *map);
   if (!saved) std::cerr << saved.error().message << "\n";
   return saved ? 0 : 1;
