@@ -11,8 +11,11 @@
 
 namespace tsdfpp {
 
-void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArguments& arguments) {
-  app.add_option(name, arguments.path, "Sequence (folder or .klg) or scene (.toml)")->required();
+CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
+                                  SequenceArguments& arguments) {
+  CLI::Option* path =
+      app.add_option(name, arguments.path, "Sequence (folder or .klg) or scene (.toml)");
+  path->required();
   std::vector<std::string> formats;
   for (const DatasetFormat format : AllDatasetFormats()) {
     formats.emplace_back(DatasetFormatName(format));
@@ -30,6 +33,7 @@ void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArgume
                "Take a camera without poses on disk as one that does not move");
   app.add_flag("--unchecked", arguments.unchecked,
                "Do not look for wrong units and inverted poses");
+  return path;
 }
 
 std::string TextOf(const SequenceArguments& arguments) {

@@ -6,6 +6,8 @@
 #include <bit>
 #include <set>
 
+#include "mapper/freeing.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -71,14 +73,15 @@ void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   if (!volume.T_WO_birth) volume.T_WO_birth = T_WO;
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
   AddReach(id);
-  volume.lattice_is_world = SameNumbers(*volume.T_WO_birth, T_WO);
-  volume.T_WL = volume.lattice_is_world ? Pose::Identity() : T_WO * volume.T_WO_birth->inverse();
+  PlaceLattice(volume);
   reach_.erase(id);
   moved_.push_back(id);
+  CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
+  const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   std::set<InstanceId> changed_ids;
   for (const FusedBlock& block : fused) changed_ids.insert(block.id);
@@ -107,7 +110,9 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
       dirty_.push_back(block.index);
     }
   }
+  freeing.FreeEmpty(fused, volumes_);
   RefreshIndex();
+  CheckInDebugBuilds(*this);
 }
 
 // Whether another object may be listed in this block of the index.
@@ -130,6 +135,7 @@ void AnchoredMap::Remove(InstanceId id) {
   volumes_.erase(id);
   reach_.erase(id);
   RefreshIndex();
+  CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::RefreshIndex() const {
@@ -169,14 +175,18 @@ void AnchoredMap::RefreshIndex() const {
         }
       },
       tbb::simple_partitioner());
+  std::vector<Index3> emptied;
   for (std::size_t i = 0; i < dirty_.size(); ++i) {
     IndexBlock* block = index_.Find(dirty_[i]);
-    if (block != nullptr) {
+    if (block != nullptr && computed[i].empty()) {
+      emptied.push_back(dirty_[i]);
+    } else if (block != nullptr) {
       *block = std::move(computed[i]);
     } else if (!computed[i].empty()) {
       index_.FindOrAdd(dirty_[i]) = std::move(computed[i]);
     }
   }
+  index_.Erase(emptied);
   dirty_.clear();
 }
 

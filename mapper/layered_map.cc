@@ -40,6 +40,12 @@ std::vector<InstanceId> LayeredMap::Objects() const {
   return ids;
 }
 
+void LayeredMap::PlaceLattice(ObjectVolume& volume) {
+  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
+  volume.T_WL =
+      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
+}
+
 Pose LayeredMap::ObjectLattice(InstanceId id) const {
   const auto volume = volumes_.find(id);
   return volume == volumes_.end() ? Pose::Identity() : volume->second.T_WL;
@@ -124,6 +130,11 @@ TriangleMesh LayeredMap::SceneMesh() const {
   std::vector<JoinedMesh> visible;
   for (const auto& [id, object] : meshes_) visible.push_back({&object.mesh, id, true});
   return Join(visible);
+}
+
+const TsdfGrid* LayeredMap::GridOf(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  return volume == volumes_.end() ? nullptr : &volume->second.grid;
 }
 
 std::optional<VoxelValue> LayeredMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {

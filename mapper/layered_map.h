@@ -9,6 +9,7 @@ namespace tsdfpp {
 
 class LayeredMap : public MapRepresentation {
  public:
+  const MapConfig& config() const override { return config_; }
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
@@ -17,7 +18,11 @@ class LayeredMap : public MapRepresentation {
                                    const RayCastOptions& options) const override;
   MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
+  void Save(Sections& sections) const override;
+  // Covers are not up to date.
+  Expected<void> Load(const Sections& sections) override;
 
  protected:
   explicit LayeredMap(const MapConfig& config) : config_(config) {}
@@ -33,7 +38,17 @@ class LayeredMap : public MapRepresentation {
   // The fused blocks of one object whose masks changed.
   static std::vector<Index3> ChangedMasks(const std::vector<FusedBlock>& fused, InstanceId id);
 
+  // Where the lattice of a volume that stays in its object's frame is, from the poses at birth and
+  // now.
+  static void PlaceLattice(ObjectVolume& volume);
+  // An object that keeps its lattice, as it arrives in Add().
+  ObjectVolume& AddAnchored(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                            const Pose& T_WO);
+
   MapMemory VolumeMemory() const;
+  // FindFault() of the volumes; adds their blocks to `blocks`. Covers are those of volumes whose
+  // lattice is the world's.
+  std::optional<std::string> FindVolumeFault(bool with_covers, std::size_t& blocks) const;
 
   MapConfig config_;
   ObjectVolumes volumes_;

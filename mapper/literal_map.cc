@@ -4,7 +4,9 @@
 #include <tbb/parallel_for.h>
 
 #include "mapper/allocation.h"
+#include "mapper/freeing.h"
 #include "mapper/layered_map.h"
+#include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
@@ -26,6 +28,7 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const auto world = [](InstanceId) { return Pose::Identity(); };
+  const std::size_t blocks_before = lists_.size();
   for (const auto& [id, indices] : BlocksAlongRays(view, config_, world)) {
     for (const Index3& index : indices) lists_.FindOrAdd(index);
   }
@@ -52,6 +55,9 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
     for (const InstanceId id : task.targets) volumes_[id].grid.FindOrAdd(task.index);
   }
   for_each_task([&](Task& task) { FuseActive(view, T_CW, task); });
+  // A frame empties no list; it may have made blocks in vain.
+  lists_.Erase(EmptyFrom(lists_, blocks_before, [](const ListBlock& b) { return b.IsEmpty(); }));
+  CheckInDebugBuilds(*this);
 }
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
@@ -101,29 +107,53 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
   }
 }
 
-void LiteralMap::Unlist(InstanceId id) {
+bool LiteralMap::ListBlock::IsEmpty() const {
+  return std::all_of(active.begin(), active.end(),
+                     [](const Entry& entry) { return entry.id == kNoInstance; });
+}
+
+std::vector<Index3> LiteralMap::Unlist(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : lists_.entries()) {
     ListBlock& lists = *entry.block;
+    bool listed = false;
     for (std::size_t i = 0; i < kBlockVoxels; ++i) {
       if (lists.active[i].id == id) {
         lists.revision = NewRevision();
         lists.active[i] = lists.inactive[i];
         lists.inactive[i] = {};
+        listed = true;
       } else if (lists.inactive[i].id == id) {
         lists.inactive[i] = {};
       }
     }
+    if (listed) blocks.push_back(entry.index);
   }
+  return blocks;
+}
+
+void LiteralMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    if (lists_.Find(index)->IsEmpty()) empty.push_back(index);
+  }
+  lists_.Erase(empty);
 }
 
 void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
-  Unlist(id);
+  const std::vector<Index3> left = Unlist(id);
   volume.grid =
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
-  for (const auto& entry : volume.grid.entries()) {
+  Activate(id);
+  FreeEmptyLists(left);
+  CheckInDebugBuilds(*this);
+}
+
+void LiteralMap::Activate(InstanceId id) {
+  for (const auto& entry : volumes_.at(id).grid.entries()) {
     ListBlock& lists = lists_.FindOrAdd(entry.index);
     lists.revision = NewRevision();
     for (int place = 0; place < kBlockVoxels; ++place) {
@@ -136,8 +166,9 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 }
 
 void LiteralMap::Remove(InstanceId id) {
-  Unlist(id);
+  FreeEmptyLists(Unlist(id));
   volumes_.erase(id);
+  CheckInDebugBuilds(*this);
 }
 
 std::vector<InstanceId> LiteralMap::Objects() const {
@@ -161,6 +192,12 @@ TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
 // Brings the field of the active objects' values in line with lists and volumes.
 void LiteralMap::UpdateActiveField() const {
   TsdfGrid& field = active_.field;
+  std::vector<Index3> gone;
+  for (const auto& entry : field.entries()) {
+    if (lists_.Find(entry.index) == nullptr) gone.push_back(entry.index);
+  }
+  field.Erase(gone);
+  active_.made_from.Erase(gone);
   for (const auto& entry : lists_.entries()) {
     field.FindOrAdd(entry.index);
     active_.made_from.FindOrAdd(entry.index);
@@ -229,6 +266,11 @@ std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pos
 TriangleMesh LiteralMap::SceneMesh() const {
   UpdateMeshes();
   return Join({{&active_.mesh}});
+}
+
+const TsdfGrid* LiteralMap::GridOf(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  return volume == volumes_.end() ? nullptr : &volume->second.grid;
 }
 
 std::optional<VoxelValue> LiteralMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {

@@ -10,6 +10,8 @@
 #include "mapper/map_config.h"
 #include "mapper/mesh_cache.h"
 #include "mapper/ray_cast.h"
+#include "mapper/section_file.h"
+#include "mapper/tsdf_block.h"
 
 namespace tsdfpp {
 
@@ -37,6 +39,9 @@ class MapRepresentation {
  public:
   virtual ~MapRepresentation() = default;
 
+  virtual Method method() const = 0;
+  virtual const MapConfig& config() const = 0;
+
   // Paper III-E. The first pose given to an object is its pose at birth and moves nothing; nor does
   // one whose numbers equal the last. Objects must be given in increasing id within a frame.
   virtual void SetObjectPose(InstanceId id, const Pose& T_WO) = 0;
@@ -47,6 +52,19 @@ class MapRepresentation {
 
   // Takes the object out of the map; unknown ids change nothing.
   virtual void Remove(InstanceId id) = 0;
+
+  // Gives an object another id: its values, listings, votes and poses are then the new one's, and
+  // the places in lists stay, but for an index that is a function of volumes and poses, where ties
+  // go by id. Errors: kUsage where `from` is not in the map, `to` is (a pose given is enough), or
+  // one of them is the background or no id; the map is then unchanged.
+  virtual Expected<void> Rename(InstanceId from, InstanceId to) = 0;
+
+  // Puts a volume into the map as a new object whose pose is T_WO, with the volume's lattice at
+  // T_WL; it arrives as if it had moved there (docs/map.md, "Adding an object"). The voxel size
+  // must be the map's, and every block must hold an observed voxel. Errors: kUsage where the id is
+  // in the map (a pose given is enough), the background or no id; the map is then unchanged.
+  virtual Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                             const Pose& T_WO) = 0;
 
   // A deep copy.
   virtual std::unique_ptr<MapRepresentation> Clone() const = 0;
@@ -80,6 +98,10 @@ class MapRepresentation {
   // voxel if it is labelled so.
   virtual std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const = 0;
 
+  // The stored voxels of the object, in its lattice (that of all, for one field); nullptr where the
+  // map has none. Valid until the map changes.
+  virtual const TsdfGrid* GridOf(InstanceId id) const = 0;
+
   // The objects listed at a global voxel, the active one first.
   virtual std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const = 0;
 
@@ -90,6 +112,18 @@ class MapRepresentation {
   virtual std::vector<Eigen::Vector3i> ListedVoxels() const = 0;
 
   virtual MapMemory Memory() const = 0;
+
+  // The first thing found in what is stored that docs/map.md rules out, in a sentence; nothing
+  // where all is well. Slow (mapper/map_invariants.h).
+  virtual std::optional<std::string> FindFault() const = 0;
+
+  // The map's content as named sections of a file (mapper/map_file.h), always of the same names.
+  virtual void Save(Sections& sections) const = 0;
+
+  // Makes the map the saved one, bit for bit. It must have the same method and settings and be as
+  // MakeMap made it; `sections` have the names that Save() gives them. Errors: kData, a fragment
+  // that says what no map can hold; the map is then unusable.
+  virtual Expected<void> Load(const Sections& sections) = 0;
 };
 
 // All objects with their hidden parts, by increasing id: ObjectMesh of each, with face_ids.

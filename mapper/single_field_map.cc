@@ -7,7 +7,9 @@
 #include <set>
 
 #include "mapper/allocation.h"
+#include "mapper/freeing.h"
 #include "mapper/layered_map.h"
+#include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
@@ -32,6 +34,7 @@ std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
 void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const auto world = [](InstanceId) { return Pose::Identity(); };
+  const std::size_t blocks_before = field_.size();
   for (const auto& [id, indices] : BlocksAlongRays(view, config_, world)) {
     for (const Index3& index : indices) {
       field_.FindOrAdd(index);
@@ -60,6 +63,9 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
         }
       },
       tbb::simple_partitioner());
+  // A frame makes no voxel unobserved; it may have made blocks in vain.
+  FreeEmpty(EmptyFrom(field_, blocks_before, [](const TsdfBlock& b) { return !b.AnyObserved(); }));
+  CheckInDebugBuilds(*this);
 }
 
 bool SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
@@ -81,7 +87,17 @@ bool SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& o
   return result.any_taken;
 }
 
-void SingleFieldMap::Vacate(InstanceId id) {
+void SingleFieldMap::FreeEmpty(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    if (!field_.Find(index)->AnyObserved()) empty.push_back(index);
+  }
+  field_.Erase(empty);
+  labels_.Erase(empty);
+}
+
+std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : labels_.entries()) {
     LabelBlock& labels = *entry.block;
     if ((labels.ever & EverBit(id)) == 0) continue;
@@ -94,13 +110,17 @@ void SingleFieldMap::Vacate(InstanceId id) {
       labels.confidence[i] = 0;
       changed = true;
     }
-    if (changed) block.UpdateMasks(config_.back());
+    if (!changed) continue;
+    block.UpdateMasks(config_.back());
+    blocks.push_back(entry.index);
   }
+  return blocks;
 }
 
 void SingleFieldMap::Remove(InstanceId id) {
-  Vacate(id);
+  FreeEmpty(Vacate(id));
   T_WO_.erase(id);
+  CheckInDebugBuilds(*this);
 }
 
 void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -124,7 +144,7 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
     source.Add(entry->index, std::move(block));
     source_labels.FindOrAdd(entry->index) = *entry->block;
   }
-  Vacate(id);
+  const std::vector<Index3> left = Vacate(id);
 
   const VoxelReader reader(source);
   const Pose T_inverse = T_rel.inverse();
@@ -152,28 +172,35 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   };
   for (std::size_t b = 0; b < touched.size(); ++b) {
     if (arrivals[b] == nullptr) continue;
-    const TsdfBlock& arrival = *arrivals[b];
-    TsdfBlock* block = nullptr;
-    LabelBlock* labels = nullptr;
-    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-      if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
-      if (block == nullptr) {
-        block = &field_.FindOrAdd(touched[b]);
-        labels = &labels_.FindOrAdd(touched[b]);
-      }
-      if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
-          std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
-        continue;
-      }
-      block->distance[i] = arrival.distance[i];
-      block->weight[i] = arrival.weight[i];
-      block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
-      labels->id[i] = id;
-      labels->confidence[i] = confidence_at(VoxelAt(touched[b], static_cast<int>(i)));
-      labels->ever |= EverBit(id);
-    }
-    if (block != nullptr) block->UpdateMasks(config_.back());
+    Arrive(id, touched[b], *arrivals[b],
+           [&](std::size_t i) { return confidence_at(VoxelAt(touched[b], static_cast<int>(i))); });
   }
+  FreeEmpty(left);
+  CheckInDebugBuilds(*this);
+}
+
+void SingleFieldMap::Arrive(InstanceId id, const Index3& index, const TsdfBlock& arrival,
+                            const std::function<std::uint16_t(std::size_t)>& confidence) {
+  TsdfBlock* block = nullptr;
+  LabelBlock* labels = nullptr;
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
+    if (block == nullptr) {
+      block = &field_.FindOrAdd(index);
+      labels = &labels_.FindOrAdd(index);
+    }
+    if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
+        std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
+      continue;
+    }
+    block->distance[i] = arrival.distance[i];
+    block->weight[i] = arrival.weight[i];
+    block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
+    labels->id[i] = id;
+    labels->confidence[i] = confidence(i);
+    labels->ever |= EverBit(id);
+  }
+  if (block != nullptr) block->UpdateMasks(config_.back());
 }
 
 template <typename Function>
@@ -238,6 +265,8 @@ TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {
   mesh.face_ids.clear();
   return mesh;
 }
+
+const TsdfGrid* SingleFieldMap::GridOf(InstanceId) const { return &field_; }
 
 std::optional<VoxelValue> SingleFieldMap::ValueAt(InstanceId id,
                                                   const Eigen::Vector3i& voxel) const {

@@ -16,6 +16,11 @@ inline bool Bit(const BlockMask& mask, int place) {
   return ((mask[static_cast<std::size_t>(place >> 6)] >> static_cast<unsigned>(place & 63)) & 1U) !=
          0;
 }
+inline bool Any(const BlockMask& mask) {
+  std::uint64_t any = 0;
+  for (const std::uint64_t slice : mask) any |= slice;
+  return any != 0;
+}
 inline void SetBit(BlockMask& mask, int place) {
   mask[static_cast<std::size_t>(place >> 6)] |= 1ULL << static_cast<unsigned>(place & 63);
 }
@@ -48,11 +53,8 @@ struct TsdfBlock {
   // Brings observed, negative and band in line with the values, and gives the block a new revision;
   // true where one of the masks changed. `back` in metres.
   bool UpdateMasks(float back);
-  bool AnyNegative() const {
-    std::uint64_t any = 0;
-    for (const std::uint64_t slice : negative) any |= slice;
-    return any != 0;
-  }
+  bool AnyNegative() const { return Any(negative); }
+  bool AnyObserved() const { return Any(observed); }
   void Clear(int place) {
     const auto i = static_cast<std::size_t>(place);
     distance[i] = 0;

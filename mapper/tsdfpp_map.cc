@@ -5,6 +5,8 @@
 
 #include <bit>
 
+#include "mapper/freeing.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -32,6 +34,7 @@ struct TsdfppMap::Group {
   ListBlock* lists = nullptr;
   std::vector<std::size_t> changes;  // into the cover changes
   std::vector<std::size_t> votes;    // into the fused blocks
+  bool emptied = false;
 };
 
 TsdfppMap::TsdfppMap(const MapConfig& config, int layers) : LayeredMap(config), layers_(layers) {}
@@ -54,13 +57,16 @@ void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
-  Deactivate(id);
+  const std::vector<Index3> left = Deactivate(id);
   volume.grid =
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
   Activate(id);
+  FreeEmptyLists(left);
+  CheckInDebugBuilds(*this);
 }
 
-void TsdfppMap::Deactivate(InstanceId id) {
+std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : volumes_.at(id).grid.entries()) {
     ListBlock* lists = index_.Find(entry.index);
     if (lists == nullptr) continue;
@@ -69,13 +75,32 @@ void TsdfppMap::Deactivate(InstanceId id) {
       ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z,
                  [&](int place) { ListOf(*lists, place).Remove(id); });
     }
+    if (Any(entry.block->cover)) blocks.push_back(entry.index);
   }
+  return blocks;
+}
+
+bool TsdfppMap::IsEmpty(const ListBlock& lists) const {
+  for (std::size_t i = 0; i < lists.size(); i += static_cast<std::size_t>(layers_)) {
+    if (lists[i].id != kNoInstance) return false;
+  }
+  return true;
+}
+
+void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    const ListBlock* lists = index_.Find(index);
+    if (lists != nullptr && IsEmpty(*lists)) empty.push_back(index);
+  }
+  index_.Erase(empty);
 }
 
 void TsdfppMap::Activate(InstanceId id) {
   const TsdfGrid& grid = volumes_.at(id).grid;
   for (const auto& entry : grid.entries()) {
     entry.block->cover = FindCover(grid, entry.index);
+    if (!Any(entry.block->cover)) continue;
     ListBlock& lists = ListsOf(entry.index);
     for (int z = 0; z < kBlockSide; ++z) {
       ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z,
@@ -86,7 +111,11 @@ void TsdfppMap::Activate(InstanceId id) {
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
-  UpdateIndex(FuseIntoVolumes(view, config_, volumes_));
+  const FrameFreeing freeing(volumes_);
+  const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
+  UpdateIndex(fused);
+  freeing.FreeEmpty(fused, volumes_);
+  CheckInDebugBuilds(*this);
 }
 
 void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
@@ -117,8 +146,14 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
     }
     return groups[number - 1];
   };
-  for (std::size_t i = 0; i < changes.size(); ++i) group_at(changes[i].index).changes.push_back(i);
-  for (std::size_t i = 0; i < fused.size(); ++i) group_at(fused[i].index).votes.push_back(i);
+  // A block that nothing covers, or did, has no lists.
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    if (!Any(changes[i].block->cover) && !Any(changes[i].old_cover)) continue;
+    group_at(changes[i].index).changes.push_back(i);
+  }
+  for (std::size_t i = 0; i < fused.size(); ++i) {
+    if (Any(fused[i].block->cover)) group_at(fused[i].index).votes.push_back(i);
+  }
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, groups.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
@@ -127,17 +162,24 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
         }
       },
       tbb::simple_partitioner());
+  std::vector<Index3> empty;
+  for (const auto& entry : group_of.entries()) {
+    if (groups[*entry.block - 1].emptied) empty.push_back(entry.index);
+  }
+  index_.Erase(empty);
 }
 
-void TsdfppMap::ApplyGroup(const Group& group, const std::vector<FusedBlock>& fused,
+void TsdfppMap::ApplyGroup(Group& group, const std::vector<FusedBlock>& fused,
                            const std::vector<CoverChange>& changes) {
   ListBlock& lists = *group.lists;
+  std::uint64_t lost_any = 0;
   for (int z = 0; z < kBlockSide; ++z) {
     const auto slice = static_cast<std::size_t>(z);
     for (const std::size_t i : group.changes) {
       const CoverChange& change = changes[i];
       const std::uint64_t lost = change.old_cover[slice] & ~change.block->cover[slice];
       ForEachBit(lost, z, [&](int place) { ListOf(lists, place).Remove(change.id); });
+      lost_any |= lost;
     }
     for (const std::size_t i : group.votes) {
       const FusedBlock& vote = fused[i];
@@ -161,6 +203,7 @@ void TsdfppMap::ApplyGroup(const Group& group, const std::vector<FusedBlock>& fu
       });
     }
   }
+  group.emptied = lost_any != 0 && IsEmpty(lists);
 }
 
 void TsdfppMap::Remove(InstanceId id) {
@@ -184,8 +227,10 @@ void TsdfppMap::Remove(InstanceId id) {
     }
   }
   volumes_.erase(removed);
-  if (!config_.relist_on_removal) return;
+  std::vector<Index3> blocks;
   for (const Vacated& voxel : vacated) {
+    if (blocks.empty() || blocks.back() != voxel.block) blocks.push_back(voxel.block);
+    if (!config_.relist_on_removal) continue;
     VoxelList list = ListOf(*index_.Find(voxel.block), voxel.place);
     for (const auto& [other, volume] : volumes_) {
       const TsdfBlock* block = volume.grid.Find(voxel.block);
@@ -193,6 +238,8 @@ void TsdfppMap::Remove(InstanceId id) {
       list.Append(other, 1);
     }
   }
+  FreeEmptyLists(blocks);
+  CheckInDebugBuilds(*this);
 }
 
 InstanceId TsdfppMap::ActiveAt(const Index3& voxel) const {

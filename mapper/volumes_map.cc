@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "mapper/freeing.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
 #include "mapper/voxel_list.h"
@@ -87,12 +89,16 @@ void VolumesMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   volume.T_WO = T_WO;
   if (!volume.T_WO_birth) volume.T_WO_birth = T_WO;
-  volume.lattice_is_world = SameNumbers(*volume.T_WO_birth, T_WO);
-  volume.T_WL = volume.lattice_is_world ? Pose::Identity() : T_WO * volume.T_WO_birth->inverse();
+  PlaceLattice(volume);
+  CheckInDebugBuilds(*this);
 }
 
 void VolumesMap::Fuse(const Frame& frame, const cv::Mat& labels) {
-  FuseIntoVolumes(FrameView(frame, labels), config_, volumes_);
+  const FrameFreeing freeing(volumes_);
+  const std::vector<FusedBlock> fused =
+      FuseIntoVolumes(FrameView(frame, labels), config_, volumes_);
+  freeing.FreeEmpty(fused, volumes_);
+  CheckInDebugBuilds(*this);
 }
 
 void VolumesMap::Remove(InstanceId id) { volumes_.erase(id); }

@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/files.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 
@@ -94,6 +96,40 @@ TEST(CommandJson, IsAllThatStdoutHolds) {
     }
   }
   EXPECT_FALSE(std::filesystem::exists((folder / "map") / "mesh" / "house-2.ply"));
+}
+
+// Every file of a folder but stats.json, whose times differ.
+std::map<std::string, std::string> FilesOf(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file() || entry.path().filename() == "stats.json") continue;
+    files[std::filesystem::relative(entry.path(), folder)] = ReadFile(entry.path()).value();
+  }
+  return files;
+}
+
+// Stopped, saved, loaded and gone on with, a run leaves what it leaves in one go; and a file alone
+// gives the meshes again.
+TEST(CommandMap, GoesOnFromAFileAsIfItHadNotStopped) {
+  const TempFolder folder;
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "map");
+    const CommandOutput output = RunTsdfpp(arguments, folder.path());
+    ASSERT_EQ(output.exit_code, 0) << output.err;
+  };
+  run({kMini, "--until", "4", "--save", folder / "whole.map", "--out", folder / "whole"});
+  run({kMini, "--until", "2", "--save", folder / "half.map", "--out", folder / "half"});
+  run({kMini, "--load", folder / "half.map", "--until", "4", "--save", folder / "both.map", "--out",
+       folder / "both"});
+  run({"--load", folder / "both.map", "--save", folder / "again.map", "--out", folder / "again"});
+  const auto whole = FilesOf(folder / "whole");
+  EXPECT_GE(whole.size(), 4U);
+  EXPECT_TRUE(FilesOf(folder / "both") == whole);
+  EXPECT_TRUE(FilesOf(folder / "again") == whole);
+  EXPECT_FALSE(FilesOf(folder / "half") == whole);
+  const std::string bytes = ReadFile(folder / "whole.map").value();
+  EXPECT_TRUE(ReadFile(folder / "both.map").value() == bytes);
+  EXPECT_TRUE(ReadFile(folder / "again.map").value() == bytes);
 }
 
 }  // namespace

@@ -38,12 +38,22 @@ class DenseAnchored : public DenseMap {
     index_.reset();
     for (auto& [id, volume] : volumes_) {
       FuseObject(id, View(frame, labels, ObjectLattice(id), config_), config_, volume, nullptr);
+      volume.FreeEmptyBlocks();
     }
   }
 
   void Remove(InstanceId id) override {
     volumes_.erase(id);
     poses_.Forget(id);
+    index_.reset();
+  }
+
+  void Rename(InstanceId from, InstanceId to) override {
+    if (const auto found = volumes_.find(from); found != volumes_.end()) {
+      volumes_.insert_or_assign(to, found->second);
+      volumes_.erase(from);
+    }
+    poses_.Rename(from, to);
     index_.reset();
   }
 
