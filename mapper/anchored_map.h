@@ -22,7 +22,7 @@ class AnchoredMap final : public LayeredMap {
                                    const RayCastOptions& options) const override;
 
  protected:
-  InstanceId ActiveAt(const Index3& voxel) const override;
+  ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
   // K ids for each voxel, active first, kNoInstance where unused.

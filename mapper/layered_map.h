@@ -21,8 +21,21 @@ class LayeredMap : public MapRepresentation {
   explicit LayeredMap(const MapConfig& config) : config_(config) {}
   LayeredMap(const LayeredMap&) = default;
 
+  // The active objects of a block of the global index, kNoInstance where there is none: that of the
+  // i-th voxel is first[i * stride]. `first` is nullptr where nothing is listed.
+  struct ActiveIds {
+    const InstanceId* first = nullptr;
+    std::size_t stride = 0;
+
+    InstanceId At(int place) const {
+      return first == nullptr ? kNoInstance : first[static_cast<std::size_t>(place) * stride];
+    }
+  };
+  virtual ActiveIds ActiveIn(const Index3& block) const = 0;
   // The active object of a global voxel, or kNoInstance.
-  virtual InstanceId ActiveAt(const Index3& voxel) const = 0;
+  InstanceId ActiveAt(const Index3& voxel) const {
+    return ActiveIn(BlockOf(voxel)).At(PlaceInBlock(voxel));
+  }
 
   // Blocks of the world-lattice volume that hold or touch a fused block: those whose cover may
   // change. Sorted, unique.

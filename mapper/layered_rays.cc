@@ -133,22 +133,30 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
         Eigen::Vector3d(of->second.T_LW * (voxel * config_.voxel_m) / config_.voxel_m)));
   };
   const float voxel_m = config_.voxel();
-  pass.hidden = [&](InstanceId id, const Eigen::Vector3f& look_up_W,
-                    std::span<const InstanceId> without) {
-    const Index3 v = NearestVoxel(look_up_W, voxel_m);
-    InstanceId active = kNoInstance;
-    if (without.empty()) {
-      active = ActiveAt(v);
-    } else {
-      for (const Listing& entry : ListAt({v.x, v.y, v.z})) {
-        if (std::find(without.begin(), without.end(), entry.id) != without.end()) continue;
-        active = entry.id;
-        break;
-      }
-    }
-    if (active == kNoInstance || active == id) return false;
-    const auto distance = distance_at(active, v);
-    return distance && *distance < -voxel_m;
+  pass.make_hidden = [&]() -> RayPass::Hidden {
+    // One look-up after another is in the same block.
+    return
+        [&, block = Index3{}, ids = ActiveIn({})](InstanceId id, const Eigen::Vector3f& look_up_W,
+                                                  std::span<const InstanceId> without) mutable {
+          const Index3 v = NearestVoxel(look_up_W, voxel_m);
+          InstanceId active = kNoInstance;
+          if (without.empty()) {
+            if (BlockOf(v) != block) {
+              block = BlockOf(v);
+              ids = ActiveIn(block);
+            }
+            active = ids.At(PlaceInBlock(v));
+          } else {
+            for (const Listing& entry : ListAt({v.x, v.y, v.z})) {
+              if (std::find(without.begin(), without.end(), entry.id) != without.end()) continue;
+              active = entry.id;
+              break;
+            }
+          }
+          if (active == kNoInstance || active == id) return false;
+          const auto distance = distance_at(active, v);
+          return distance && *distance < -voxel_m;
+        };
   };
   return RunRayPass(pass, camera, T_WC, options);
 }

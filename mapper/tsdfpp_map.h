@@ -21,7 +21,7 @@ class TsdfppMap final : public LayeredMap {
                                    const RayCastOptions& options) const override;
 
  protected:
-  InstanceId ActiveAt(const Index3& voxel) const override;
+  ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
   // kBlockVoxels lists of K entries.
