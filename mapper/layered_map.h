@@ -27,14 +27,16 @@ class LayeredMap : public MapRepresentation {
     const InstanceId* first = nullptr;
     std::size_t stride = 0;
 
-    InstanceId At(int place) const {
-      return first == nullptr ? kNoInstance : first[static_cast<std::size_t>(place) * stride];
+    // Where the voxel's is, nullptr where nothing is listed.
+    const InstanceId* Place(int place) const {
+      return first == nullptr ? nullptr : first + static_cast<std::size_t>(place) * stride;
     }
   };
   virtual ActiveIds ActiveIn(const Index3& block) const = 0;
   // The active object of a global voxel, or kNoInstance.
   InstanceId ActiveAt(const Index3& voxel) const {
-    return ActiveIn(BlockOf(voxel)).At(PlaceInBlock(voxel));
+    const InstanceId* place = ActiveIn(BlockOf(voxel)).Place(PlaceInBlock(voxel));
+    return place == nullptr ? kNoInstance : *place;
   }
 
   // Blocks of the world-lattice volume that hold or touch a fused block: those whose cover may

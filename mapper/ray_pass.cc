@@ -216,14 +216,12 @@ class Caster::Tile {
     if (!c_.pass_.contested) return;
     // Few surfaces are hidden, so that is asked of the nearest ones only; where it is so, the ray
     // is cast again, with the question at every surface.
-    bool any = false;
-    for (std::size_t i = 0; i < kTilePixels; ++i) {
-      const bool again = hits.block[i] >= 0 && IsHidden(hits, i, k);
-      redone_.depth[i] = again ? kInfinite : 0;
-      redone_.block[i] = -1;
-      any = any || again;
+    if (!AnyHidden(hits, hits.block, k)) return;
+    redone_.depth.fill(0);
+    redone_.block.fill(-1);
+    for (const HiddenQuery& query : queries_) {
+      if (query.hidden) redone_.depth[query.pixel] = kInfinite;
     }
-    if (!any) return;
     for (TileValues& component : redone_.normal) component.fill(0);
     Sweep(list, k, true, redone_);
     for (std::size_t i = 0; i < kTilePixels; ++i) {
@@ -267,15 +265,30 @@ class Caster::Tile {
     return any;
   }
 
-  // Whether what pixel i has hit is hidden in the map without the objects of the surfaces before k.
-  bool IsHidden(const TileHits& hits, std::size_t i, std::size_t k) {
-    const std::uint32_t number = static_cast<std::uint32_t>(hits.block[i]);
-    if (!c_.blocks_[number].contested) return false;
-    const Eigen::Vector3f normal(hits.normal[0][i], hits.normal[1][i], hits.normal[2][i]);
-    without_.clear();
-    for (std::size_t n = 0; n < k; ++n) without_.push_back(IdOf(surfaces_[n], i));
-    return hidden_(c_.id_of_block_[number], PointAt(i, hits.depth[i]) + 0.5F * voxel_ * normal,
-                   without_);
+  // Asks of all pixels whose entry in `asked` is not negative whether what they have hit is hidden
+  // in the map without the objects of their surfaces before k; the answers are in `queries_`.
+  bool AnyHidden(const TileHits& hits, const std::array<std::int32_t, kTilePixels>& asked,
+                 std::size_t k) {
+    queries_.clear();
+    for (std::uint32_t i = 0; i < kTilePixels; ++i) {
+      if (asked[i] < 0) continue;
+      const auto number = static_cast<std::size_t>(hits.block[i]);
+      if (!c_.blocks_[number].contested) continue;
+      const Eigen::Vector3f normal(hits.normal[0][i], hits.normal[1][i], hits.normal[2][i]);
+      queries_.push_back(
+          {c_.id_of_block_[number], i, PointAt(i, hits.depth[i]) + 0.5F * voxel_ * normal, false});
+    }
+    if (k == 0) {
+      hidden_(queries_, {});
+    } else {
+      for (HiddenQuery& query : queries_) {
+        without_.clear();
+        for (std::size_t n = 0; n < k; ++n) without_.push_back(IdOf(surfaces_[n], query.pixel));
+        hidden_({&query, 1}, without_);
+      }
+    }
+    return std::any_of(queries_.begin(), queries_.end(),
+                       [](const HiddenQuery& query) { return query.hidden; });
   }
 
   // Surfaces that are hidden are passed through.
@@ -285,14 +298,17 @@ class Caster::Tile {
     trial_.depth = hits.depth;
     Through(number, from, trial_);
     for (bool again = true; again;) {
-      again = false;
-      trial_from_.fill(kInfinite);
+      std::array<std::int32_t, kTilePixels> asked;
       for (std::size_t i = 0; i < kTilePixels; ++i) {
-        if (!(trial_.depth[i] < hits.depth[i])) continue;
-        if (IsHidden(trial_, i, k)) {
+        asked[i] = trial_.depth[i] < hits.depth[i] ? 0 : -1;
+      }
+      again = AnyHidden(trial_, asked, k);
+      trial_from_.fill(kInfinite);
+      for (const HiddenQuery& query : queries_) {
+        const std::size_t i = query.pixel;
+        if (query.hidden) {
           trial_from_[i] = trial_.depth[i] + past;
           trial_.depth[i] = hits.depth[i];
-          again = true;
         } else {
           Copy(trial_, hits, i);
         }
@@ -424,6 +440,7 @@ class Caster::Tile {
   TileValues trial_from_;
   std::vector<InstanceId> without_;
   RayPass::Hidden hidden_;
+  std::vector<HiddenQuery> queries_;
 };
 
 std::vector<RaySurface> Caster::Run() {
