@@ -5,7 +5,9 @@
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "eval/map_output.h"
+#include "eval/map_views.h"
 #include "eval/open_source.h"
+#include "mapper/voxel_list.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -23,6 +25,7 @@ struct Options {
   double trunc_front = 0;
   double trunc_back = 0;
   int until = -1;
+  int views = 0;
 };
 
 Expected<CommandResult> RunMap(const Options& options) {
@@ -55,6 +58,7 @@ Expected<CommandResult> RunMap(const Options& options) {
 
   Pipeline pipeline(config, info.objects);
   RunTimes times;
+  Pose T_WC = Pose::Identity();  // of the last frame
   {
     ProgressBar bar("map");
     for (int index = info.first_index; index <= until; ++index) {
@@ -64,6 +68,7 @@ Expected<CommandResult> RunMap(const Options& options) {
                          options.source.path, index);
       }
       times.Add(pipeline.Process(frame));
+      T_WC = frame.T_WC;
       bar.Show(index - info.first_index + 1, until - info.first_index + 1);
     }
   }
@@ -75,6 +80,10 @@ Expected<CommandResult> RunMap(const Options& options) {
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
   TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out));
+  if (options.views > 0) {
+    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views,
+                                      std::filesystem::path(options.out) / "views"));
+  }
   const MapMemory memory = map->Memory();
   const nlohmann::json stats{
       {"method", MethodName(config.method)},
@@ -125,6 +134,10 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
+  app.add_option("--views", options->views,
+                 "Surfaces along each ray of the last camera to write as pictures: 1 is what is "
+                 "visible, 2 adds what is behind it")
+      ->check(CLI::Range(0, kMaxLayers));
   app.add_option("--out", options->out, "Output folder")->required();
   return [options] { return RunMap(*options); };
 }
