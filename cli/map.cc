@@ -8,7 +8,9 @@
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "eval/map_output.h"
+#include "eval/map_views.h"
 #include "eval/open_source.h"
+#include "mapper/voxel_list.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -28,6 +30,7 @@ struct Options {
   double trunc_front = 0;
   double trunc_back = 0;
   int until = -1;
+  int views = 0;
 };
 
 // Settings that a loaded map has already.
@@ -94,6 +97,11 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
 
   RunTimes times;
   const int frames = start.last - start.first + 1;
+  if (options.views > 0 && frames == 0) {
+    return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
+                      options.views);
+  }
+  Pose T_WC = Pose::Identity();  // of the last frame
   {
     ProgressBar bar("map");
     for (int index = start.first; index <= start.last; ++index) {
@@ -103,6 +111,7 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
                          options.source.path, index);
       }
       times.Add(pipeline.Process(frame));
+      T_WC = frame.T_WC;
       bar.Show(index - start.first + 1, frames);
     }
   }
@@ -114,6 +123,10 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
   TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out));
+  if (options.views > 0) {
+    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views,
+                                      std::filesystem::path(options.out) / "views"));
+  }
   const MapMemory memory = map->Memory();
   nlohmann::json stats{
       {"method", MethodName(config.method)},
@@ -174,6 +187,10 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
+  app.add_option("--views", options->views,
+                 "Surfaces along each ray of the last camera to write as pictures: 1 is what is "
+                 "visible, 2 adds what is behind it")
+      ->check(CLI::Range(0, kMaxLayers));
   app.add_option(
       "--load", options->load,
       "Begin with the map in this file: with a sequence, go on after the map's last frame; "

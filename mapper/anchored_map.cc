@@ -225,10 +225,10 @@ AnchoredMap::IndexBlock AnchoredMap::ComputeBlock(const Index3& index,
   return ids;
 }
 
-InstanceId AnchoredMap::ActiveAt(const Index3& voxel) const {
-  const IndexBlock* ids = index_.Find(BlockOf(voxel));
-  if (ids == nullptr || ids->empty()) return kNoInstance;
-  return (*ids)[static_cast<std::size_t>(PlaceInBlock(voxel) * layers_)];
+LayeredMap::ActiveIds AnchoredMap::ActiveIn(const Index3& block) const {
+  const IndexBlock* ids = index_.Find(block);
+  if (ids == nullptr || ids->empty()) return {};
+  return {ids->data(), static_cast<std::size_t>(layers_)};
 }
 
 MeshWork AnchoredMap::UpdateMeshes() const {

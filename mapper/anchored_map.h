@@ -28,7 +28,7 @@ class AnchoredMap final : public LayeredMap {
   Expected<void> Load(const Sections& sections) override;
 
  protected:
-  InstanceId ActiveAt(const Index3& voxel) const override;
+  ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
   // K ids for each voxel, active first, kNoInstance where unused.

@@ -28,8 +28,23 @@ class LayeredMap : public MapRepresentation {
   explicit LayeredMap(const MapConfig& config) : config_(config) {}
   LayeredMap(const LayeredMap&) = default;
 
+  // The active objects of a block of the global index, kNoInstance where there is none: that of the
+  // i-th voxel is first[i * stride]. `first` is nullptr where nothing is listed.
+  struct ActiveIds {
+    const InstanceId* first = nullptr;
+    std::size_t stride = 0;
+
+    // Where the voxel's is, nullptr where nothing is listed.
+    const InstanceId* Place(int place) const {
+      return first == nullptr ? nullptr : first + static_cast<std::size_t>(place) * stride;
+    }
+  };
+  virtual ActiveIds ActiveIn(const Index3& block) const = 0;
   // The active object of a global voxel, or kNoInstance.
-  virtual InstanceId ActiveAt(const Index3& voxel) const = 0;
+  InstanceId ActiveAt(const Index3& voxel) const {
+    const InstanceId* place = ActiveIn(BlockOf(voxel)).Place(PlaceInBlock(voxel));
+    return place == nullptr ? kNoInstance : *place;
+  }
 
   // Blocks of the world-lattice volume that hold or touch a fused block: those whose cover may
   // change. Sorted, unique.

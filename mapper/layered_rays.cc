@@ -94,6 +94,19 @@ class Claims {
   std::vector<InstanceId> table_;  // empty where the box is too large
 };
 
+struct LookUp {
+  Index3 voxel;
+  const InstanceId* active = nullptr;  // in the index; nullptr where nothing is listed
+};
+
+// The first one that is not left out, or kNoInstance.
+InstanceId FirstOf(const std::vector<Listing>& list, std::span<const InstanceId> without) {
+  for (const Listing& entry : list) {
+    if (std::find(without.begin(), without.end(), entry.id) == without.end()) return entry.id;
+  }
+  return kNoInstance;
+}
+
 }  // namespace
 
 std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
@@ -133,22 +146,34 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
         Eigen::Vector3d(of->second.T_LW * (voxel * config_.voxel_m) / config_.voxel_m)));
   };
   const float voxel_m = config_.voxel();
-  pass.hidden = [&](InstanceId id, const Eigen::Vector3f& look_up_W,
-                    std::span<const InstanceId> without) {
-    const Index3 v = NearestVoxel(look_up_W, voxel_m);
-    InstanceId active = kNoInstance;
-    if (without.empty()) {
-      active = ActiveAt(v);
-    } else {
-      for (const Listing& entry : ListAt({v.x, v.y, v.z})) {
-        if (std::find(without.begin(), without.end(), entry.id) != without.end()) continue;
-        active = entry.id;
-        break;
+  pass.make_hidden = [&]() -> RayPass::Hidden {
+    return [&, looked_up = std::vector<LookUp>()](std::span<HiddenQuery> queries,
+                                                  std::span<const InstanceId> without) mutable {
+      // All places first, so that their memory is on its way when it is read; one after another is
+      // in the same block.
+      looked_up.clear();
+      Index3 block;
+      ActiveIds ids = ActiveIn(block);
+      for (const HiddenQuery& query : queries) {
+        const Index3 v = NearestVoxel(query.look_up_W, voxel_m);
+        if (BlockOf(v) != block) {
+          block = BlockOf(v);
+          ids = ActiveIn(block);
+        }
+        const InstanceId* place = ids.Place(PlaceInBlock(v));
+        __builtin_prefetch(place);
+        looked_up.push_back({v, place});
       }
-    }
-    if (active == kNoInstance || active == id) return false;
-    const auto distance = distance_at(active, v);
-    return distance && *distance < -voxel_m;
+      for (std::size_t i = 0; i < queries.size(); ++i) {
+        const auto& [v, place] = looked_up[i];
+        if (place == nullptr) continue;
+        const InstanceId active =
+            without.empty() ? *place : FirstOf(ListAt({v.x, v.y, v.z}), without);
+        if (active == kNoInstance || active == queries[i].id) continue;
+        const auto distance = distance_at(active, v);
+        queries[i].hidden = distance && *distance < -voxel_m;
+      }
+    };
   };
   return RunRayPass(pass, camera, T_WC, options);
 }

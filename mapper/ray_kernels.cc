@@ -1,5 +1,7 @@
 #include "mapper/ray_kernels.h"
 
+#include <hwy/cache_control.h>
+
 // One pass of this file an instruction set, as fusion_kernels.cc.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "mapper/ray_kernels.cc"
@@ -313,6 +315,12 @@ const TileOrder& OrderOfTile() {
 
 void FillTileRays(const LatticeRays& lattice, int u, int v, TileRays& rays) {
   HWY_DYNAMIC_DISPATCH(FillRays)(lattice, u, v, rays);
+}
+
+void PrefetchBlock(const RayBlock& block) {
+  constexpr std::size_t kLine = 64;
+  const auto* bytes = reinterpret_cast<const char*>(&block);
+  for (std::size_t i = 0; i < sizeof(RayBlock); i += kLine) hwy::Prefetch(bytes + i);
 }
 
 float CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,

@@ -49,6 +49,9 @@ struct TileHits {
   std::array<std::int32_t, kTilePixels> block;  // its number, -1 for none
 };
 
+// Starts to bring a block into the cache: most are met by one tile only once.
+void PrefetchBlock(const RayBlock& block);
+
 // Casts the tile's rays through the block's crossed cubes: where a ray passes from outside to
 // inside at a depth of at least `from` and less than what it has met so far, that is its first such
 // point in this block, and `hits` takes it. `number` is the block's. Returns the largest

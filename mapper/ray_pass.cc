@@ -15,7 +15,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kTilesPerTask = 4;
+constexpr std::size_t kTilesPerTask = 16;
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 std::size_t At(int i) { return static_cast<std::size_t>(i); }
@@ -145,6 +145,7 @@ class Caster::Tile {
         filled_(caster.lattices_.size(), 0),
         surfaces_(At(caster.options_.surfaces)) {
     from_.fill(static_cast<float>(c_.options_.near_m));
+    if (c_.pass_.make_hidden) hidden_ = c_.pass_.make_hidden();
   }
 
   void Cast(std::size_t number) {
@@ -211,55 +212,106 @@ class Caster::Tile {
         if (surfaces_[k - 1].block[i] < 0) hits.depth[i] = 0;  // nothing in front: nothing behind
       }
     }
+    Sweep(list, k, false, hits);
+    if (!c_.pass_.contested) return;
+    // Few surfaces are hidden, so that is asked of the nearest ones only; where it is so, the ray
+    // is cast again, with the question at every surface.
+    if (!AnyHidden(hits, hits.block, k)) return;
+    redone_.depth.fill(0);
+    redone_.block.fill(-1);
+    for (const HiddenQuery& query : queries_) {
+      if (query.hidden) redone_.depth[query.pixel] = kInfinite;
+    }
+    for (TileValues& component : redone_.normal) component.fill(0);
+    Sweep(list, k, true, redone_);
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      if (redone_.depth[i] != 0) Copy(redone_, hits, i);
+    }
+  }
+
+  static void Copy(const TileHits& from, TileHits& to, std::size_t i) {
+    to.depth[i] = from.depth[i];
+    to.block[i] = from.block[i];
+    for (std::size_t a = 0; a < 3; ++a) to.normal[a][i] = from.normal[a][i];
+  }
+
+  // Through the tile's blocks, nearest first. Pixels with a depth of 0 are left out.
+  void Sweep(std::span<const std::uint32_t> list, std::size_t k, bool ask, TileHits& hits) {
     float farthest = Farthest(hits.depth);
-    for (const std::uint32_t number : list) {
+    for (std::size_t l = 0; l < list.size(); ++l) {
+      const std::uint32_t number = list[l];
       if (c_.blocks_.footprints[number].near_m >= farthest) break;
-      const RayBlock& block = c_.blocks_[number];
+      if (l + 1 < list.size()) PrefetchBlock(c_.blocks_[list[l + 1]]);
       const TileValues* from = &from_;
       if (k > 0) {
-        const InstanceId id = c_.pass_.volumes[block.volume].id;
-        bool any = false;
-        for (std::size_t i = 0; i < kTilePixels; ++i) {
-          bool taken_away = hits.depth[i] == 0;
-          for (std::size_t n = 0; n < k && !taken_away; ++n) {
-            taken_away = IdOf(surfaces_[n], i) == id;
-          }
-          from_left_[i] = taken_away ? kInfinite : from_[i];
-          any = any || !taken_away;
-        }
-        if (!any) continue;
+        if (!FillFromLeft(c_.id_of_block_[number], k, hits)) continue;
         from = &from_left_;
       }
-      farthest =
-          block.contested ? ThroughContested(number, *from, k, hits) : Through(number, *from, hits);
+      farthest = ask && c_.blocks_[number].contested ? ThroughContested(number, *from, k, hits)
+                                                     : Through(number, *from, hits);
     }
+  }
+
+  // Where the rays begin in volumes of an object: nowhere where it is in front. False where no ray
+  // is left.
+  bool FillFromLeft(InstanceId id, std::size_t k, const TileHits& hits) {
+    bool any = false;
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      bool taken_away = hits.depth[i] == 0;
+      for (std::size_t n = 0; n < k && !taken_away; ++n) taken_away = IdOf(surfaces_[n], i) == id;
+      from_left_[i] = taken_away ? kInfinite : from_[i];
+      any = any || !taken_away;
+    }
+    return any;
+  }
+
+  // Asks of all pixels whose entry in `asked` is not negative whether what they have hit is hidden
+  // in the map without the objects of their surfaces before k; the answers are in `queries_`.
+  bool AnyHidden(const TileHits& hits, const std::array<std::int32_t, kTilePixels>& asked,
+                 std::size_t k) {
+    queries_.clear();
+    for (std::uint32_t i = 0; i < kTilePixels; ++i) {
+      if (asked[i] < 0) continue;
+      const auto number = static_cast<std::size_t>(hits.block[i]);
+      if (!c_.blocks_[number].contested) continue;
+      const Eigen::Vector3f normal(hits.normal[0][i], hits.normal[1][i], hits.normal[2][i]);
+      queries_.push_back(
+          {c_.id_of_block_[number], i, PointAt(i, hits.depth[i]) + 0.5F * voxel_ * normal, false});
+    }
+    if (k == 0) {
+      hidden_(queries_, {});
+    } else {
+      for (HiddenQuery& query : queries_) {
+        without_.clear();
+        for (std::size_t n = 0; n < k; ++n) without_.push_back(IdOf(surfaces_[n], query.pixel));
+        hidden_({&query, 1}, without_);
+      }
+    }
+    return std::any_of(queries_.begin(), queries_.end(),
+                       [](const HiddenQuery& query) { return query.hidden; });
   }
 
   // Surfaces that are hidden are passed through.
   float ThroughContested(std::uint32_t number, const TileValues& from, std::size_t k,
                          TileHits& hits) {
     const float past = 0.05F * voxel_;  // goes on behind a hidden surface
-    const InstanceId id = c_.pass_.volumes[c_.blocks_[number].volume].id;
     trial_.depth = hits.depth;
     Through(number, from, trial_);
     for (bool again = true; again;) {
-      again = false;
-      trial_from_.fill(kInfinite);
+      std::array<std::int32_t, kTilePixels> asked;
       for (std::size_t i = 0; i < kTilePixels; ++i) {
-        const float depth = trial_.depth[i];
-        if (!(depth < hits.depth[i])) continue;
-        const Eigen::Vector3f normal(trial_.normal[0][i], trial_.normal[1][i], trial_.normal[2][i]);
-        without_.clear();
-        for (std::size_t n = 0; n < k; ++n) without_.push_back(IdOf(surfaces_[n], i));
-        if (c_.pass_.hidden(id, PointAt(i, depth) + 0.5F * voxel_ * normal, without_)) {
-          trial_from_[i] = depth + past;
+        asked[i] = trial_.depth[i] < hits.depth[i] ? 0 : -1;
+      }
+      again = AnyHidden(trial_, asked, k);
+      trial_from_.fill(kInfinite);
+      for (const HiddenQuery& query : queries_) {
+        const std::size_t i = query.pixel;
+        if (query.hidden) {
+          trial_from_[i] = trial_.depth[i] + past;
           trial_.depth[i] = hits.depth[i];
-          again = true;
-          continue;
+        } else {
+          Copy(trial_, hits, i);
         }
-        hits.depth[i] = depth;
-        hits.block[i] = static_cast<std::int32_t>(number);
-        for (std::size_t a = 0; a < 3; ++a) hits.normal[a][i] = trial_.normal[a][i];
       }
       if (again) Through(number, trial_from_, trial_);
     }
@@ -382,10 +434,13 @@ class Caster::Tile {
   std::vector<std::uint8_t> filled_;
   std::vector<TileHits> surfaces_;
   TileHits trial_;
+  TileHits redone_;
   TileValues from_;
   TileValues from_left_;
   TileValues trial_from_;
   std::vector<InstanceId> without_;
+  RayPass::Hidden hidden_;
+  std::vector<HiddenQuery> queries_;
 };
 
 std::vector<RaySurface> Caster::Run() {

@@ -242,10 +242,11 @@ void TsdfppMap::Remove(InstanceId id) {
   CheckInDebugBuilds(*this);
 }
 
-InstanceId TsdfppMap::ActiveAt(const Index3& voxel) const {
-  const ListBlock* lists = index_.Find(BlockOf(voxel));
-  if (lists == nullptr || lists->empty()) return kNoInstance;
-  return (*lists)[static_cast<std::size_t>(PlaceInBlock(voxel) * layers_)].id;
+LayeredMap::ActiveIds TsdfppMap::ActiveIn(const Index3& block) const {
+  const ListBlock* lists = index_.Find(block);
+  if (lists == nullptr || lists->empty()) return {};
+  static_assert(sizeof(ListEntry) == 2 * sizeof(InstanceId) && offsetof(ListEntry, id) == 0);
+  return {&lists->data()->id, 2 * static_cast<std::size_t>(layers_)};
 }
 
 std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,

@@ -28,7 +28,7 @@ class TsdfppMap final : public LayeredMap {
   Expected<void> Load(const Sections& sections) override;
 
  protected:
-  InstanceId ActiveAt(const Index3& voxel) const override;
+  ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
   // kBlockVoxels lists of K entries.

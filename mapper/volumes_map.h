@@ -29,7 +29,7 @@ class VolumesMap final : public LayeredMap {
 
  protected:
   // Nobody: without an index nothing hides what another object claims.
-  InstanceId ActiveAt(const Index3&) const override { return kNoInstance; }
+  ActiveIds ActiveIn(const Index3&) const override { return {}; }
 };
 
 }  // namespace tsdfpp

@@ -387,7 +387,7 @@ TEST_P(RayCast, NearSurfacesAreSeenFromCloseBy) {
       }
       if (DepthAt(cast, v, u) > 0.15F) {
         // Begun inside a cube, its root is found by other roundings.
-        EXPECT_NEAR(DepthAt(far, v, u), DepthAt(cast, v, u), 1e-3 * kToyVoxel_m);
+        EXPECT_NEAR(DepthAt(far, v, u), DepthAt(cast, v, u), kDepthTolerance_voxels * kToyVoxel_m);
       }
     }
   }
