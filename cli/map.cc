@@ -19,6 +19,7 @@ struct Options {
   std::string profile = "close";
   std::string remove;
   std::string out;
+  std::string mesh_format = "ply";
   MapConfig map;
   double trunc_front = 0;
   double trunc_back = 0;
@@ -29,6 +30,7 @@ Expected<CommandResult> RunMap(const Options& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
+  TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -74,7 +76,7 @@ Expected<CommandResult> RunMap(const Options& options) {
   }
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
-  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out));
+  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out, mesh_format));
   const MapMemory memory = map->Memory();
   const nlohmann::json stats{
       {"method", MethodName(config.method)},
@@ -125,6 +127,9 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
+  app.add_option("--mesh-format", options->mesh_format,
+                 "Meshes as ply or as glb (binary glTF, with names and a node an object)")
+      ->capture_default_str();
   app.add_option("--out", options->out, "Output folder")->required();
   return [options] { return RunMap(*options); };
 }
