@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <memory>
 
 #include "bench/median.h"
@@ -37,25 +38,21 @@ double ResidentMegabytes() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-// One method's map and what was measured of it.
-struct Run {
-  std::string name;
-  std::unique_ptr<Pipeline> pipeline;
-  double growth_mb = 0;
-  // Of the kept meshes, a frame each.
-  std::vector<double> share;
-  std::vector<double> update_ms;
-  std::vector<double> all_ms;  // update and joining to one mesh
-  // At the frames at which a copy is meshed from scratch: kept over (scratch times share).
+// Kept meshes, an update each.
+struct KeptTimes {
+  std::vector<double> share;      // of changed blocks
+  std::vector<double> update_ms;  // of the parts alone
+  std::vector<double> all_ms;     // with joining them to one mesh
+  // Where a copy was meshed from scratch beside it: kept over (scratch times share).
   std::vector<double> whole_ms;
   std::vector<double> update_ratio;
   std::vector<double> all_ratio;
 
-  void MeasureKept(bool also_whole);
+  void Measure(const MapRepresentation& map, bool also_whole);
+  void Print(const std::string& name) const;
 };
 
-void Run::MeasureKept(bool also_whole) {
-  const MapRepresentation& map = pipeline->map();
+void KeptTimes::Measure(const MapRepresentation& map, bool also_whole) {
   MeshWork work;
   update_ms.push_back(MillisecondsOf([&] { work = map.UpdateMeshes(); }));
   all_ms.push_back(update_ms.back() + MillisecondsOf([&] { map.SceneMesh(); }));
@@ -66,6 +63,37 @@ void Run::MeasureKept(bool also_whole) {
   const double fair_ms = whole_ms.back() * share.back();
   update_ratio.push_back(update_ms.back() / fair_ms);
   all_ratio.push_back(all_ms.back() / fair_ms);
+}
+
+void KeptTimes::Print(const std::string& name) const {
+  std::printf("%-28s %10.3f %10.1f %10.2f %10.2f %10.2f %10.2f\n", name.c_str(), Median(share),
+              Median(whole_ms), Median(update_ms), Median(update_ratio), Median(all_ms),
+              Median(all_ratio));
+}
+
+// One method's map and what was measured of it.
+struct Run {
+  std::string name;
+  std::unique_ptr<Pipeline> pipeline;
+  double growth_mb = 0;
+  KeptTimes frames;  // of the run
+  KeptTimes small;   // of frames that show one object alone
+};
+
+// The labels of the object that fills the most pixels, the background apart; nothing else.
+cv::Mat LargestObjectAlone(const Frame& frame) {
+  std::map<InstanceId, int> pixels;
+  for (int v = 0; v < frame.mask.rows; ++v) {
+    for (int u = 0; u < frame.mask.cols; ++u) ++pixels[frame.mask.at<InstanceId>(v, u)];
+  }
+  InstanceId largest = kNoInstance;
+  for (const auto& [id, count] : pixels) {
+    if (id == kBackground || id == kNoInstance) continue;
+    if (largest == kNoInstance || count > pixels[largest]) largest = id;
+  }
+  cv::Mat labels(frame.mask.size(), CV_16UC1, cv::Scalar(kNoInstance));
+  labels.setTo(cv::Scalar(largest), frame.mask == static_cast<double>(largest));
+  return labels;
 }
 
 // The child prints "milliseconds triangles bytes growth_mb" of VoxelBlockGrid.
@@ -114,15 +142,15 @@ void PrintMeshing(const std::vector<Run>& runs, const std::vector<double>& final
     std::printf("%-28s %10zu %10.1f %12.3f\n", runs[m].name.c_str(), triangles[m], final_ms[m],
                 final_ms[m] / peer_ms);
   }
-  std::printf(
-      "\nkept meshes, a frame (medians); the ratios are over (from scratch x share of changed "
-      "blocks)\n%-28s %10s %10s %10s %10s %10s %10s\n",
-      "", "share", "scratch", "update", "ratio", "+ joining", "ratio");
-  for (const Run& run : runs) {
-    std::printf("%-28s %10.3f %10.1f %10.2f %10.2f %10.2f %10.2f\n", run.name.c_str(),
-                Median(run.share), Median(run.whole_ms), Median(run.update_ms),
-                Median(run.update_ratio), Median(run.all_ms), Median(run.all_ratio));
-  }
+  const auto print_kept = [&](const char* title, KeptTimes Run::*times) {
+    std::printf(
+        "\nkept meshes, %s; medians; ratios are over (from scratch x share of changed blocks)\n"
+        "%-28s %10s %10s %10s %10s %10s %10s\n",
+        title, "", "share", "scratch", "update", "ratio", "+ joining", "ratio");
+    for (const Run& run : runs) (run.*times).Print(run.name);
+  };
+  print_kept("frame by frame", &Run::frames);
+  print_kept("the last frame's largest object observed alone", &Run::small);
 }
 
 void PrintMemory(const std::vector<Run>& runs, const Open3dVolume& peer, double peer_growth_mb,
@@ -177,7 +205,15 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
     peer_growth_mb += growth_of([&] { peer.Integrate(frame); });
     for (Run& run : runs) {
       run.growth_mb += growth_of([&] { run.pipeline->Process(frame); });
-      run.MeasureKept((i + 1) % options.every == 0 || i + 1 == count);
+      run.frames.Measure(run.pipeline->map(), (i + 1) % options.every == 0 || i + 1 == count);
+      if (i + 1 < count) continue;
+      const cv::Mat labels = LargestObjectAlone(frame);
+      const auto copy = run.pipeline->map().Clone();
+      copy->SceneMesh();
+      for (int repeat = 0; repeat < kRepeats; ++repeat) {
+        copy->Fuse(frame, labels);
+        run.small.Measure(*copy, true);
+      }
     }
   }
   std::printf("%s, frames %d to %d, profile %s, voxels of %g m, %d threads\n", info.name.c_str(),

@@ -26,6 +26,7 @@ struct Options {
   std::string out;
   std::string load;
   std::string save;
+  std::string mesh_format = "ply";
   MapConfig map;
   double trunc_front = 0;
   double trunc_back = 0;
@@ -41,6 +42,7 @@ Expected<PipelineConfig> ConfigOf(const Options& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
+  TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -122,7 +124,7 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
   }
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
-  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out));
+  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out, mesh_format));
   if (options.views > 0) {
     TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views,
                                       std::filesystem::path(options.out) / "views"));
@@ -187,6 +189,9 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
+  app.add_option("--mesh-format", options->mesh_format,
+                 "Meshes as ply or as glb (binary glTF, with names and a node an object)")
+      ->capture_default_str();
   app.add_option("--views", options->views,
                  "Surfaces along each ray of the last camera to write as pictures: 1 is what is "
                  "visible, 2 adds what is behind it")

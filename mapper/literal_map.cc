@@ -217,7 +217,8 @@ void LiteralMap::UpdateActiveField() const {
           std::vector<std::uint64_t>& made_from = *active_.made_from.Find(lists[i].index);
           if (from == made_from) continue;
           made_from = std::move(from);
-          TsdfBlock block;
+          TsdfBlock& block = *field.Find(lists[i].index);
+          block = {};
           auto source = of.begin();
           for (const auto& [id, volume] : volumes_) {
             const TsdfBlock* values = *source++;
@@ -230,7 +231,6 @@ void LiteralMap::UpdateActiveField() const {
             }
           }
           block.UpdateMasks(config_.back());
-          *field.Find(lists[i].index) = block;
         }
       },
       tbb::simple_partitioner());

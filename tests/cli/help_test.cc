@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/files.h"
+#include "core/gltf.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 
@@ -130,6 +131,37 @@ TEST(CommandMap, GoesOnFromAFileAsIfItHadNotStopped) {
   const std::string bytes = ReadFile(folder / "whole.map").value();
   EXPECT_TRUE(ReadFile(folder / "both.map").value() == bytes);
   EXPECT_TRUE(ReadFile(folder / "again.map").value() == bytes);
+}
+
+TEST(CommandMap, WritesGltfWithANodeAnObject) {
+  const TempFolder folder;
+  const std::vector<std::string> arguments{"map",           kMini, "--until", "2",
+                                           "--mesh-format", "glb", "--out",   folder / "map"};
+  const CommandOutput output = RunTsdfpp(arguments, folder.path());
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  const std::filesystem::path meshes = (folder / "map") / "mesh";
+  const auto scene = ReadGlb(meshes / "scene.glb");
+  ASSERT_TRUE(scene.has_value()) << scene.error().message;
+  ASSERT_EQ(scene->size(), 3U);
+  for (std::size_t i = 0; i < scene->size(); ++i) {
+    const NamedMesh& object = (*scene)[i];
+    EXPECT_EQ(object.id, i);
+    EXPECT_FALSE(object.mesh.triangles.empty());
+    const auto alone = ReadGlb(meshes / fmt::format("{}-{}.glb", object.name, object.id));
+    ASSERT_TRUE(alone.has_value()) << alone.error().message;
+    ASSERT_EQ(alone->size(), 1U);
+    EXPECT_EQ(alone->front().id, object.id);
+    EXPECT_GE(alone->front().mesh.triangles.size(), object.mesh.triangles.size());
+  }
+  EXPECT_FALSE(std::filesystem::exists(meshes / "scene.ply"));
+
+  std::vector<std::string> wrong = arguments;
+  wrong[5] = "stl";
+  wrong[7] = folder / "none";
+  const CommandOutput refused = RunTsdfpp(wrong, folder.path());
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.err, "tsdfpp: mesh format 'stl' is unknown, expected ply or glb\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "none"));
 }
 
 }  // namespace
