@@ -1,32 +1,9 @@
 #include "metrics/segmentation.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace tsdfpp {
 namespace {
-
-using Overlaps = std::map<std::pair<std::int32_t, std::int32_t>, std::int64_t>;
-
-// Pixels of each pair (true id, predicted id).
-Overlaps CountOverlaps(const cv::Mat& truth, const cv::Mat& prediction) {
-  Overlaps overlaps;
-  // Runs of one pair are long, so the map is asked once a run.
-  for (int y = 0; y < truth.rows; ++y) {
-    const auto* true_row = truth.ptr<std::int32_t>(y);
-    const auto* predicted_row = prediction.ptr<std::int32_t>(y);
-    int begin = 0;
-    for (int x = 1; x <= truth.cols; ++x) {
-      if (x < truth.cols && true_row[x] == true_row[begin] &&
-          predicted_row[x] == predicted_row[begin]) {
-        continue;
-      }
-      overlaps[{true_row[begin], predicted_row[begin]}] += x - begin;
-      begin = x;
-    }
-  }
-  return overlaps;
-}
 
 struct Listed {
   PanopticSegment segment;
@@ -73,6 +50,25 @@ Expected<void> CheckImages(const cv::Mat& truth, const cv::Mat& prediction) {
 
 }  // namespace
 
+LabelPairs CountLabelPairs(const cv::Mat& truth, const cv::Mat& prediction) {
+  LabelPairs pairs;
+  // Runs of one pair are long, so the map is asked once a run.
+  for (int y = 0; y < truth.rows; ++y) {
+    const auto* true_row = truth.ptr<std::int32_t>(y);
+    const auto* predicted_row = prediction.ptr<std::int32_t>(y);
+    int begin = 0;
+    for (int x = 1; x <= truth.cols; ++x) {
+      if (x < truth.cols && true_row[x] == true_row[begin] &&
+          predicted_row[x] == predicted_row[begin]) {
+        continue;
+      }
+      pairs[{true_row[begin], predicted_row[begin]}] += x - begin;
+      begin = x;
+    }
+  }
+  return pairs;
+}
+
 PanopticImage SegmentsOfLabels(const cv::Mat& labels, std::int32_t divisor) {
   PanopticImage image;
   image.ids = labels.clone();
@@ -101,7 +97,7 @@ void Add(const PanopticCounts& more, PanopticCounts& to) {
 Expected<PanopticCounts> CountPanoptic(const PanopticImage& truth,
                                        const PanopticImage& prediction) {
   TSDFPP_RETURN_IF_ERROR(CheckImages(truth.ids, prediction.ids));
-  const Overlaps overlaps = CountOverlaps(truth.ids, prediction.ids);
+  const LabelPairs overlaps = CountLabelPairs(truth.ids, prediction.ids);
   std::map<std::int32_t, std::int64_t> true_areas;
   std::map<std::int32_t, std::int64_t> predicted_areas;
   for (const auto& [ids, pixels] : overlaps) {
@@ -199,7 +195,7 @@ MeanPanopticQuality MeanQuality(const PanopticCounts& counts, const std::set<int
 
 void LabelOverlap::Observe(const cv::Mat& truth, const cv::Mat& prediction, std::int32_t ignored) {
   std::map<std::int32_t, Areas> frame;
-  for (const auto& [labels, pixels] : CountOverlaps(truth, prediction)) {
+  for (const auto& [labels, pixels] : CountLabelPairs(truth, prediction)) {
     if (labels.first == ignored) continue;
     frame[labels.first].in_union += pixels;
     if (labels.first == labels.second) {

@@ -5,12 +5,18 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "metrics/measured.h"
 
 namespace tsdfpp {
+
+// Pixels of each pair (label of the truth, label of the prediction). Both images are CV_32SC1 and
+// of one size.
+using LabelPairs = std::map<std::pair<std::int32_t, std::int32_t>, std::int64_t>;
+LabelPairs CountLabelPairs(const cv::Mat& truth, const cv::Mat& prediction);
 
 struct PanopticSegment {
   std::int32_t id = 0;  // in the image; never kVoid

@@ -2,17 +2,14 @@
 
 #include <cmath>
 
+#include "metrics/segmentation.h"
+
 namespace tsdfpp {
 
-TrackingQuality::TrackingQuality(TrackingConfig config)
-    : config_(std::move(config)),
-      size_(static_cast<std::size_t>(config_.classes) + 1),
-      confusion_(size_ * size_, 0) {}
+TrackingQuality::TrackingQuality(TrackingConfig config) : config_(std::move(config)) {}
 
-std::size_t TrackingQuality::Row(int class_id) const {
-  if (class_id == config_.ignored_class) return size_ - 1;
-  if (class_id < 0 || class_id >= config_.classes) return size_;
-  return static_cast<std::size_t>(class_id);
+bool TrackingQuality::Known(int class_id) const {
+  return class_id == config_.ignored_class || (class_id >= 0 && class_id < config_.classes);
 }
 
 Expected<void> TrackingQuality::Observe(const cv::Mat& truth, const cv::Mat& prediction) {
@@ -24,26 +21,21 @@ Expected<void> TrackingQuality::Observe(const cv::Mat& truth, const cv::Mat& pre
         prediction.cols, prediction.rows, prediction.type(), truth.cols, truth.rows, truth.type());
   }
   const std::int32_t instance_mask = (1 << config_.instance_bits) - 1;
-  for (int y = 0; y < truth.rows; ++y) {
-    for (int x = 0; x < truth.cols; ++x) {
-      const std::int32_t true_label = truth.at<std::int32_t>(y, x);
-      const std::int32_t label = prediction.at<std::int32_t>(y, x);
-      const int true_class = true_label >> config_.instance_bits;
-      const int label_class = label >> config_.instance_bits;
-      const std::size_t row = Row(true_class);
-      const std::size_t column = Row(label_class);
-      if (row == size_ || column == size_) {
-        return DataError("pixel {},{} has class {}, expected 0 to {}", x, y,
-                         row == size_ ? true_class : label_class, config_.classes - 1);
-      }
-      ++confusion_[row * size_ + column];
-      const bool true_thing = config_.things.contains(true_class);
-      if (true_thing && (true_label & instance_mask) == 0) continue;
-      const bool is_thing = config_.things.contains(label_class);
-      if (true_thing) ++true_tubes_[true_label];
-      if (is_thing) ++predicted_tubes_[label];
-      if (true_thing && is_thing) ++shared_[{true_label, label}];
+  for (const auto& [labels, pixels] : CountLabelPairs(truth, prediction)) {
+    const auto& [true_label, label] = labels;
+    const int true_class = true_label >> config_.instance_bits;
+    const int label_class = label >> config_.instance_bits;
+    if (!Known(true_class) || !Known(label_class)) {
+      return DataError("{} pixels have class {}, expected 0 to {}", pixels,
+                       Known(true_class) ? label_class : true_class, config_.classes - 1);
     }
+    confusion_[{true_class, label_class}] += pixels;
+    const bool true_thing = config_.things.contains(true_class);
+    if (true_thing && (true_label & instance_mask) == 0) continue;
+    const bool is_thing = config_.things.contains(label_class);
+    if (true_thing) true_tubes_[true_label] += pixels;
+    if (is_thing) predicted_tubes_[label] += pixels;
+    if (true_thing && is_thing) shared_[labels] += pixels;
   }
   return {};
 }
@@ -52,33 +44,34 @@ TrackingQuality::Scores TrackingQuality::Result() const {
   Scores scores;
   double association = 0;
   for (const auto& [tubes, pixels] : shared_) {
-    const auto both = static_cast<double>(pixels);
+    const auto shared = static_cast<double>(pixels);
     const auto in_truth = static_cast<double>(true_tubes_.at(tubes.first));
     const auto in_prediction = static_cast<double>(predicted_tubes_.at(tubes.second));
-    association += both * (both / (in_truth + in_prediction - both)) / in_truth;
+    association += shared * (shared / (in_truth + in_prediction - shared)) / in_truth;
   }
   scores.aq = true_tubes_.empty()
                   ? Measured::Undefined("the truth has no instance to follow")
                   : Measured::Of(association / static_cast<double>(true_tubes_.size()));
 
-  double iou = 0;
-  int occurring = 0;
-  for (std::size_t k = 0; k + 1 < size_; ++k) {
-    std::int64_t in_truth = 0;
-    std::int64_t in_prediction = 0;
-    for (std::size_t other = 0; other < size_; ++other) {
-      in_truth += confusion_[k * size_ + other];
-      // Predictions on the truth's ignored pixels, its last row, are not held against it.
-      if (other + 1 < size_) in_prediction += confusion_[other * size_ + k];
+  std::map<int, std::int64_t> both;
+  std::map<int, std::int64_t> in_union;
+  for (const auto& [classes, pixels] : confusion_) {
+    const auto& [true_class, label_class] = classes;
+    // Predictions on the truth's ignored pixels are not held against it.
+    if (true_class == config_.ignored_class) continue;
+    in_union[true_class] += pixels;
+    if (true_class == label_class) {
+      both[true_class] += pixels;
+    } else if (label_class != config_.ignored_class) {
+      in_union[label_class] += pixels;
     }
-    const std::int64_t both = confusion_[k * size_ + k];
-    const std::int64_t in_union = in_truth + in_prediction - both;
-    if (in_union == 0) continue;
-    iou += static_cast<double>(both) / static_cast<double>(in_union);
-    ++occurring;
   }
-  scores.iou =
-      occurring == 0 ? Measured::Undefined("no pixel has a class") : Measured::Of(iou / occurring);
+  double iou = 0;
+  for (const auto& [class_id, pixels] : in_union) {
+    iou += static_cast<double>(both[class_id]) / static_cast<double>(pixels);
+  }
+  scores.iou = in_union.empty() ? Measured::Undefined("no pixel has a class")
+                                : Measured::Of(iou / static_cast<double>(in_union.size()));
   if (!scores.aq.value) {
     scores.stq = scores.aq;
   } else if (!scores.iou.value) {

@@ -6,7 +6,6 @@
 #include <opencv2/core.hpp>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "core/error.h"
 #include "metrics/measured.h"
@@ -41,11 +40,10 @@ class TrackingQuality {
   Scores Result() const;
 
  private:
-  std::size_t Row(int class_id) const;
+  bool Known(int class_id) const;
 
   TrackingConfig config_;
-  std::size_t size_;                     // of the confusion matrix, the ignored class last
-  std::vector<std::int64_t> confusion_;  // [truth][prediction], pixels
+  std::map<std::pair<int, int>, std::int64_t> confusion_;  // pixels by class: truth, prediction
   std::map<std::int32_t, std::int64_t> true_tubes_;
   std::map<std::int32_t, std::int64_t> predicted_tubes_;
   std::map<std::pair<std::int32_t, std::int32_t>, std::int64_t> shared_;
