@@ -42,7 +42,6 @@ Expected<PipelineConfig> ConfigOf(const Options& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
-  TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -90,6 +89,7 @@ Expected<void> CheckOutputs(const Options& options) {
 }
 
 Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
+  TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   TSDFPP_ASSIGN(const MapStart start, Start(options, app));
   const SequenceInfo& info = start.info;
   const PipelineConfig& config = start.config;
