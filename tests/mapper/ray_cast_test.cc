@@ -76,10 +76,10 @@ bool IsOneField(Method method) {
 }
 
 // Whether the reference can say anything of what was hit.
-bool IsKnown(const reference::RayReference& truth, const RaySurface& cast, const Pose& T_WC, int v,
-             int u) {
+bool IsKnown(const reference::RayReference& truth, const RaySurface& cast, const Intrinsics& k,
+             const Pose& T_WC, int v, int u) {
   if (IdAt(cast, v, u) == kNoInstance) return true;
-  const Eigen::Vector3d ray((u - kCamera.cx) / kCamera.fx, (v - kCamera.cy) / kCamera.fy, 1);
+  const Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1);
   return truth.Knows(IdAt(cast, v, u), T_WC * (DepthAt(cast, v, u) * ray));
 }
 
@@ -87,6 +87,9 @@ bool IsKnown(const reference::RayReference& truth, const RaySurface& cast, const
 constexpr double kDepthTolerance_voxels = 0.01;
 // Rays that graze a surface or an edge of what is observed, where a rounding decides.
 constexpr double kGrazingShare = 0.005;
+// `tsdf++/literal` mixes objects in one cube, where the distance jumps and may change its sign
+// twice within a third of a ray's way.
+constexpr double kMixedShare = 0.015;
 constexpr double kNormalTolerance = 0.02;
 
 TEST_P(RayCast, AgreesWithTinySteps) {
@@ -98,43 +101,46 @@ TEST_P(RayCast, AgreesWithTinySteps) {
   const int surfaces = IsOneField(GetParam()) ? 1 : 2;
   RayCastOptions options;
   options.surfaces = surfaces;
-  for (const double angle : {0.5, 2.6}) {
-    const Pose T_WC = CircleCamera(angle, 0.3);
-    const auto cast = map->CastRays(kCamera, T_WC, options);
-    ASSERT_EQ(static_cast<int>(cast.size()), surfaces);
-    std::vector<int> hits(2, 0);
-    int different = 0;
-    int pixels = 0;
-    for (int v = 0; v < kCamera.height; v += 2) {
-      for (int u = 0; u < kCamera.width; u += 2) {
+  // Of the whole table, and with a long lens, whose tiles are smaller than blocks.
+  Intrinsics tele = kCamera;
+  tele.fx = tele.fy = 400;
+  for (const Intrinsics& camera : {kCamera, tele}) {
+    for (const double angle : {0.5, 2.6}) {
+      const Pose T_WC = CircleCamera(angle, 0.3);
+      const auto cast = map->CastRays(camera, T_WC, options);
+      ASSERT_EQ(static_cast<int>(cast.size()), surfaces);
+      std::vector<int> hits(2, 0);
+      int different = 0;
+      int pixels = 0;
+      const auto agrees = [&](int v, int u) {
         std::vector<InstanceId> without;
         for (const RaySurface& surface : cast) {
-          const auto expected = truth.Cast(kCamera, T_WC, u, v, 1.2, without);
-          if (!IsKnown(truth, surface, T_WC, v, u)) break;
+          const auto expected = truth.Cast(camera, T_WC, u, v, 1.2, without);
+          if (!IsKnown(truth, surface, camera, T_WC, v, u)) return true;
           ++pixels;
-          if (!expected) {
-            different += IdAt(surface, v, u) != kNoInstance ? 1 : 0;
-            break;
-          }
+          if (!expected) return IdAt(surface, v, u) == kNoInstance;
           ++hits[without.size()];
           const bool same =
               IdAt(surface, v, u) == expected->id &&
               std::abs(DepthAt(surface, v, u) - expected->depth) <
                   kDepthTolerance_voxels * kToyVoxel_m &&
               (NormalAt(surface, v, u) - expected->normal_W).norm() < kNormalTolerance;
-          if (!same) {
-            ++different;
-            break;
-          }
+          if (!same) return false;
           without.push_back(expected->id);
         }
+        return true;
+      };
+      for (int v = 0; v < camera.height; v += 2) {
+        for (int u = 0; u < camera.width; u += 2) different += agrees(v, u) ? 0 : 1;
       }
+      EXPECT_GT(hits[0], 500) << "the camera sees too little";
+      if (surfaces > 1) {
+        EXPECT_GT(hits[1], 20) << "too little behind the toys";
+      }
+      const bool mixes = GetParam() == Method::kTsdfppLiteral;
+      EXPECT_LE(different, (mixes ? kMixedShare : kGrazingShare) * pixels)
+          << "of " << pixels << ", f " << camera.fx;
     }
-    EXPECT_GT(hits[0], 500) << "the camera sees too little";
-    if (surfaces > 1) {
-      EXPECT_GT(hits[1], 20) << "too little behind the toys";
-    }
-    EXPECT_LE(different, kGrazingShare * pixels) << "of " << pixels;
   }
 }
 
@@ -370,7 +376,7 @@ TEST_P(RayCast, NearSurfacesAreSeenFromCloseBy) {
   for (int v = 0; v < kCamera.height; v += 3) {
     for (int u = 0; u < kCamera.width; u += 3) {
       const auto expected = truth.Cast(kCamera, T_WC, u, v, 0.8);
-      if (!IsKnown(truth, cast, T_WC, v, u)) continue;
+      if (!IsKnown(truth, cast, kCamera, T_WC, v, u)) continue;
       ++pixels;
       const double depth = expected ? expected->depth : 0;
       if (std::abs(DepthAt(cast, v, u) - depth) > kDepthTolerance_voxels * kToyVoxel_m) ++different;
