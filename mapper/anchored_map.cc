@@ -67,12 +67,6 @@ void AnchoredMap::AddReach(InstanceId id) const {
   }
 }
 
-void AnchoredMap::PlaceLattice(ObjectVolume& volume) {
-  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
-  volume.T_WL =
-      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
-}
-
 void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);

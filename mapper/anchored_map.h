@@ -33,8 +33,6 @@ class AnchoredMap final : public LayeredMap {
   using IndexBlock = std::vector<InstanceId>;
   struct Participants;
 
-  // Where the lattice is, from the poses at birth and now.
-  static void PlaceLattice(ObjectVolume& volume);
   // Recomputes the index where `dirty_` says that its inputs changed. Logically const: the index is
   // a function of volumes and poses.
   void RefreshIndex() const;

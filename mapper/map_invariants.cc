@@ -243,6 +243,14 @@ Fault LayeredMap::FindVolumeFault(bool with_covers, std::size_t& blocks) const {
   return std::nullopt;
 }
 
+Fault LayeredMap::FindFault() const {
+  std::size_t blocks = 0;
+  if (Fault fault = FindVolumeFault(false, blocks)) return fault;
+  if (Fault fault = FindCountFault(*this, blocks)) return fault;
+  if (Fault fault = FindListFault(*this)) return fault;
+  return FindCoverFault(*this, config_, true);
+}
+
 Fault TsdfppMap::FindFault() const {
   std::size_t blocks = index_.size();
   if (Fault fault = FindVolumeFault(true, blocks)) return fault;
