@@ -20,6 +20,12 @@ class LayeredMap : public MapRepresentation {
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
+  // What follows is of the volumes alone: all there is to do for a map without an index, and the
+  // first part of it for one with an index. Volumes stay in their objects' lattices.
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
+  std::optional<std::string> FindFault() const override;
   void Save(Sections& sections) const override;
   // Covers are not up to date.
   Expected<void> Load(const Sections& sections) override;
@@ -56,9 +62,6 @@ class LayeredMap : public MapRepresentation {
   // Where the lattice of a volume that stays in its object's frame is, from the poses at birth and
   // now.
   static void PlaceLattice(ObjectVolume& volume);
-  // An object that keeps its lattice, as it arrives in Add().
-  ObjectVolume& AddAnchored(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                            const Pose& T_WO);
 
   MapMemory VolumeMemory() const;
   // FindFault() of the volumes; adds their blocks to `blocks`. Covers are those of volumes whose

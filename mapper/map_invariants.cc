@@ -11,7 +11,6 @@
 #include "mapper/literal_map.h"
 #include "mapper/single_field_map.h"
 #include "mapper/tsdfpp_map.h"
-#include "mapper/volumes_map.h"
 
 namespace tsdfpp {
 namespace {
@@ -244,6 +243,14 @@ Fault LayeredMap::FindVolumeFault(bool with_covers, std::size_t& blocks) const {
   return std::nullopt;
 }
 
+Fault LayeredMap::FindFault() const {
+  std::size_t blocks = 0;
+  if (Fault fault = FindVolumeFault(false, blocks)) return fault;
+  if (Fault fault = FindCountFault(*this, blocks)) return fault;
+  if (Fault fault = FindListFault(*this)) return fault;
+  return FindCoverFault(*this, config_, true);
+}
+
 Fault TsdfppMap::FindFault() const {
   std::size_t blocks = index_.size();
   if (Fault fault = FindVolumeFault(true, blocks)) return fault;
@@ -262,9 +269,7 @@ Fault TsdfppMap::FindFault() const {
   return FindCoverFault(*this, config_, false);
 }
 
-Fault VolumesMap::FindFault() const {
-  std::size_t blocks = 0;
-  if (Fault fault = FindVolumeFault(false, blocks)) return fault;
+Fault fault = FindVolumeFault(false, blocks)) return fault;
   if (Fault fault = FindCountFault(*this, blocks)) return fault;
   if (Fault fault = FindListFault(*this)) return fault;
   return FindCoverFault(*this, config_, true);

@@ -6,7 +6,6 @@
 #include "mapper/pull_back.h"
 #include "mapper/single_field_map.h"
 #include "mapper/tsdfpp_map.h"
-#include "mapper/volumes_map.h"
 
 namespace tsdfpp {
 namespace {
@@ -64,42 +63,33 @@ TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {
   return volume;
 }
 
-ObjectVolume& LayeredMap::AddAnchored(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                                      const Pose& T_WO) {
+Expected<void> LayeredMap::Rename(InstanceId from, InstanceId to) {
+  TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
+  RenameKey(from, to, volumes_);
+  return {};
+}
+
+Expected<void> LayeredMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                               const Pose& T_WO) {
+  TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
   ObjectVolume& added = volumes_[id];
   added.T_WO = T_WO;
   // T_WL = T_WO * T_WO(birth)^-1
   added.T_WO_birth = SameNumbers(T_WL, Pose::Identity()) ? T_WO : T_WL.inverse() * T_WO;
   PlaceLattice(added);
   added.grid = InWorldLattice(volume, Pose::Identity(), config_);
-  return added;
-}
-
-Expected<void> VolumesMap::Rename(InstanceId from, InstanceId to) {
-  TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
-  RenameKey(from, to, volumes_);
-  CheckInDebugBuilds(*this);
-  return {};
-}
-
-Expected<void> VolumesMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                               const Pose& T_WO) {
-  TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
-  AddAnchored(id, volume, T_WL, T_WO);
-  CheckInDebugBuilds(*this);
   return {};
 }
 
 Expected<void> TsdfppMap::Rename(InstanceId from, InstanceId to) {
-  TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
-  for (const auto& entry : volumes_.at(from).grid.entries()) {
+  TSDFPP_RETURN_IF_ERROR(LayeredMap::Rename(from, to));
+  for (const auto& entry : volumes_.at(to).grid.entries()) {
     ListBlock* lists = Any(entry.block->cover) ? index_.Find(entry.index) : nullptr;
     if (lists == nullptr) continue;
     for (ListEntry& listing : *lists) {
       if (listing.id == from) listing.id = to;
     }
   }
-  RenameKey(from, to, volumes_);
   CheckInDebugBuilds(*this);
   return {};
 }
@@ -116,11 +106,10 @@ Expected<void> TsdfppMap::Add(InstanceId id, const TsdfGrid& volume, const Pose&
 }
 
 Expected<void> AnchoredMap::Rename(InstanceId from, InstanceId to) {
-  TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
   RefreshIndex();
-  AddReach(from);
+  AddReach(from);  // made anew in vain where the renaming is refused
+  TSDFPP_RETURN_IF_ERROR(LayeredMap::Rename(from, to));
   reach_.erase(from);
-  RenameKey(from, to, volumes_);
   moved_.push_back(to);
   CheckInDebugBuilds(*this);
   return {};
@@ -128,8 +117,7 @@ Expected<void> AnchoredMap::Rename(InstanceId from, InstanceId to) {
 
 Expected<void> AnchoredMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                                 const Pose& T_WO) {
-  TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
-  AddAnchored(id, volume, T_WL, T_WO);
+  TSDFPP_RETURN_IF_ERROR(LayeredMap::Add(id, volume, T_WL, T_WO));
   moved_.push_back(id);
   CheckInDebugBuilds(*this);
   return {};

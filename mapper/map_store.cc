@@ -88,10 +88,7 @@ Expected<void> VolumesMap::Load(const Sections& sections) {
 
 Expected<void> AnchoredMap::Load(const Sections& sections) {
   TSDFPP_RETURN_IF_ERROR(LayeredMap::Load(sections));
-  for (auto& [id, volume] : volumes_) {
-    PlaceLattice(volume);
-    moved_.push_back(id);
-  }
+  for (const auto& [id, volume] : volumes_) moved_.push_back(id);
   RefreshIndex();
   return {};
 }

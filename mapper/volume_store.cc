@@ -244,6 +244,7 @@ Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config) 
       TSDFPP_ASSIGN(*pose, LoadPose(bytes));
     }
     if (volume.T_WO_birth && !volume.T_WO) return DataError("an object has lost its pose");
+    PlaceLattice(volume);
     TSDFPP_ASSIGN(volume.grid, LoadGrid(bytes, config));
   }
   return volumes;

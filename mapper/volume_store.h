@@ -23,7 +23,7 @@ void SavePose(const Pose& T, std::string& bytes);
 // Errors: kData, a fragment, where it is not rigid or beyond 100 km.
 Expected<Pose> LoadPose(ByteReader& bytes);
 
-// Values, T_WO at birth and now. Where the lattice is follows from these for anchored volumes.
+// Values, T_WO at birth and now; where the lattice is follows from these.
 void SaveVolumes(const ObjectVolumes& volumes, std::string& bytes);
 Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config);
 

@@ -14,15 +14,11 @@ class VolumesMap final : public LayeredMap {
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
-  Expected<void> Rename(InstanceId from, InstanceId to) override;
-  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                     const Pose& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   // Asks every volume: the objects that cover the voxel, by distance, then id; kMaxLayers at most.
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
-  std::optional<std::string> FindFault() const override;
   Expected<void> Load(const Sections& sections) override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
