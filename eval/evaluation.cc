@@ -79,11 +79,14 @@ class Evaluator {
     const SampleMatch match = MatchSamples(
         samples, seen, T_WO, IndexNear(faces, samples, seen, T_WO, kSearchMargin_m), limit_m);
     const Selection reconstructed = Reconstructed(match, voxel_m_);
-    const Selection hidden = SelectHidden(tracker, within);
-    const Selection any =
-        Reconstructed(MatchSamples(samples, hidden, T_WO,
-                                   IndexNear(mesh, samples, hidden, T_WO, limit_m), limit_m),
+    // What the object's own faces reconstruct, faces of any label do: only the rest is asked again.
+    Selection missing = SelectHidden(tracker, within);
+    for (std::size_t k = 0; k < missing.size(); ++k) missing[k] = missing[k] & !reconstructed[k];
+    Selection any =
+        Reconstructed(MatchSamples(samples, missing, T_WO,
+                                   IndexNear(mesh, samples, missing, T_WO, limit_m), limit_m),
                       voxel_m_);
+    for (std::size_t k = 0; k < any.size(); ++k) any[k] = any[k] | reconstructed[k];
     scores.preserved = ScorePreservation(tracker, within, reconstructed, last_seen, &any);
     last_seen.Update(reconstructed, SelectSeenWith(tracker, SampleStatus::kVisible, within));
     scores.completion = CompletionDistances(samples, seen, match);

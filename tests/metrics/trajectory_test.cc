@@ -209,8 +209,9 @@ TEST(Association, NearestOfTheLongerWithinTheTolerance) {
   EXPECT_EQ(turned.unmatched_truth, 2U);
   EXPECT_EQ(turned.unmatched_estimate, 4U);
   // Exactly at the tolerance is within it; of two equally near the earlier.
-  EXPECT_EQ(AssociateByTime(AlongX({1, 2}), AlongX({1.5}), 0.5).pairs.truth[0].translation().x(),
-            1);
+  const Association tied = AssociateByTime(AlongX({1, 2}), AlongX({1.5}), 0.5);
+  ASSERT_EQ(tied.pairs.size(), 1U);
+  EXPECT_EQ(tied.pairs.truth[0].translation().x(), 1);
   EXPECT_EQ(AssociateByTime({}, estimate, 1).pairs.size(), 0U);
   EXPECT_EQ(AssociateByTime(truth, {}, 1).unmatched_truth, 6U);
 }
