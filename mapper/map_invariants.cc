@@ -270,9 +270,9 @@ Fault TsdfppMap::FindFault() const {
 }
 
 Fault fault = FindVolumeFault(false, blocks)) return fault;
-  if (Fault fault = FindCountFault(*this, blocks)) return fault;
-  if (Fault fault = FindListFault(*this)) return fault;
-  return FindCoverFault(*this, config_, true);
+if (Fault fault = FindCountFault(*this, blocks)) return fault;
+if (Fault fault = FindListFault(*this)) return fault;
+return FindCoverFault(*this, config_, true);
 }
 
 Fault AnchoredMap::FindFault() const {
