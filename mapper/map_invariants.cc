@@ -269,12 +269,6 @@ Fault TsdfppMap::FindFault() const {
   return FindCoverFault(*this, config_, false);
 }
 
-Fault fault = FindVolumeFault(false, blocks)) return fault;
-if (Fault fault = FindCountFault(*this, blocks)) return fault;
-if (Fault fault = FindListFault(*this)) return fault;
-return FindCoverFault(*this, config_, true);
-}
-
 Fault AnchoredMap::FindFault() const {
   RefreshIndex();
   std::size_t blocks = index_.size();
