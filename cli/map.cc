@@ -195,7 +195,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--views", options->views,
                  "Surfaces along each ray of the last camera to write as pictures: 1 is what is "
                  "visible, 2 adds what is behind it")
-      ->check(CLI::Range(0, kMaxLayers));
+      ->check(WholeBetween(0, kMaxLayers));
   app.add_option(
       "--load", options->load,
       "Begin with the map in this file: with a sequence, go on after the map's last frame; "

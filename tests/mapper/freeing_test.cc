@@ -32,7 +32,8 @@ std::size_t BlocksNeeded(const MapRepresentation& map, Method method) {
     }
     return BlocksOf(observed);
   }
-  std::size_t blocks = BlocksOf(map.ListedVoxels());
+  // `volumes` stores no lists.
+  std::size_t blocks = method == Method::kVolumes ? 0 : BlocksOf(map.ListedVoxels());
   for (const InstanceId id : ToyIds()) blocks += BlocksOf(map.ObservedVoxels(id));
   return blocks;
 }

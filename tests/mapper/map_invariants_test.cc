@@ -83,6 +83,7 @@ TEST_P(Invariants, AnEmptyBlockIsNoticed) {
 
 // Values that are in order by themselves, but that the lists do not know.
 TEST_P(Invariants, AListThatDoesNotFitTheValuesIsNoticed) {
+  if (GetParam() == Method::kVolumes) GTEST_SKIP() << "it stores no lists";
   const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
   const InstanceId id = IsOneField(GetParam()) ? kBackground : kBrick;
   for (const auto& entry : map->GridOf(id)->entries()) {

@@ -20,7 +20,9 @@ constexpr InstanceId kNew = 7;
 
 bool IsOneField(Method method) { return method == Method::kTsdf || method == Method::kTsdfMin; }
 // Whether values stay in the object's own frame.
-bool IsAnchored(Method method) { return method == Method::kTsdfppAnchored; }
+bool IsAnchored(Method method) {
+  return method == Method::kTsdfppAnchored || method == Method::kVolumes;
+}
 
 class MapObjects : public EveryMethodTest {};
 TSDFPP_FOR_EVERY_METHOD(MapObjects);

@@ -24,7 +24,7 @@ TSDFPP_FOR_EVERY_METHOD(Query);
 class LayeredQuery : public EveryMethodTest {};
 INSTANTIATE_TEST_SUITE_P(Methods, LayeredQuery,
                          ::testing::Values(Method::kTsdfpp, Method::kTsdfppLiteral,
-                                           Method::kTsdfppAnchored),
+                                           Method::kTsdfppAnchored, Method::kVolumes),
                          [](const auto& tested) { return MethodTestName(tested.param); });
 
 // A camera above the plane z = height that looks straight down.
