@@ -117,8 +117,8 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
   Unlist(id);
-  volume.grid =
-      ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
+  volume.grid = ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m,
+                             config_.back(), config_.resampling);
   for (const auto& entry : volume.grid.entries()) {
     ListBlock& lists = lists_.FindOrAdd(entry.index);
     for (int place = 0; place < kBlockVoxels; ++place) {
