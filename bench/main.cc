@@ -1,4 +1,5 @@
-// tsdfpp_bench side-by-side | render [options], or Google Benchmark's own options for the kernels.
+// tsdfpp_bench side-by-side | render | figures [options], or Google Benchmark's own options for the
+// kernels.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <string_view>
 #include <thread>
 
+#include "bench/figures.h"
 #include "bench/render.h"
 #include "bench/side_by_side.h"
 
@@ -22,7 +24,7 @@ int main(int argc, char** argv) {
     execv("/proc/self/exe", argv);
   }
   const std::string_view word = argc < 2 ? "" : argv[1];
-  if (word != "side-by-side" && word != "render") {
+  if (word != "side-by-side" && word != "render" && word != "figures") {
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();
@@ -53,9 +55,16 @@ int main(int argc, char** argv) {
   rendering->add_option("--jobs", render.jobs, "Processes side by side that the rate is of")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  tsdfpp::FigureOptions figures;
+  CLI::App* figure = app.add_subcommand("figures", "What docs/map-figures.md shows, as CSV");
+  figure->add_option("--out", figures.out, "Output folder")->capture_default_str();
+  figure->add_option("--parts", figures.parts, "Some of them")
+      ->delimiter(',')
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const auto done =
-      rendering->parsed() ? tsdfpp::RunRenderBench(render) : tsdfpp::RunSideBySide(options);
+  const auto done = figure->parsed()      ? tsdfpp::RunFigures(figures)
+                    : rendering->parsed() ? tsdfpp::RunRenderBench(render)
+                                          : tsdfpp::RunSideBySide(options);
   if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());
     return static_cast<int>(done.error().kind);
