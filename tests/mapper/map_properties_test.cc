@@ -229,10 +229,14 @@ TEST(AnchoredProperties, TenThousandSmallMovesLeaveTheIndexOfOneMove) {
   for (int i = 0; i < kMoves; ++i) {
     const InstanceId id = i % 2 == 0 ? kBrick : kBall;
     Pose& T_WO = scene.T_WO.at(id);
-    // Up to 0.2 voxels and half a degree about the toy's own centre, which is drawn to the middle.
-    T_WO.translation() += Eigen::Vector3d(
-        dice.Uniform(-0.004, 0.004) - 0.01 * T_WO.translation().x(),
-        dice.Uniform(-0.004, 0.004) - 0.01 * T_WO.translation().y(), dice.Uniform(-0.001, 0.001));
+    // Up to 0.2 voxels and half a degree; each is drawn to where neither was before, so that what
+    // it leaves behind in the index is nobody else's to clear.
+    const Eigen::Vector3d to_end =
+        Eigen::Vector3d(0.3, id == kBrick ? 0.25 : -0.25, T_WO.translation().z()) -
+        T_WO.translation();
+    T_WO.translation() +=
+        0.01 * to_end + Eigen::Vector3d(dice.Uniform(-0.004, 0.004), dice.Uniform(-0.004, 0.004),
+                                        dice.Uniform(-0.001, 0.001));
     T_WO.linear() = (Eigen::AngleAxisd(dice.Uniform(-0.009, 0.009), Eigen::Vector3d::UnitZ()) *
                      Eigen::Quaterniond(T_WO.linear()).normalized())
                         .toRotationMatrix();
@@ -241,7 +245,10 @@ TEST(AnchoredProperties, TenThousandSmallMovesLeaveTheIndexOfOneMove) {
       ASSERT_FALSE(walked->ListedVoxels().empty());
     }
   }
-  for (const InstanceId id : {kBrick, kBall}) direct->SetObjectPose(id, scene.T_WO.at(id));
+  for (const InstanceId id : {kBrick, kBall}) {
+    direct->SetObjectPose(id, scene.T_WO.at(id));
+    EXPECT_EQ(walked->ObjectLattice(id).matrix(), direct->ObjectLattice(id).matrix());
+  }
   EXPECT_TRUE(SameLists(*walked, *direct));
   EXPECT_FALSE(SameLists(*walked, *still)) << "nothing was moved";
   EXPECT_TRUE(SnapshotOf(*walked, ToyIds()) == SnapshotOf(*direct, ToyIds()));
