@@ -95,14 +95,14 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
   const PipelineConfig& config = start.config;
   Pipeline& pipeline = *start.pipeline;
   TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
-  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
-
-  RunTimes times;
   const int frames = start.last - start.first + 1;
   if (options.views > 0 && frames == 0) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
                       options.views);
   }
+  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
+
+  RunTimes times;
   Pose T_WC = Pose::Identity();  // of the last frame
   {
     ProgressBar bar("map");
