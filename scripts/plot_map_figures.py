@@ -55,7 +55,7 @@ def save(figure, folder, name, kind="svg"):
 
 
 def decay(tables, pictures):
-    # Measured on the authors' code by its own scene and settings: /work/shared/facts/peers.md.
+    # Measured on the authors' code by its own scene and settings: facts/peers.md.
     authors = {0: 63, 1: 52, 3: 30, 5: 16, 7: 4, 10: 0}
     # tsdf++/literal resamples as tsdf++ does: one line for both.
     rows = [row for row in rows_of(tables, "decay") if row["moves"].isdigit() and row["map"] != "tsdf++/literal"]
