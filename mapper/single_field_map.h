@@ -42,8 +42,10 @@ class SingleFieldMap final : public MapRepresentation {
                       InstanceId id) const {
     return labels.id[i] == id && block.weight[i] > 0 && block.distance[i] <= config_.voxel();
   }
-  void FuseBlock(const FrameView& frame, const BlockObservation& observation, TsdfBlock& block,
-                 LabelBlock& labels) const;
+  // `label` is the one that all the block's pixels have, kNoInstance where there may be several.
+  // `next` as FuseVoxels() takes it.
+  void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
+                 const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
   void Vacate(InstanceId id);
   template <typename Function>
   void ForEachVoxel(const Function& function) const;

@@ -20,12 +20,19 @@ inline void SetBit(BlockMask& mask, int place) {
   mask[static_cast<std::size_t>(place >> 6)] |= 1ULL << static_cast<unsigned>(place & 63);
 }
 
+inline bool Any(const BlockMask& mask) {
+  std::uint64_t any = 0;
+  for (const std::uint64_t slice : mask) any |= slice;
+  return any != 0;
+}
+
 // One number a voxel for the vectorised loops; -1 is yes and 0 is no where they answer a question.
 using Lanes = std::array<std::int32_t, kBlockVoxels>;
 
 using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
 
-struct TsdfBlock {
+// Aligned to cache lines, which whole vectors then do not straddle.
+struct alignas(64) TsdfBlock {
   std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
   std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
   std::array<std::array<std::uint16_t, kBlockVoxels>, 3> colour{};  // by channel, 8.8 fixed point
@@ -35,15 +42,13 @@ struct TsdfBlock {
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
+  BlockMask coloured{};  // colour_count > 0
+  BlockMask full{};      // of these it is known that the weight is at its cap
 
-  // Brings observed, negative and band in line with the values; true where one of them changed.
-  // `back` in metres.
+  // Brings the masks but for `cover` in line with the values; true where one of observed, negative
+  // and band changed. `back` in metres.
   bool UpdateMasks(float back);
-  bool AnyNegative() const {
-    std::uint64_t any = 0;
-    for (const std::uint64_t slice : negative) any |= slice;
-    return any != 0;
-  }
+  bool AnyNegative() const { return Any(negative); }
   void Clear(int place) {
     const auto i = static_cast<std::size_t>(place);
     distance[i] = 0;
@@ -68,7 +73,23 @@ struct TsdfBlock {
 
 using TsdfGrid = BlockGrid<TsdfBlock>;
 
-// The cover mask at the lattice points of this block: band, or corner of a crossed cube.
-BlockMask FindCover(const TsdfGrid& grid, const Index3& block);
+// The masks of a block (number 13) and of the 26 around it, x fastest, then y, then z; never
+// nullptr.
+using MasksAround = std::array<const BlockMask*, 27>;
+
+// What the cover of a block depends on. To find it is to wait for memory: find several, then
+// compute their covers.
+struct Surroundings {
+  MasksAround observed;
+  MasksAround negative;
+  const BlockMask* band = nullptr;
+};
+Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block);
+
+// The cover mask at the lattice points of the block: band, or corner of a crossed cube.
+BlockMask CoverOf(const Surroundings& around);
+inline BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
+  return CoverOf(FindSurroundings(grid, block));
+}
 
 }  // namespace tsdfpp

@@ -22,18 +22,23 @@ class TsdfppMap final : public LayeredMap {
   InstanceId ActiveAt(const Index3& voxel) const override;
 
  private:
-  // kBlockVoxels lists of K entries.
-  using ListBlock = std::vector<ListEntry>;
+  struct ListBlock {
+    std::vector<ListEntry> entries;  // entry k of the list of voxel i at [k * kBlockVoxels + i]
+    // Voxels where `settled_id` is active with full confidence, so that its votes change nothing.
+    BlockMask settled{};
+    InstanceId settled_id = kNoInstance;
+  };
   struct CoverChange;
-  struct Group;
+  class Groups;
 
   ListBlock& ListsOf(const Index3& block);
+  // To be changed: the voxel is no longer taken for settled.
   VoxelList ListOf(ListBlock& lists, int place) const;
+  void Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
   void Deactivate(InstanceId id);
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
-  void ApplyGroup(const Group& group, const std::vector<FusedBlock>& fused,
-                  const std::vector<CoverChange>& changes);
+  std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused);
 
   int layers_;
   BlockGrid<ListBlock> index_;
