@@ -1,16 +1,95 @@
-// tsdfpp_bench side-by-side | render [options], or Google Benchmark's own options for the kernels.
+// tsdfpp_bench COMMAND [options], or Google Benchmark's own options for the kernels.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
+#include <memory>
 #include <string>
-#include <string_view>
 #include <thread>
+#include <vector>
 
+#include "bench/mesh.h"
+#include "bench/rays.h"
 #include "bench/render.h"
 #include "bench/side_by_side.h"
+
+namespace tsdfpp {
+namespace {
+
+// What the command line asked for.
+using Chosen = std::function<Expected<void>()>;
+
+void AddScene(CLI::App* command, std::string& scene) {
+  command->add_option("--scene", scene, "Scene or sequence")->capture_default_str();
+}
+void AddProfile(CLI::App* command, std::string& profile) {
+  command->add_option("--profile", profile, "paper or close")->capture_default_str();
+}
+void AddCount(CLI::App* command, const char* name, int& count, const char* what, int least,
+              int most) {
+  command->add_option(name, count, what)->check(CLI::Range(least, most))->capture_default_str();
+}
+
+void AddSideBySide(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<SideBySideOptions>();
+  CLI::App* command = app.add_subcommand(
+      "side-by-side", "Mapping beside Open3D's ScalableTSDFVolume, on the same frames");
+  AddScene(command, options->scene);
+  AddProfile(command, options->profile);
+  AddCount(command, "--frames", options->frames, "Frames from the first on", 32, 100000);
+  command->add_option("--threads", options->threads, "Numbers of threads")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->callback([=, &chosen] { chosen = [=] { return RunSideBySide(*options); }; });
+}
+
+void AddRender(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<RenderBenchOptions>();
+  CLI::App* command = app.add_subcommand("render", "Rendering and writing, step by step");
+  command->add_option("--scene", options->scene, "Scene")->capture_default_str();
+  AddCount(command, "--frames", options->frames, "Frames, spread over the scene", 1, 100000);
+  AddCount(command, "--repeats", options->repeats, "Of each frame; the fastest counts", 1, 1000);
+  AddCount(command, "--jobs", options->jobs, "Processes side by side that the rate is of", 1, 256);
+  command->callback([=, &chosen] { chosen = [=] { return RunRenderBench(*options); }; });
+}
+
+void AddRays(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<RaysBenchOptions>();
+  CLI::App* command = app.add_subcommand(
+      "rays", "Ray casting beside Open3D's VoxelBlockGrid, and what more ids cost");
+  AddScene(command, options->scene);
+  AddProfile(command, options->profile);
+  AddCount(command, "--frames", options->frames, "Frames from the first on", 8, 1000);
+  AddCount(command, "--every", options->every, "Frames between casts", 1, 8);
+  AddCount(command, "--repeats", options->repeats, "Of each cast; the fastest counts", 1, 1000);
+  AddCount(command, "--threads", options->threads, "Threads", 1, 1024);
+  command->add_option("--limit", options->limit_s, "Seconds that Open3D's process may take")
+      ->check(CLI::Range(1.0, 1e5))
+      ->capture_default_str();
+  command->callback([=, &chosen] { chosen = [=] { return RunRaysBench(*options); }; });
+}
+
+void AddMesh(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<MeshBenchOptions>();
+  CLI::App* mesh = app.add_subcommand("mesh", "Meshing and memory beside Open3D's two volumes");
+  CLI::App* grid = app.add_subcommand("voxel-block-grid", "What mesh runs in a process of its own");
+  for (CLI::App* command : {mesh, grid}) {
+    AddScene(command, options->scene);
+    AddProfile(command, options->profile);
+    command->add_option("--voxel", options->voxel_m, "Voxel size, metres")->capture_default_str();
+    AddCount(command, "--frames", options->frames, "Frames from the first on", 16, 100000);
+    AddCount(command, "--threads", options->threads, "Number of threads", 1, 1024);
+  }
+  mesh->callback([=, &chosen] { chosen = [=] { return RunMeshBench(*options); }; });
+  grid->callback([=, &chosen] { chosen = [=] { return RunVoxelBlockGrid(*options); }; });
+}
+
+}  // namespace
+}  // namespace tsdfpp
 
 int main(int argc, char** argv) {
   // OpenMP's waiting threads would take the cores from whoever comes after Open3D; the library
@@ -21,38 +100,26 @@ int main(int argc, char** argv) {
     setenv("OMP_NUM_THREADS", std::to_string(std::thread::hardware_concurrency()).c_str(), 0);
     execv("/proc/self/exe", argv);
   }
-  const std::string_view word = argc < 2 ? "" : argv[1];
-  if (word != "side-by-side" && word != "render") {
+  tsdfpp::Chosen chosen;
+  CLI::App app(
+      "Measurements of the whole, each printed as a table; without a command Google "
+      "Benchmark's of the kernels, with its options");
+  app.require_subcommand(1);
+  tsdfpp::AddSideBySide(app, chosen);
+  tsdfpp::AddRender(app, chosen);
+  tsdfpp::AddRays(app, chosen);
+  tsdfpp::AddMesh(app, chosen);
+  const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
+  if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {
+        return command->get_name() == argv[1];
+      })) {
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();
     return 0;
   }
-  tsdfpp::SideBySideOptions options;
-  CLI::App app("Measurements of the whole, each printed as a table");
-  app.require_subcommand(1);
-  CLI::App* run = app.add_subcommand(
-      "side-by-side", "Mapping beside Open3D's ScalableTSDFVolume, on the same frames");
-  run->add_option("--scene", options.scene, "Scene or sequence")->capture_default_str();
-  run->add_option("--profile", options.profile, "paper or close")->capture_default_str();
-  run->add_option("--frames", options.frames, "Frames from the first on")
-      ->check(CLI::Range(32, 100000))
-      ->capture_default_str();
-  run->add_option("--threads", options.threads, "Numbers of threads")
-      ->delimiter(',')
-      ->capture_default_str();
-  tsdfpp::RenderBenchOptions render;
-  CLI::App* rendering = app.add_subcommand("render", "Rendering and writing, step by step");
-  rendering->add_option("--scene", render.scene, "Scene")->capture_default_str();
-  rendering->add_option("--frames", render.frames, "Frames, spread over the scene")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  rendering->add_option("--repeats", render.repeats, "Of each frame; the fastest counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const auto done =
-      rendering->parsed() ? tsdfpp::RunRenderBench(render) : tsdfpp::RunSideBySide(options);
+  const auto done = chosen();
   if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());
     return static_cast<int>(done.error().kind);

@@ -2,7 +2,9 @@
 
 #include <omp.h>
 #include <open3d/geometry/RGBDImage.h>
+#include <open3d/geometry/TriangleMesh.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
+#include <open3d/pipelines/integration/UniformTSDFVolume.h>
 
 #include <chrono>
 #include <cstring>
@@ -34,6 +36,22 @@ double Open3dVolume::Integrate(const Frame& frame) {
   const auto start = std::chrono::steady_clock::now();
   impl_->volume.Integrate(*image, intrinsic, T_CW);
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Open3dVolume::Mesh Open3dVolume::ExtractMesh() const {
+  const auto start = std::chrono::steady_clock::now();
+  const auto mesh = impl_->volume.ExtractTriangleMesh();
+  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+          mesh->triangles_.size()};
+}
+
+std::size_t Open3dVolume::OccupiedBytes() const {
+  std::size_t bytes = 0;
+  for (const auto& [index, unit] : impl_->volume.volume_units_) {
+    if (unit.volume_ != nullptr)
+      bytes += unit.volume_->voxels_.size() * sizeof(unit.volume_->voxels_[0]);
+  }
+  return bytes;
 }
 
 void SetOpen3dThreads(int threads) { omp_set_num_threads(threads); }

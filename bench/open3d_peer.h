@@ -16,6 +16,15 @@ class Open3dVolume {
   // Converts the frame, which is not timed, then integrates it; returns the seconds of the latter.
   double Integrate(const Frame& frame);
 
+  struct Mesh {
+    double seconds = 0;
+    std::size_t triangles = 0;
+  };
+  // Times the extraction of all triangles.
+  Mesh ExtractMesh() const;
+  // The voxels of all blocks.
+  std::size_t OccupiedBytes() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

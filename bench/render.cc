@@ -4,33 +4,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <map>
 #include <vector>
 
+#include "bench/clocks.h"
 #include "bench/median.h"
 #include "core/files.h"
+#include "eval/workers.h"
 #include "sequence/image_files.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {
 namespace {
-
-// All threads of the process: what a frame costs, whoever else uses the machine.
-double CpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-double WallMilliseconds() {
-  return std::chrono::duration<double, std::milli>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 // The steps of one frame, milliseconds by name.
 using Steps = std::map<std::string, double>;
@@ -71,30 +58,80 @@ Expected<Steps> MeasureFrame(SimulatedSource& source, int index, bool write,
   return steps;
 }
 
-Expected<void> Measure(const SceneConfig& scene, const RenderBenchOptions& options,
-                       const SimOptions& sim, const char* title,
-                       const std::filesystem::path& scratch) {
-  TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(scene, sim));
+// One of the ways to render.
+struct Mode {
+  const char* title;
+  SimOptions sim;
+};
+
+int FrameOf(const SceneConfig& scene, int i, int count) {
+  return kFirstFrame + (scene.frames - 1) * i / std::max(1, count - 1);
+}
+
+// The steps of a frame of one process.
+Expected<void> MeasureSteps(const SceneConfig& scene, const RenderBenchOptions& options,
+                            const Mode& mode, const std::filesystem::path& scratch) {
+  TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(scene, mode.sim));
   std::map<std::string, std::vector<double>> all;
   for (int i = 0; i < options.frames; ++i) {
-    const int index = kFirstFrame + (scene.frames - 1) * i / std::max(1, options.frames - 1);
     Steps best;
     for (int repeat = 0; repeat < options.repeats; ++repeat) {
-      TSDFPP_ASSIGN(Steps steps, MeasureFrame(*source, index, sim.render_colour, scratch));
+      TSDFPP_ASSIGN(Steps steps, MeasureFrame(*source, FrameOf(scene, i, options.frames),
+                                              mode.sim.render_colour, scratch));
       if (best.empty() || steps.at("all, CPU") < best.at("all, CPU")) best = std::move(steps);
     }
     for (const auto& [name, ms] : best) all[name].push_back(ms);
   }
-  fmt::print("{} ({}, {}x{}, {} frames of {})\n", title, source->gl_info().renderer,
+  fmt::print("{} ({}, {}x{}, {} frames of {})\n", mode.title, source->gl_info().renderer,
              scene.intrinsics.width, scene.intrinsics.height, options.frames, scene.name);
-  for (const auto& [name, values] : all) {
-    if (!name.starts_with("all")) fmt::print("  {:<24} {:7.2f} ms\n", name, Median(values));
-  }
-  for (const char* name : {"all, CPU", "all, wall"}) {
-    const double ms = Median(all.at(name));
-    fmt::print("  {:<24} {:7.2f} ms, {:.1f} frames/s a core\n", name, ms, 1e3 / ms);
-  }
+  for (const auto& [name, values] : all) fmt::print("  {:<24} {:7.2f} ms\n", name, Median(values));
+  std::fflush(stdout);
   return {};
+}
+
+// Renders all frames in `jobs` processes, as generate does; returns frames a second.
+Expected<double> MeasureRate(const SceneConfig& scene, const RenderBenchOptions& options,
+                             const Mode& mode, const std::filesystem::path& scratch) {
+  constexpr const char* kGo = "go";
+  TSDFPP_ASSIGN(
+      Workers workers, Workers::Start(options.jobs, [&](Channel& channel) -> Expected<void> {
+        const auto own = scratch / fmt::format("{}", getpid());
+        TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(scene, mode.sim));
+        // The first frame compiles shaders.
+        TSDFPP_RETURN_IF_ERROR(MeasureFrame(*source, kFirstFrame, mode.sim.render_colour, own));
+        channel.Send("ready");
+        while (const auto line = channel.Receive()) {
+          if (*line != kGo) return EnvironmentError("the bench sent '{}'", *line);
+          for (int i = 0; i < options.frames; ++i) {
+            TSDFPP_RETURN_IF_ERROR(MeasureFrame(*source, FrameOf(scene, i, options.frames),
+                                                mode.sim.render_colour, own));
+          }
+          channel.Send("rendered");
+        }
+        return {};
+      }));
+  double start = 0;
+  double best = 0;
+  int waiting = options.jobs;
+  int round = 0;  // 0: opening
+  while (workers.running() > 0) {
+    TSDFPP_ASSIGN(const auto message, workers.Next());
+    if (!message) break;
+    if (--waiting > 0) continue;
+    const double seconds = (WallMilliseconds() - start) / 1e3;
+    if (round > 0) best = std::max(best, options.jobs * options.frames / seconds);
+    waiting = options.jobs;
+    start = WallMilliseconds();
+    for (int worker = 0; worker < options.jobs; ++worker) {
+      if (round < options.repeats) {
+        workers.Send(worker, kGo);
+      } else {
+        workers.Close(worker);
+      }
+    }
+    ++round;
+  }
+  return best;
 }
 
 }  // namespace
@@ -104,13 +141,24 @@ Expected<void> RunRenderBench(const RenderBenchOptions& options) {
   TSDFPP_ASSIGN(const SceneConfig scene, LoadSceneConfig(options.scene));
   const auto scratch =
       std::filesystem::temp_directory_path() / fmt::format("tsdfpp-render-{}", getpid());
+  const std::vector<Mode> modes{
+      {"antialiased colour + depth + masks, written", {true, {true}, {}}},
+      {"colour without antialiasing + depth + masks, written", {true, {false}, {}}},
+      {"depth + masks, streamed", {false, {}, {}}}};
   const auto run = [&]() -> Expected<void> {
-    TSDFPP_RETURN_IF_ERROR(Measure(scene, options, {true, {true}, {}},
-                                   "antialiased colour + depth + masks, written", scratch));
-    TSDFPP_RETURN_IF_ERROR(Measure(scene, options, {true, {false}, {}},
-                                   "colour without antialiasing + depth + masks, written",
-                                   scratch));
-    return Measure(scene, options, {false, {}, {}}, "depth + masks, streamed", scratch);
+    for (const Mode& mode : modes) {
+      // In a child, since those of the rate are forked from this process.
+      TSDFPP_ASSIGN(Workers workers, Workers::Start(1, [&](Channel&) {
+                      return MeasureSteps(scene, options, mode, scratch / "steps");
+                    }));
+      while (workers.running() > 0) {
+        TSDFPP_ASSIGN(const auto message, workers.Next());
+        if (!message) break;
+      }
+      TSDFPP_ASSIGN(const double rate, MeasureRate(scene, options, mode, scratch));
+      fmt::print("  {} processes: {:.1f} frames/s\n", options.jobs, rate);
+    }
+    return {};
   };
   const auto done = run();
   std::error_code ignored;

@@ -1,20 +1,34 @@
 #include "cli/command.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <sstream>
 
 namespace tsdfpp {
 namespace {
 
+// All of the text as a finite number.
+std::optional<double> FiniteNumber(const std::string& text) {
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !std::isfinite(number)) return std::nullopt;
+  return number;
+}
+
 CLI::Validator Number(bool zero_allowed) {
   // CLI11's own names the greatest double as the other limit. Words are refused by the option.
   return {[zero_allowed](const std::string& text) {
             const double number = std::strtod(text.c_str(), nullptr);
-            if (number > 0 || (zero_allowed && number == 0)) return std::string();
+            const bool enough = number > 0 || (zero_allowed && number == 0);
+            if (enough && std::isfinite(number)) return std::string();
             return fmt::format("found {}, expected a number {}", text,
                                zero_allowed ? "from 0" : "above 0");
           },
@@ -25,6 +39,45 @@ CLI::Validator Number(bool zero_allowed) {
 
 CLI::Validator AboveZero() { return Number(false); }
 CLI::Validator NotNegative() { return Number(true); }
+
+CLI::Validator Between(double low, double high) {
+  return {[low, high](const std::string& text) {
+            const auto number = FiniteNumber(text);
+            if (number && *number >= low && *number <= high) return std::string();
+            return fmt::format("found '{}', expected a number from {} to {}", text, low, high);
+          },
+          fmt::format("{} to {}", low, high), ""};
+}
+
+CLI::Validator WholeBetween(std::int64_t low, std::int64_t high) {
+  return {[low, high](const std::string& text) {
+            std::int64_t number = 0;
+            const char* last = text.data() + text.size();
+            const auto [end, fault] = std::from_chars(text.data(), last, number);
+            if (fault == std::errc() && end == last && number >= low && number <= high) {
+              return std::string();
+            }
+            return fmt::format("found '{}', expected a whole number from {} to {}", text, low,
+                               high);
+          },
+          fmt::format("{} to {}", low, high), ""};
+}
+
+CLI::Validator OneOf(const std::vector<std::string>& words) {
+  return {[words](const std::string& text) {
+            if (std::find(words.begin(), words.end(), text) != words.end()) return std::string();
+            return fmt::format("found '{}', expected {}{}", text, words.size() > 1 ? "one of " : "",
+                               fmt::join(words, ", "));
+          },
+          fmt::format("{}", fmt::join(words, "|")), ""};
+}
+
+CLI::Validator NotEmpty(const std::string& expected) {
+  return {[expected](const std::string& text) {
+            return text.empty() ? "found nothing, expected " + expected : std::string();
+          },
+          "", ""};
+}
 
 ProgressBar::ProgressBar(std::string title)
     : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0) {}

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -32,6 +33,7 @@ Run AddVerify(CLI::App& app, const CommonOptions& common);
 Run AddExport(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
+Run AddMetric(CLI::App& app, const CommonOptions& common);
 
 // A progress bar on stderr, with frames a second and the time left, where that is a terminal;
 // silent elsewhere.
@@ -58,6 +60,11 @@ std::string SpeedText(int done, int total, double elapsed_s);
 // What a number has to be, for add_option(...)->check().
 CLI::Validator AboveZero();
 CLI::Validator NotNegative();
+CLI::Validator Between(double low, double high);
+CLI::Validator WholeBetween(std::int64_t low, std::int64_t high);
+// What a word has to be; `expected` is a phrase, e.g. "a folder".
+CLI::Validator OneOf(const std::vector<std::string>& words);
+CLI::Validator NotEmpty(const std::string& expected);
 
 // The words between commas. Empty text gives none.
 std::vector<std::string> SplitList(const std::string& text);

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "cli/command.h"
 #include "cli/sequence_options.h"
 #include "eval/compare_report.h"
@@ -34,6 +37,16 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
   if (config.methods.empty() || config.profiles.empty() || config.poses.empty()) {
     return UsageError("--methods, --profiles and --poses each need one name at least");
   }
+  for (const auto& [option, list] :
+       {std::pair{"--methods", &options.methods}, std::pair{"--profiles", &options.profiles},
+        std::pair{"--poses", &options.poses}}) {
+    const std::vector<std::string> names = SplitList(*list);
+    for (const std::string& name : names) {
+      if (std::count(names.begin(), names.end(), name) > 1) {
+        return UsageError("{} names {} twice", option, name);
+      }
+    }
+  }
   for (const std::string& profile : config.profiles) {
     MapConfig probe = config.map;
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));
@@ -59,10 +72,10 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
 Run AddCompare(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
-  app.add_option("--out", options->out, "Output folder")->required();
+  app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
   app.add_option("--methods", options->methods,
                  "Maps to compare, by commas: tsdf, tsdf/min, tsdf++, tsdf++/literal, "
-                 "tsdf++/anchored")
+                 "tsdf++/anchored, volumes")
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();

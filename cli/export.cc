@@ -4,6 +4,7 @@
 
 #include "cli/command.h"
 #include "cli/sequence_options.h"
+#include "cli/stop_on_signal.h"
 
 namespace tsdfpp {
 
@@ -16,28 +17,36 @@ Run AddExport(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--to", options->to, "Format to write")
-      ->check(CLI::IsMember({"tum", "bop", "klg", "7scenes"}))
+      ->check(OneOf({"tum", "bop", "klg", "7scenes"}))
       ->required();
-  app.add_option("--out", options->out, "Folder to write: new or empty")->required();
+  app.add_option("--out", options->out, "Folder to write: new or empty")
+      ->check(NotEmpty("a folder"))
+      ->required();
   return [options]() -> Expected<CommandResult> {
     TSDFPP_ASSIGN(const DatasetFormat format, DatasetFormatFromName(options->to));
     TSDFPP_ASSIGN(auto source, OpenArguments(options->source));
-    ProgressBar bar("export");
-    TSDFPP_ASSIGN(const ExportReport report,
-                  ExportSequence(*source, format, options->out,
-                                 [&](int done, int total) { bar.Show(done, total); }));
+    Expected<ExportReport> report;
+    {
+      const StopOnSignal handler;
+      ProgressBar bar("export");
+      report = ExportSequence(
+          *source, format, options->out, [&](int done, int total) { bar.Show(done, total); },
+          &StopOnSignal::stop());
+    }
+    if (!report && StopOnSignal::stop()) StopOnSignal::Die(report.error());
+    if (!report) return tl::unexpected(report.error());
     std::string text =
         fmt::format("{}: {} frames of {} as {}; depth is within {:g} mm\n", options->out,
-                    report.frames, source->info().name, options->to, 1000 * report.depth_bound_m);
-    for (const std::string& left_out : report.left_out) {
+                    report->frames, source->info().name, options->to, 1000 * report->depth_bound_m);
+    for (const std::string& left_out : report->left_out) {
       text += fmt::format("not kept: {}\n", left_out);
     }
     return CommandResult{{{"sequence", source->info().name},
                           {"format", options->to},
                           {"out", options->out},
-                          {"frames", report.frames},
-                          {"depth_bound_m", report.depth_bound_m},
-                          {"not_kept", report.left_out}},
+                          {"frames", report->frames},
+                          {"depth_bound_m", report->depth_bound_m},
+                          {"not_kept", report->left_out}},
                          text};
   };
 }

@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <limits>
 #include <thread>
 
 #include "cli/command.h"
+#include "cli/stop_on_signal.h"
 #include "core/intrinsics.h"
 #include "eval/scene_page.h"
 #include "sim/scene_list.h"
@@ -26,30 +25,6 @@ struct Options {
   CLI::Option* seed_given = nullptr;
   double scale = 1;
   GenerateOptions generate;
-};
-
-std::atomic<bool> stop{false};
-std::atomic<int> stop_signal{0};
-
-void OnSignal(int signal) {
-  stop_signal = signal;
-  stop = true;
-}
-
-// While this lives, the first SIGINT or SIGTERM asks to stop, and the second one ends the process.
-class StopOnSignal {
- public:
-  StopOnSignal() {
-    struct sigaction action {};
-    action.sa_handler = OnSignal;
-    action.sa_flags = SA_RESETHAND;  // and no SA_RESTART: waiting ends
-    for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
-  }
-  ~StopOnSignal() {
-    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
-  }
-  StopOnSignal(const StopOnSignal&) = delete;
-  StopOnSignal& operator=(const StopOnSignal&) = delete;
 };
 
 Expected<CommandResult> ListScenes(const Options& options) {
@@ -101,6 +76,14 @@ Expected<CommandResult> RunGenerate(const Options& options) {
   if (options.out.empty()) return UsageError("--out is required (see tsdfpp generate --help)");
   std::optional<std::uint64_t> seed;
   if (options.seed_given->count() > 0) seed = options.seed;
+  if (std::filesystem::is_directory(options.scene)) {
+    return UsageError("{}: is a folder, expected a scene file (.toml)", options.scene);
+  }
+  if (std::filesystem::path(options.scene).extension() == ".xml") {
+    return UsageError(
+        "{}: is MJCF or other XML, expected a scene file (.toml, docs/scene-files.md)",
+        options.scene);
+  }
   TSDFPP_ASSIGN(SceneConfig scene, LoadSceneConfig(options.scene, seed));
   if (!options.sensor.empty()) {
     TSDFPP_ASSIGN(scene.sensor, SensorPresetNamed(options.sensor));
@@ -108,7 +91,7 @@ Expected<CommandResult> RunGenerate(const Options& options) {
   scene.intrinsics = Scaled(scene.intrinsics, options.scale);
   GenerateOptions generate = options.generate;
   generate.out = options.out;
-  generate.stop = &stop;
+  generate.stop = &StopOnSignal::stop();
   if (generate.jobs == 0) {
     generate.jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   }
@@ -124,11 +107,7 @@ Expected<CommandResult> RunGenerate(const Options& options) {
     };
     made = GenerateSequence(scene, TSDFPP_VERSION, generate);
   }
-  if (!made && stop) {
-    // To whoever waits for this process it died by the signal, as it would have without a handler.
-    std::fprintf(stderr, "tsdfpp: %s\n", made.error().message.c_str());
-    std::raise(stop_signal);
-  }
+  if (!made && StopOnSignal::stop()) StopOnSignal::Die(made.error());
   if (!made) return tl::unexpected(made.error());
   const double seconds = std::max(made->render_s, 1e-9);
   return CommandResult{{{"scene", made->info.name},
@@ -151,24 +130,29 @@ Run AddGenerate(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
   options->generate.jobs = 0;
   CLI::Option* scene = app.add_option("SCENE", options->scene, "Scene file (.toml)");
-  CLI::Option* out = app.add_option("--out", options->out, "Folder of the new sequence");
+  CLI::Option* out = app.add_option("--out", options->out, "Folder of the new sequence")
+                         ->check(NotEmpty("a folder"));
   app.add_flag("--overwrite", options->generate.overwrite, "Replace an earlier sequence of ours");
   app.add_option("--jobs", options->generate.jobs,
                  "Processes that render; one a core by default. The bytes do not depend on it")
-      ->check(CLI::Range(1, 256));
+      ->check(WholeBetween(1, 256));
   options->seed_given = app.add_option(
       "--seed", options->seed, "Replaces the scene's seed: of random scenes, jitter, sensor");
   // TOML's integers end there, and the seed is written into scene.toml.
-  options->seed_given->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()));
-  app.add_option("--sensor", options->sensor, "Ready-made sensor in place of the scene's own");
+  options->seed_given->check(WholeBetween(0, std::numeric_limits<std::int64_t>::max()));
+  app.add_option("--sensor", options->sensor,
+                 "Ready-made sensor in place of the scene's own, or several joined by '+' "
+                 "(docs/sensors.md)")
+      ->check(NotEmpty("the name of a sensor"));
   app.add_option("--scale", options->scale, "Images this many times the scene's size")
-      ->check(CLI::Range(0.05, 4.0))
+      ->check(Between(0.05, 4.0))
       ->capture_default_str();
-  app.add_flag("!--no-antialias", options->generate.render.antialias,
-               "Colour without multisampling: jagged edges, faster");
+  app.add_flag_callback(
+      "--no-antialias", [options] { options->generate.render.antialias = false; },
+      "Colour without multisampling: jagged edges, faster");
   app.add_option("--share", options->generate.ray_share,
                  "Share of the frames that are compared with rays before the sequence is published")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Between(0, 1))
       ->capture_default_str();
   CLI::Option* list =
       app.add_flag("--list", options->list, "List the scenes of --scenes and what they are for");

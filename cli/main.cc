@@ -25,7 +25,7 @@ int RunCommand(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(name, help);
     command->add_flag("--json", common.json, "Print the result as JSON on stdout");
     command->add_option("--threads", common.threads, "Worker threads; all cores by default")
-        ->check(CLI::Range(1, 1024));
+        ->check(tsdfpp::WholeBetween(1, 1024));
     runs[command] = function(*command, common);
   };
   add("doctor", "Say what this machine has and what is missing", tsdfpp::AddDoctor);
@@ -34,6 +34,8 @@ int RunCommand(int argc, char** argv) {
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+  add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
+      tsdfpp::AddMetric);
 
   try {
     app.parse(argc, argv);
@@ -41,11 +43,15 @@ int RunCommand(int argc, char** argv) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     // CLI11 misses the subcommand before it looks at the word that is none.
-    const std::vector<std::string> unknown = app.remaining();
-    const std::string what = app.get_subcommands().empty() && !unknown.empty()
+    const CLI::App* deepest = &app;
+    while (!deepest->get_subcommands().empty()) deepest = deepest->get_subcommands().front();
+    const std::vector<std::string> unknown = deepest->remaining();
+    const std::string what = deepest->get_require_subcommand_min() > 0 && !unknown.empty()
                                  ? "'" + unknown.front() + "' is no subcommand or option"
                                  : error.what();
-    std::fprintf(stderr, "tsdfpp: %s (see tsdfpp --help)\n", what.c_str());
+    const auto used = app.get_subcommands();
+    const std::string command = used.empty() ? "tsdfpp" : "tsdfpp " + used.front()->get_name();
+    std::fprintf(stderr, "tsdfpp: %s (see %s --help)\n", what.c_str(), command.c_str());
     return static_cast<int>(ErrorKind::kUsage);
   }
   std::unique_ptr<tbb::global_control> limit;

@@ -1,11 +1,16 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
+
 #include "cli/command.h"
+#include "cli/map_start.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "eval/map_output.h"
+#include "eval/map_views.h"
 #include "eval/open_source.h"
+#include "mapper/voxel_list.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -19,13 +24,21 @@ struct Options {
   std::string profile = "close";
   std::string remove;
   std::string out;
+  std::string load;
+  std::string save;
+  std::string mesh_format = "ply";
   MapConfig map;
   double trunc_front = 0;
   double trunc_back = 0;
   int until = -1;
+  int views = 0;
 };
 
-Expected<CommandResult> RunMap(const Options& options) {
+// Settings that a loaded map has already.
+constexpr std::array<const char*, 7> kSettingsOfTheMap = {
+    "--method", "--profile", "--trunc-front", "--trunc-back", "--layers", "--voxel", "--poses"};
+
+Expected<PipelineConfig> ConfigOf(const Options& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
@@ -38,50 +51,91 @@ Expected<CommandResult> RunMap(const Options& options) {
                       options.map.layers, options.method);
   }
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
+  return config;
+}
 
-  TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
-  const SequenceInfo& info = source->info();
-  const int last = info.first_index + info.frame_count - 1;
-  const int until = options.until < 0 ? last : options.until;
-  if (until < info.first_index || until > last) {
-    return UsageError("--until {} is out of range: {} has frames {} to {}", until, info.name,
-                      info.first_index, last);
+Expected<MapStart> Start(const Options& options, const CLI::App& app) {
+  if (options.load.empty()) {
+    if (options.source.path.empty()) {
+      return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
+    }
+    TSDFPP_ASSIGN(const PipelineConfig config, ConfigOf(options));
+    return StartNew(config, options.source, options.until);
   }
-  TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
+  for (const char* option : kSettingsOfTheMap) {
+    if (app.count(option) > 0) {
+      return UsageError("{} cannot be given with --load, whose map has its own", option);
+    }
+  }
+  return StartLoaded(options.load, options.source, options.until);
+}
+
+// Before anything is mapped, which may take long.
+Expected<void> CheckOutputs(const Options& options) {
+  if (!options.remove.empty() && SplitList(options.remove).empty()) {
+    return UsageError("--remove '{}' names no object", options.remove);
+  }
   if (IsOurSequence(options.out)) {
     return UsageError("--out '{}' is a sequence, expected another folder", options.out);
   }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
+  if (options.save.empty()) return {};
+  const std::filesystem::path save(options.save);
+  std::error_code ignored;
+  if (std::filesystem::is_directory(save, ignored)) {
+    return UsageError("--save '{}' is a folder, expected a file", options.save);
+  }
+  return save.has_parent_path() ? MakeWritableFolder(save.parent_path()) : Expected<void>{};
+}
 
-  Pipeline pipeline(config, info.objects);
+Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
+  TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
+  TSDFPP_ASSIGN(const MapStart start, Start(options, app));
+  const SequenceInfo& info = start.info;
+  const PipelineConfig& config = start.config;
+  Pipeline& pipeline = *start.pipeline;
+  TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
+  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
+
   RunTimes times;
+  const int frames = start.last - start.first + 1;
+  if (options.views > 0 && frames == 0) {
+    return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
+                      options.views);
+  }
+  Pose T_WC = Pose::Identity();  // of the last frame
   {
     ProgressBar bar("map");
-    for (int index = info.first_index; index <= until; ++index) {
-      TSDFPP_ASSIGN(const Frame frame, source->Read(index));
+    for (int index = start.first; index <= start.last; ++index) {
+      TSDFPP_ASSIGN(const Frame frame, start.source->Read(index));
       if (frame.mask.empty()) {
         return DataError("{}: frame {} has no mask, which --segmentation gt needs",
                          options.source.path, index);
       }
       times.Add(pipeline.Process(frame));
-      bar.Show(index - info.first_index + 1, until - info.first_index + 1);
+      T_WC = frame.T_WC;
+      bar.Show(index - start.first + 1, frames);
     }
   }
-  if (config.poses == PoseSource::kGiven && info.objects.size() > 1 &&
+  if (frames > 0 && config.poses == PoseSource::kGiven && info.objects.size() > 1 &&
       pipeline.trajectories().empty()) {
     spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
                  options.source.path);
   }
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
-  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out));
+  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out, mesh_format));
+  if (options.views > 0) {
+    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views,
+                                      std::filesystem::path(options.out) / "views"));
+  }
   const MapMemory memory = map->Memory();
-  const nlohmann::json stats{
+  nlohmann::json stats{
       {"method", MethodName(config.method)},
       {"poses", PoseSourceName(config.poses)},
       {"segmentation", options.segmentation},
       {"sequence", info.name},
-      {"frames", until - info.first_index + 1},
+      {"frames", frames},
       {"removed", removed},
       {"voxel_m", config.map.voxel_m},
       {"trunc_front_voxels", config.map.trunc_front_voxels},
@@ -90,26 +144,36 @@ Expected<CommandResult> RunMap(const Options& options) {
       {"times", times.ToJson()},
       {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
   };
+  if (!options.load.empty()) stats["loaded"] = options.load;
+  if (!options.save.empty()) {
+    const MappedRun run = RunOf(start, start.last);
+    TSDFPP_RETURN_IF_ERROR(SaveMap(options.save, *map, &run));
+    std::error_code ignored;
+    stats["saved"] = {{"file", options.save},
+                      {"bytes", std::filesystem::file_size(options.save, ignored)}};
+  }
   TSDFPP_RETURN_IF_ERROR(
       WriteFile(std::filesystem::path(options.out) / "stats.json", stats.dump(2) + "\n"));
+  const std::string fusion = frames == 0
+                                 ? ""
+                                 : fmt::format("; fusion median {:.1f} ms a frame",
+                                               stats["times"]["fuse"]["median_ms"].get<double>());
   return CommandResult{
-      stats, fmt::format("{}: {} frames of {} mapped with {}; {} blocks, {:.1f} MB; fusion median "
-                         "{:.1f} ms a frame\n",
-                         options.out, stats["frames"].get<int>(), info.name, options.method,
-                         memory.blocks, static_cast<double>(memory.bytes) / 1e6,
-                         stats["times"]["fuse"]["median_ms"].get<double>())};
+      stats, fmt::format("{}: {} frames of {} mapped with {}; {} blocks, {:.1f} MB{}\n",
+                         options.out, frames, info.name, MethodName(config.method), memory.blocks,
+                         static_cast<double>(memory.bytes) / 1e6, fusion)};
 }
 
 }  // namespace
 
 Run AddMap(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<Options>();
-  AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
+  AddSequenceArguments(app, "SCENE-or-SEQ", options->source)->required(false);
   app.add_option("--method", options->method,
-                 "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored")
+                 "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored, volumes")
       ->capture_default_str();
   app.add_option("--segmentation", options->segmentation, "Where masks come from")
-      ->check(CLI::IsMember({"gt"}))
+      ->check(OneOf({"gt"}))
       ->capture_default_str();
   app.add_option("--poses", options->poses, "Object poses: gt (given) or icp (tracked)")
       ->capture_default_str();
@@ -125,8 +189,20 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
                  "Objects to remove from the map at the end: ids or names, by commas");
-  app.add_option("--out", options->out, "Output folder")->required();
-  return [options] { return RunMap(*options); };
+  app.add_option("--mesh-format", options->mesh_format,
+                 "Meshes as ply or as glb (binary glTF, with names and a node an object)")
+      ->capture_default_str();
+  app.add_option("--views", options->views,
+                 "Surfaces along each ray of the last camera to write as pictures: 1 is what is "
+                 "visible, 2 adds what is behind it")
+      ->check(CLI::Range(0, kMaxLayers));
+  app.add_option(
+      "--load", options->load,
+      "Begin with the map in this file: with a sequence, go on after the map's last frame; "
+      "without, write its meshes");
+  app.add_option("--save", options->save, "Write the whole map, after the removals, to this file");
+  app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
+  return [options, &app] { return RunMap(*options, app); };
 }
 
 }  // namespace tsdfpp

@@ -3,21 +3,26 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
+
 #include "cli/command.h"
 #include "eval/open_source.h"
 #include "sequence/calibration.h"
 
 namespace tsdfpp {
 
-void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArguments& arguments) {
-  app.add_option(name, arguments.path, "Sequence (folder or .klg) or scene (.toml)")->required();
+CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
+                                  SequenceArguments& arguments) {
+  CLI::Option* path =
+      app.add_option(name, arguments.path, "Sequence (folder or .klg) or scene (.toml)");
+  path->required();
   std::vector<std::string> formats;
   for (const DatasetFormat format : AllDatasetFormats()) {
     formats.emplace_back(DatasetFormatName(format));
   }
   app.add_option("--dataset", arguments.dataset,
                  "The sequence's format, where it is not to be detected")
-      ->check(CLI::IsMember(formats));
+      ->check(OneOf(formats));
   app.add_option("--calibration", arguments.calibration,
                  "File with fx fy cx cy [width height] in place of the sequence's own; a negative "
                  "fy is an image whose y axis points up");
@@ -28,6 +33,7 @@ void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArgume
                "Take a camera without poses on disk as one that does not move");
   app.add_flag("--unchecked", arguments.unchecked,
                "Do not look for wrong units and inverted poses");
+  return path;
 }
 
 std::string TextOf(const SequenceArguments& arguments) {
@@ -46,6 +52,10 @@ Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& ar
     TSDFPP_ASSIGN(options.format, DatasetFormatFromName(arguments.dataset));
   }
   if (!arguments.calibration.empty()) {
+    std::error_code code;
+    if (!std::filesystem::exists(arguments.calibration, code)) {
+      return UsageError("--calibration {}: no such file", arguments.calibration);
+    }
     TSDFPP_ASSIGN(options.intrinsics, ReadSignedCalibration(arguments.calibration));
   }
   if (arguments.depth_units > 0) options.depth_units_per_m = arguments.depth_units;

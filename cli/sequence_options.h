@@ -19,8 +19,9 @@ struct SequenceArguments {
   bool unchecked = false;
 };
 
-// Adds the positional argument `name` and the options.
-void AddSequenceArguments(CLI::App& app, const std::string& name, SequenceArguments& arguments);
+// Adds the positional argument `name` and the options; returns the argument, which is required.
+CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
+                                  SequenceArguments& arguments);
 
 // What was typed, for commands that print how to run them again.
 std::string TextOf(const SequenceArguments& arguments);

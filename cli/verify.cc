@@ -37,7 +37,7 @@ Run AddVerify(CLI::App& app, const CommonOptions& common) {
   app.add_option("SEQ", options->sequence, "Sequence of ours (folder)")->required();
   CLI::Option* share =
       app.add_option("--share", options->share, "Share of the frames that are compared with rays")
-          ->check(CLI::Range(0.0, 1.0))
+          ->check(Between(0, 1))
           ->capture_default_str();
   app.add_flag("--all", options->all, "Compare all frames with rays")->excludes(share);
   return [options, &common] { return RunVerify(*options, common); };

@@ -25,7 +25,8 @@ function(tsdfpp_room name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(tsdfpp_${name} STATIC ${ARG_SOURCES})
   add_library(tsdfpp::${name} ALIAS tsdfpp_${name})
-  target_include_directories(tsdfpp_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_include_directories(tsdfpp_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                                                   $<INSTALL_INTERFACE:include/tsdfpp>)
   target_link_libraries(
     tsdfpp_${name}
     PUBLIC ${ARG_PUBLIC}

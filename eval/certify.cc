@@ -102,7 +102,8 @@ void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
   auto scene = config ? CompiledScene::Compile(*config)
                       : Expected<CompiledScene>(tl::unexpected(config.error()));
   if (!scene) {
-    result.notes.push_back("the scene was not composed again: " + scene.error().message);
+    result.findings.push_back({"scene", cofusion::kScene, -1,
+                               "the scene cannot be composed again: " + scene.error().message});
     return;
   }
   for (const TrueModel& composed : scene->TrueModels()) {
@@ -238,11 +239,15 @@ std::vector<int> SpreadFrames(int first, int count, double share) {
 Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& options) {
   std::error_code code;
   if (!fs::is_directory(folder, code)) {
-    return UsageError("{}: no such folder, expected a sequence", folder.string());
+    if (!fs::exists(folder, code)) {
+      return UsageError("{}: no such folder, expected a sequence", folder.string());
+    }
+    return UsageError("{}: is a {}, expected the folder of a sequence that tsdfpp generate made",
+                      folder.string(), folder.extension() == ".toml" ? "scene" : "file");
   }
   if (!fs::exists(folder / cofusion::kSequence, code)) {
-    return DataError("{}: no {}, expected a sequence of ours", folder.string(),
-                     cofusion::kSequence);
+    return DataError("{}: holds no {}, expected a sequence that tsdfpp generate made",
+                     folder.string(), cofusion::kSequence);
   }
   TSDFPP_ASSIGN(const SequenceRecord record, ReadSequenceJson(folder / cofusion::kSequence));
   CertifyResult result;

@@ -84,6 +84,13 @@ const std::vector<Column>& Columns() {
        3},
       {"sane least", "sanity_least",
        [](const CompareResult&, const Evaluation& e) { return LeastSanity(e); }, 3},
+      {"kept any label", "table_preservation_any_label",
+       [](const CompareResult&, const Evaluation& e) {
+         return e.objects.front().preserved.by_cause.front().any_label;
+       },
+       3},
+      {"purity", "table_label_purity",
+       [](const CompareResult&, const Evaluation& e) { return e.objects.front().label_purity; }, 3},
   };
   return columns;
 }

@@ -79,15 +79,17 @@ class Evaluator {
     const SampleMatch match = MatchSamples(
         samples, seen, T_WO, IndexNear(faces, samples, seen, T_WO, kSearchMargin_m), limit_m);
     const Selection reconstructed = Reconstructed(match, voxel_m_);
-    scores.preserved = ScorePreservation(tracker, within, reconstructed, last_seen);
+    // What the object's own faces reconstruct, faces of any label do: only the rest is asked again.
+    Selection missing = SelectHidden(tracker, within);
+    for (std::size_t k = 0; k < missing.size(); ++k) missing[k] = missing[k] & !reconstructed[k];
+    Selection any =
+        Reconstructed(MatchSamples(samples, missing, T_WO,
+                                   IndexNear(mesh, samples, missing, T_WO, limit_m), limit_m),
+                      voxel_m_);
+    for (std::size_t k = 0; k < any.size(); ++k) any[k] = any[k] | reconstructed[k];
+    scores.preserved = ScorePreservation(tracker, within, reconstructed, last_seen, &any);
     last_seen.Update(reconstructed, SelectSeenWith(tracker, SampleStatus::kVisible, within));
     scores.completion = CompletionDistances(samples, seen, match);
-
-    const Selection behind = SelectSeenWith(tracker, SampleStatus::kBehindOther, within);
-    const SampleMatch any = MatchSamples(samples, behind, T_WO,
-                                         IndexNear(mesh, samples, behind, T_WO, limit_m), limit_m);
-    scores.agnostic_preservation = ShareOf(samples, behind, Reconstructed(any, voxel_m_),
-                                           "nothing seen is behind another object");
 
     const SampleSet surface = SampleReconstruction(faces, {});
     std::vector<double> thresholds_m;
@@ -220,6 +222,15 @@ nlohmann::json ToJson(const ObjectScores& scores) {
                           {"recall", tsdfpp::ToJson(scores.recall[k])},
                           {"f_score", tsdfpp::ToJson(scores.f_score[k])}});
   }
+  nlohmann::json hidden;
+  for (std::size_t k = 0; k < kHidingCauses.size(); ++k) {
+    const HiddenScores& of_cause = p.by_cause[k];
+    hidden[kHidingCauseNames[k]] = {{"area_cm2", of_cause.area_cm2},
+                                    {"lost_area_cm2", tsdfpp::ToJson(of_cause.lost_area_cm2)},
+                                    {"preservation", tsdfpp::ToJson(of_cause.preservation)},
+                                    {"preservation_any_label", tsdfpp::ToJson(of_cause.any_label)},
+                                    {"retention", tsdfpp::ToJson(of_cause.retention)}};
+  }
   return {{"id", scores.info.id},
           {"name", scores.info.name},
           {"completion", tsdfpp::ToJson(p.completion)},
@@ -228,7 +239,8 @@ nlohmann::json ToJson(const ObjectScores& scores) {
           {"preservation_behind_other", tsdfpp::ToJson(p.preservation_behind_other)},
           {"preservation_behind_itself", tsdfpp::ToJson(p.preservation_behind_itself)},
           {"preservation_outside", tsdfpp::ToJson(p.preservation_outside)},
-          {"preservation_any_label", tsdfpp::ToJson(scores.agnostic_preservation)},
+          {"preservation_any_label", tsdfpp::ToJson(p.by_cause[0].any_label)},
+          {"hidden", hidden},
           {"retention", tsdfpp::ToJson(p.retention)},
           {"retention_behind_other", tsdfpp::ToJson(p.retention_behind_other)},
           {"hole_area_cm2", tsdfpp::ToJson(p.hole_area_cm2)},

@@ -23,11 +23,10 @@ LastSeenStores MakeLastSeenStores(const SceneTruth& truth);
 // it is.
 struct ObjectScores {
   ObjectInfo info;
-  PreservationScores preserved;    // at one voxel
-  Measured visible_completion;     // of the visible scene, at one voxel
-  Measured agnostic_preservation;  // as preserved.preservation_behind_other, faces of any label
-  AccuracyScores accuracy;         // precision at kThresholdsVoxels
-  DistanceSummary completion;      // truth to reconstruction, seen samples
+  PreservationScores preserved;  // at one voxel
+  Measured visible_completion;   // of the visible scene, at one voxel
+  AccuracyScores accuracy;       // precision at kThresholdsVoxels
+  DistanceSummary completion;    // truth to reconstruction, seen samples
   std::array<Measured, 3> recall;
   std::array<Measured, 3> f_score;
   Measured label_purity;

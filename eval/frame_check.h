@@ -55,10 +55,11 @@ class FrameCheck {
   // Each pixel's point (depth times ray) must lie on the model of the mask's object at its pose, to
   // kModelLimit_m: the exact distance to the nearest triangle, or to the one that the pixel's ray
   // hits first where that is within the limit. Left out, and counted, are points up to a millimetre
-  // off beside another object or where the nearest triangle is seen at 80 degrees or more. What is
-  // off is put down to the mask (the points lie on another object), the depth's unit, an object's
-  // pose (all of its points and no others are off), or else camera pose and depth. Safe to call
-  // from several threads.
+  // (a tenth of a pixel, where that is more) off, if they are beside another object or a step in
+  // depth, or where the nearest triangle is seen at 80 degrees or more; unless a frame has
+  // more than a few of them. What is off is put down to the mask (the points lie on another
+  // object), the depth's unit, an object's pose (all of its points and no others are off), or else
+  // camera pose and depth. Safe to call from several threads.
   FrameReport Check(const Frame& frame) const;
 
  private:

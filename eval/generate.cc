@@ -18,6 +18,7 @@
 #include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_writer.h"
 #include "sequence/staging_folder.h"
+#include "sim/scene_inputs.h"
 #include "sim/shutter.h"
 #include "sim/simulated_source.h"
 
@@ -106,13 +107,15 @@ class Generator {
       : scene_(scene),
         version_(version),
         options_(options),
-        scene_text_(SceneToToml(scene)),
         staging_(options.out, StagingFolder::Kind::kShared),
         journal_(staging_.notes(), staging_.path()) {}
 
   Expected<GenerateResult> Run() {
-    TSDFPP_RETURN_IF_ERROR(CheckReplaceable(options_.out, options_.overwrite));
+    TSDFPP_RETURN_IF_ERROR(CheckPlace());
+    TSDFPP_RETURN_IF_ERROR(Collect());
     TSDFPP_RETURN_IF_ERROR(staging_.Make());
+    // Another process may have finished it while this one waited.
+    TSDFPP_RETURN_IF_ERROR(CheckPlace());
     const auto start = Clock::now();
     TSDFPP_RETURN_IF_ERROR(Render());
     TSDFPP_ASSIGN(SequenceRecord record, Finish());
@@ -123,6 +126,26 @@ class Generator {
   }
 
  private:
+  Expected<void> CheckPlace() const {
+    auto place = CheckReplaceable(options_.out, options_.overwrite);
+    if (!place && !options_.overwrite && IsOurSequence(options_.out)) {
+      place.error().message += ", or --overwrite";
+    }
+    return place;
+  }
+
+  // The scene as it is stored, and what its files hold now.
+  Expected<void> Collect() {
+    TSDFPP_ASSIGN(SceneInputs inputs, CollectInputs(scene_));
+    scene_text_ = SceneToToml(inputs.config);
+    input_files_ = std::move(inputs.files);
+    for (const auto& [place, file] : input_files_) {
+      TSDFPP_ASSIGN(const std::string bytes, ReadFile(file));
+      input_hashes_[place] = HashText(bytes);
+    }
+    return {};
+  }
+
   bool Stopped() const { return options_.stop != nullptr && *options_.stop; }
 
   Expected<void> StoppedError() {
@@ -188,9 +211,9 @@ class Generator {
     TSDFPP_ASSIGN(const SequenceRecord read, ReadSequenceJson(record));
     result_.info = read.info;
     TSDFPP_RETURN_IF_ERROR(CheckObjectsFit(result_.info.objects));
-    const std::string key =
-        fmt::format("{}\n{} {} {}\nantialias {}\n{}", version_, gl.backend, gl.renderer, gl.version,
-                    options_.render.antialias, scene_text_);
+    std::string key = fmt::format("{}\n{} {} {}\nantialias {}\n{}", version_, gl.backend,
+                                  gl.renderer, gl.version, options_.render.antialias, scene_text_);
+    for (const auto& [place, hash] : input_hashes_) key += fmt::format("\n{} {}", place, hash);
     if (journal_.HasKey(key)) {
       entries_ = journal_.ReadSound();
     } else {
@@ -252,6 +275,12 @@ class Generator {
     if (!(scene_.sensor.masks == MaskFaultConfig{})) {
       files[kSegments] = "frame,id,object,class\n" + segments;
     }
+    for (const auto& [place, file] : input_files_) {
+      TSDFPP_ASSIGN(files[place], ReadFile(file));
+      if (HashText(files[place]) != input_hashes_[place]) {
+        return DataError("{}: was changed while the scene was rendered from it", file.string());
+      }
+    }
     TSDFPP_ASSIGN(const CompiledScene compiled, CompiledScene::Compile(scene_));
     return FinishCofusion(result_.info, Info(), frames, compiled.TrueModels(), files,
                           staging_.path());
@@ -280,6 +309,8 @@ class Generator {
   std::string version_;
   const GenerateOptions& options_;
   std::string scene_text_;
+  std::map<std::string, fs::path> input_files_;  // by their places in the set
+  std::map<std::string, std::string> input_hashes_;
   StagingFolder staging_;
   FrameJournal journal_;
   GenerateResult result_;

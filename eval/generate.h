@@ -37,10 +37,11 @@ struct GenerateResult {
   CertifyResult certificate;
 };
 
-// The set (sequence/cofusion_writer.h) with scene.toml, truth/visibility.csv and the certificate in
-// sequence.json. Colour is what the sensor gave; depth, masks and poses are true, and what the
-// sensor made of them lies beside them (sequence/cofusion_layout.h). The bytes do not depend on
-// `jobs`.
+// The set (sequence/cofusion_writer.h) with scene.toml and the files that it names (in inputs/, so
+// that the set can be rendered again from itself: sim/scene_inputs.h), truth/visibility.csv and the
+// certificate in sequence.json. Colour is what the sensor gave; depth, masks and poses are true,
+// and what the sensor made of them lies beside them (sequence/cofusion_layout.h). The bytes do not
+// depend on `jobs`.
 //
 // Frames are made in a hidden folder beside `out`, which takes out's place in the end. It stays
 // there if the run is killed or stopped, or a worker dies; the next run of the same scene with the

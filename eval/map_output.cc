@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/gltf.h"
 #include "core/ply.h"
 #include "core/pose_text.h"
 #include "eval/open_source.h"
@@ -36,14 +37,28 @@ nlohmann::json RunTimes::ToJson() const {
           {"mesh_scene", Spread(mesh_s)}};
 }
 
+Expected<MeshFormat> MeshFormatFromName(std::string_view name) {
+  if (name == "ply") return MeshFormat::kPly;
+  if (name == "glb") return MeshFormat::kGlb;
+  return UsageError("mesh format '{}' is unknown, expected ply or glb", name);
+}
+
 Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
-                        const SequenceInfo& info, const std::filesystem::path& out) {
+                        const SequenceInfo& info, const std::filesystem::path& out,
+                        MeshFormat format) {
+  const bool glb = format == MeshFormat::kGlb;
   const std::vector<InstanceId> mapped = map.Objects();
   for (const ObjectInfo& object : info.objects) {
     if (std::find(mapped.begin(), mapped.end(), object.id) != mapped.end()) {
       TriangleMesh mesh = map.ObjectMesh(object.id);
-      mesh.face_ids.assign(mesh.triangles.size(), object.id);
-      TSDFPP_RETURN_IF_ERROR(WritePly(out / "mesh" / (FileStem(object) + ".ply"), mesh));
+      const std::filesystem::path stem = out / "mesh" / FileStem(object);
+      if (glb) {
+        TSDFPP_RETURN_IF_ERROR(
+            WriteGlb(stem.string() + ".glb", {{object.name, object.id, std::move(mesh)}}));
+      } else {
+        mesh.face_ids.assign(mesh.triangles.size(), object.id);
+        TSDFPP_RETURN_IF_ERROR(WritePly(stem.string() + ".ply", mesh));
+      }
     }
     const auto trajectory = pipeline.trajectories().find(object.id);
     if (trajectory == pipeline.trajectories().end()) continue;
@@ -53,7 +68,14 @@ Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
     }
     TSDFPP_RETURN_IF_ERROR(WriteFile(out / "trajectories" / (FileStem(object) + ".txt"), text));
   }
-  return WritePly(out / "mesh" / "scene.ply", map.SceneMesh());
+  if (!glb) return WritePly(out / "mesh" / "scene.ply", map.SceneMesh());
+  const auto name_of = [&](InstanceId id) {
+    for (const ObjectInfo& object : info.objects) {
+      if (object.id == id) return object.name;
+    }
+    return fmt::format("object {}", id);
+  };
+  return WriteGlb(out / "mesh" / "scene.glb", SplitByFaceIds(map.SceneMesh(), name_of));
 }
 
 }  // namespace tsdfpp

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "core/frame_source.h"
 #include "mapper/pipeline.h"
@@ -21,10 +22,17 @@ struct RunTimes {
   nlohmann::json ToJson() const;
 };
 
-// mesh/<name>-<id>.ply for each object, mesh/scene.ply, trajectories/<name>-<id>.txt below `out`.
+enum class MeshFormat { kPly, kGlb };
+
+// "ply" or "glb". Errors: kUsage.
+Expected<MeshFormat> MeshFormatFromName(std::string_view name);
+
+// mesh/<name>-<id>.ply for each object, mesh/scene.ply, trajectories/<name>-<id>.txt below `out`;
+// as .glb files (core/gltf.h), a node an object in the scene's, where that is the format.
 // `map` is the map after removals, `pipeline` the run that it comes from.
 // Errors: kEnvironment where the disk refuses.
 Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
-                        const SequenceInfo& info, const std::filesystem::path& out);
+                        const SequenceInfo& info, const std::filesystem::path& out,
+                        MeshFormat format = MeshFormat::kPly);
 
 }  // namespace tsdfpp

@@ -7,7 +7,9 @@
 #include <list>
 #include <set>
 
+#include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -56,14 +58,15 @@ void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   if (!volume.T_WO_birth) volume.T_WO_birth = T_WO;
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
   AddReach(id);
-  volume.lattice_is_world = SameNumbers(*volume.T_WO_birth, T_WO);
-  volume.T_WL = volume.lattice_is_world ? Pose::Identity() : T_WO * volume.T_WO_birth->inverse();
+  PlaceLattice(volume);
   reach_.erase(id);
   moved_.push_back(id);
+  CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
+  const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   std::set<InstanceId> changed_ids;
   for (const FusedBlock& block : fused) changed_ids.insert(block.id);
@@ -97,7 +100,9 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   for (std::size_t i = 0; i < fused.size(); ++i) {
     if (shared[i] != 0) dirty_.push_back(fused[i].index);
   }
+  freeing.FreeEmpty(fused, volumes_);
   RefreshIndex();
+  CheckInDebugBuilds(*this);
 }
 
 // Whether another object may be listed in this block of the index.
@@ -121,6 +126,7 @@ void AnchoredMap::Remove(InstanceId id) {
   volumes_.erase(id);
   reach_.erase(id);
   RefreshIndex();
+  CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::RefreshIndex() const {
@@ -162,11 +168,15 @@ void AnchoredMap::RefreshIndex() const {
         }
       },
       tbb::simple_partitioner());
+  std::vector<Index3> emptied;
   for (std::size_t i = 0; i < dirty_.size(); ++i) {
-    if (existing[i] == nullptr && !computed[i].empty()) {
+    if (existing[i] != nullptr && existing[i]->empty()) {
+      emptied.push_back(dirty_[i]);
+    } else if (existing[i] == nullptr && !computed[i].empty()) {
       index_.FindOrAdd(dirty_[i]) = std::move(computed[i]);
     }
   }
+  index_.Erase(emptied);
   dirty_.clear();
 }
 
@@ -215,15 +225,25 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
 }
 
-InstanceId AnchoredMap::ActiveAt(const Index3& voxel) const {
-  const IndexBlock* ids = index_.Find(BlockOf(voxel));
-  if (ids == nullptr || ids->empty()) return kNoInstance;
-  return (*ids)[static_cast<std::size_t>(PlaceInBlock(voxel))];
+LayeredMap::ActiveIds AnchoredMap::ActiveIn(const Index3& block) const {
+  const IndexBlock* ids = index_.Find(block);
+  if (ids == nullptr || ids->empty()) return {};
+  return {ids->data(), 1};
 }
 
-TriangleMesh AnchoredMap::SceneMesh() const {
+MeshWork AnchoredMap::UpdateMeshes() const {
   RefreshIndex();
-  return LayeredMap::SceneMesh();
+  return LayeredMap::UpdateMeshes();
+}
+
+std::vector<RaySurface> AnchoredMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                              const RayCastOptions& options) const {
+  RefreshIndex();
+  if (options.surfaces <= layers_) return LayeredMap::CastRays(camera, T_WC, options);
+  // Beyond K objects the lists do not say who comes next.
+  RayCastOptions listed = options;
+  listed.surfaces = layers_;
+  return CastByRemoval(*this, LayeredMap::CastRays(camera, T_WC, listed), camera, T_WC, options);
 }
 
 std::vector<Listing> AnchoredMap::ListAt(const Eigen::Vector3i& voxel) const {

@@ -10,17 +10,25 @@ class AnchoredMap final : public LayeredMap {
  public:
   AnchoredMap(const MapConfig& config, int layers);
 
+  Method method() const override { return Method::kTsdfppAnchored; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
-  TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
+  std::optional<std::string> FindFault() const override;
+  Expected<void> Load(const Sections& sections) override;
 
  protected:
-  InstanceId ActiveAt(const Index3& voxel) const override;
+  ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
   // Entry k of the list of voxel i at [k * kBlockVoxels + i], active first, kNoInstance where

@@ -58,7 +58,7 @@ inline Index3 UnpackIndex(std::uint64_t key) {
           static_cast<int>(key >> 42U) - kOffset};
 }
 
-// A hash of blocks. References to blocks stay valid until the block is erased with the grid.
+// A hash of blocks. References to blocks stay valid until the block is erased.
 template <typename Block>
 class BlockGrid {
  public:
@@ -114,6 +114,30 @@ class BlockGrid {
     return *entries_.back().block;
   }
 
+  // Erases blocks that are there, each named once; the others keep their order.
+  void Erase(const std::vector<Index3>& indices) {
+    if (indices.empty()) return;
+    std::size_t first = entries_.size();
+    for (const Index3& index : indices) {
+      const std::size_t slot = FindSlot(index);
+      const auto entry = static_cast<std::size_t>(slots_[slot]);
+      entries_[entry].block.reset();
+      first = std::min(first, entry);
+      Vacate(slot);
+    }
+    // What was made last goes first, as a rule, so that there is little to move.
+    std::size_t kept = first;
+    for (std::size_t i = first; i < entries_.size(); ++i) {
+      if (entries_[i].block == nullptr) continue;
+      if (i != kept) {
+        slots_[FindSlot(entries_[i].index)] = static_cast<std::int32_t>(kept);
+        entries_[kept] = std::move(entries_[i]);
+      }
+      ++kept;
+    }
+    entries_.resize(kept);
+  }
+
   // In the order of insertion.
   const std::vector<Entry>& entries() const { return entries_; }
   std::size_t size() const { return entries_.size(); }
@@ -134,6 +158,26 @@ class BlockGrid {
   }
 
  private:
+  // Of a block that is there. An entry that was moved, or erased, matches by its index still.
+  std::size_t FindSlot(const Index3& index) const {
+    std::size_t slot = SlotOf(index);
+    while (entries_[static_cast<std::size_t>(slots_[slot])].index != index) {
+      slot = (slot + 1) & (slots_.size() - 1);
+    }
+    return slot;
+  }
+  // Empties a slot and pulls the ones behind it forward, so that no search ends too early.
+  void Vacate(std::size_t slot) {
+    const std::size_t mask = slots_.size() - 1;
+    for (std::size_t next = (slot + 1) & mask; slots_[next] != kEmpty; next = (next + 1) & mask) {
+      const std::size_t home = SlotOf(entries_[static_cast<std::size_t>(slots_[next])].index);
+      if (((next - home) & mask) < ((next - slot) & mask)) continue;
+      slots_[slot] = slots_[next];
+      slot = next;
+    }
+    slots_[slot] = kEmpty;
+  }
+
   static constexpr std::int32_t kEmpty = -1;
   static constexpr std::size_t kInitialSlots = 64;
 

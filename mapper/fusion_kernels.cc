@@ -379,7 +379,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     // Free space and full weights stay what they are: then the memory need not be written.
     if (!hn::AllTrue(df, hn::Eq(d, old_d))) hn::Store(d, df, &block.distance[i]);
     if (!hn::AllTrue(df, hn::Eq(w, old_w))) hn::Store(w, df, &block.weight[i]);
-    if (!all_full || any_cleared) PutBits(df, hn::Ge(w, cap), i, full.data());
+    if (!all_full || any_cleared) PutBits(df, hn::Eq(w, cap), i, full.data());
     const auto known = hn::Gt(w, zero);
     const auto inside = hn::And(known, hn::Lt(d, zero));
     PutBits(df, known, i, observed.data());

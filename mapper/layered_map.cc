@@ -3,16 +3,15 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 
-#include "mapper/marching_cubes.h"
 #include "mapper/mesh_tools.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kTrianglesPerTask = 4096;
 constexpr std::size_t kBlocksPerTask = 64;
 constexpr std::size_t kCoversPerTask = 16;
 
@@ -52,20 +51,51 @@ std::vector<InstanceId> LayeredMap::Objects() const {
   return ids;
 }
 
+void LayeredMap::PlaceLattice(ObjectVolume& volume) {
+  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
+  volume.T_WL =
+      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
+}
+
 Pose LayeredMap::ObjectLattice(InstanceId id) const {
   const auto volume = volumes_.find(id);
   return volume == volumes_.end() ? Pose::Identity() : volume->second.T_WL;
 }
 
-TriangleMesh LayeredMap::ObjectMesh(InstanceId id) const {
-  const auto volume = volumes_.find(id);
-  if (volume == volumes_.end()) return {};
-  TriangleMesh mesh = ExtractMesh(volume->second.grid, config_.voxel());
-  if (!volume->second.lattice_is_world) Transform(mesh, volume->second.T_WL);
-  return mesh;
+MeshWork LayeredMap::UpdateObjectMesh(InstanceId id) const {
+  const ObjectVolume& volume = volumes_.at(id);
+  return meshes_[id].Update(volume.grid, config_.voxel(), volume.T_WL, volume.lattice_is_world);
 }
 
-TriangleMesh LayeredMap::SceneMesh() const {
+TriangleMesh LayeredMap::ObjectMesh(InstanceId id) const {
+  if (!volumes_.contains(id)) return {};
+  UpdateObjectMesh(id);
+  return Join({{&meshes_.at(id).mesh}});
+}
+
+MeshWork LayeredMap::UpdateMeshes() const {
+  std::erase_if(meshes_, [&](const auto& mesh) { return !volumes_.contains(mesh.first); });
+  MeshWork work;
+  for (const auto& [id, volume] : volumes_) work += UpdateObjectMesh(id);
+  // Who is active where changes only with a volume, a pose or the objects that there are.
+  bool is_same = hidden_among_.size() == meshes_.size();
+  for (const auto& [id, object] : meshes_) {
+    const auto then = hidden_among_.find(id);
+    is_same = is_same && then != hidden_among_.end() && then->second == object.version;
+  }
+  if (is_same) return work;
+  std::map<InstanceId, BlockBox> reach;
+  hidden_among_.clear();
+  for (const auto& [id, object] : meshes_) {
+    hidden_among_.emplace(id, object.version);
+    reach.emplace(id, ReachOf(object, config_.voxel_m));
+  }
+  FindHiddenTriangles(reach);
+  return work;
+}
+
+// A triangle is dropped where another object is active at its look-up voxel, deep enough.
+void LayeredMap::FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const {
   struct Reader {
     VoxelReader reader;
     Pose T_LW;
@@ -86,31 +116,36 @@ TriangleMesh LayeredMap::SceneMesh() const {
     return DistanceAt(FindCorners(of.reader, q));
   };
   const float voxel = config_.voxel();
-  TriangleMesh scene;
-  for (const InstanceId id : Objects()) {
-    const TriangleMesh mesh = ObjectMesh(id);
-    std::vector<std::uint8_t> keep(mesh.triangles.size(), 1);
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, keep.size(), kTrianglesPerTask),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            const auto& t = mesh.triangles[i];
-            const Eigen::Vector3f& a = mesh.vertices[t[0]];
-            const Eigen::Vector3f& b = mesh.vertices[t[1]];
-            const Eigen::Vector3f& c = mesh.vertices[t[2]];
-            const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
-            const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
-            const Index3 v = NearestVoxel(outwards, voxel);
-            const InstanceId active = ActiveAt(v);
-            if (active == kNoInstance || active == id) continue;
-            const auto distance = distance_at(active, v);
-            if (distance && *distance < -voxel) keep[i] = 0;
-          }
-        },
-        tbb::simple_partitioner());
-    Append(scene, KeepFaces(mesh, keep), id);
+  for (const auto& [id, object] : meshes_) {
+    const auto in_doubt = [&, self = id, is_world = object.lattice_is_world](const MeshPart& part) {
+      return std::any_of(reach.begin(), reach.end(), [&](const auto& other) {
+        return other.first != self && (!is_world || other.second.Holds(part.index));
+      });
+    };
+    const auto is_hidden = [&, self = id](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
+                                          const Eigen::Vector3f& c) {
+      const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
+      const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
+      const Index3 v = NearestVoxel(outwards, voxel);
+      const InstanceId active = ActiveAt(v);
+      if (active == kNoInstance || active == self) return false;
+      const auto distance = distance_at(active, v);
+      return distance && *distance < -voxel;
+    };
+    HideTriangles(object.mesh, in_doubt, is_hidden);
   }
-  return scene;
+}
+
+TriangleMesh LayeredMap::SceneMesh() const {
+  UpdateMeshes();
+  std::vector<JoinedMesh> visible;
+  for (const auto& [id, object] : meshes_) visible.push_back({&object.mesh, id, true});
+  return Join(visible);
+}
+
+const TsdfGrid* LayeredMap::GridOf(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  return volume == volumes_.end() ? nullptr : &volume->second.grid;
 }
 
 std::optional<VoxelValue> LayeredMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {
@@ -187,6 +222,7 @@ MapMemory LayeredMap::VolumeMemory() const {
     memory.blocks += volume.grid.size();
     memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
   }
+  for (const auto& [id, object] : meshes_) memory.mesh_bytes += object.mesh.Bytes();
   return memory;
 }
 

@@ -2,25 +2,55 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/scene_parts.h"
 #include "mapper/volume_fusion.h"
 
 namespace tsdfpp {
 
 class LayeredMap : public MapRepresentation {
  public:
+  const MapConfig& config() const override { return config_; }
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
+  // What follows is of the volumes alone: all there is to do for a map without an index, and the
+  // first part of it for one with an index. Volumes stay in their objects' lattices.
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
+  std::optional<std::string> FindFault() const override;
+  void Save(Sections& sections) const override;
+  // Covers are not up to date.
+  Expected<void> Load(const Sections& sections) override;
 
  protected:
   explicit LayeredMap(const MapConfig& config) : config_(config) {}
   LayeredMap(const LayeredMap&) = default;
 
+  // The active objects of a block of the global index, kNoInstance where there is none: that of the
+  // i-th voxel is first[i * stride]. `first` is nullptr where nothing is listed.
+  struct ActiveIds {
+    const InstanceId* first = nullptr;
+    std::size_t stride = 0;
+
+    // Where the voxel's is, nullptr where nothing is listed.
+    const InstanceId* Place(int place) const {
+      return first == nullptr ? nullptr : first + static_cast<std::size_t>(place) * stride;
+    }
+  };
+  virtual ActiveIds ActiveIn(const Index3& block) const = 0;
   // The active object of a global voxel, or kNoInstance.
-  virtual InstanceId ActiveAt(const Index3& voxel) const = 0;
+  InstanceId ActiveAt(const Index3& voxel) const {
+    const InstanceId* place = ActiveIn(BlockOf(voxel)).Place(PlaceInBlock(voxel));
+    return place == nullptr ? kNoInstance : *place;
+  }
 
   // A block whose cover may have changed with a frame.
   struct StaleCover {
@@ -34,10 +64,25 @@ class LayeredMap : public MapRepresentation {
   // The covers as they are now, one for each of these; their blocks still hold the old ones.
   static std::vector<BlockMask> NewCovers(const std::vector<StaleCover>& stale);
 
+  // Where the lattice of a volume that stays in its object's frame is, from the poses at birth and
+  // now.
+  static void PlaceLattice(ObjectVolume& volume);
+
   MapMemory VolumeMemory() const;
+  // FindFault() of the volumes; adds their blocks to `blocks`. Covers are those of volumes whose
+  // lattice is the world's.
+  std::optional<std::string> FindVolumeFault(bool with_covers, std::size_t& blocks) const;
 
   MapConfig config_;
   ObjectVolumes volumes_;
+
+ private:
+  MeshWork UpdateObjectMesh(InstanceId id) const;
+  void FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const;
+
+  mutable std::map<InstanceId, PlacedMesh> meshes_;
+  // Versions of the meshes when their hidden triangles were last looked up.
+  mutable std::map<InstanceId, std::uint64_t> hidden_among_;
 };
 
 // The observed voxels of a grid, sorted by (z, y, x).

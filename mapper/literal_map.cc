@@ -6,10 +6,13 @@
 #include <cmath>
 
 #include "mapper/allocation.h"
+#include "mapper/freeing.h"
 #include "mapper/layered_map.h"
-#include "mapper/marching_cubes.h"
+#include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
+#include "mapper/ray_pass.h"
+#include "mapper/scene_parts.h"
 
 namespace tsdfpp {
 namespace {
@@ -30,6 +33,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const auto is_known = [&](InstanceId, const Index3& index) {
     return lists_.Find(index) != nullptr;
   };
+  const std::size_t blocks_before = lists_.size();
   for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
     for (const Index3& index : indices) lists_.FindOrAdd(index);
   }
@@ -58,6 +62,9 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
     for (const InstanceId id : task.targets) volumes_[id].grid.FindOrAdd(task.index);
   }
   for_each_task([&](Task& task) { FuseActive(view, T_CW, task); });
+  // A frame empties no list; it may have made blocks in vain.
+  lists_.Erase(EmptyFrom(lists_, blocks_before, [](const ListBlock& b) { return b.IsEmpty(); }));
+  CheckInDebugBuilds(*this);
 }
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
@@ -69,12 +76,14 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
     if (pixel < 0 || observation.distance[i] > config_.front()) continue;
     const InstanceId observed = frame.kernel.label[pixel];
     Entry& active = task.lists->active[i];
+    const InstanceId before = active.id;
     if (active.id == observed) {
       if (active.confidence < config_.confidence_cap) ++active.confidence;
     } else if (active.id == kNoInstance || --active.confidence <= 0) {
       active = {observed, 1};
       if (task.lists->inactive[i].id == observed) task.lists->inactive[i] = {};
     }
+    if (active.id != before) task.lists->revision = NewRevision();
     auto& targets = task.targets;
     const auto at = std::lower_bound(targets.begin(), targets.end(), active.id);
     if (at == targets.end() || *at != active.id) targets.insert(at, active.id);
@@ -108,29 +117,55 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
   }
 }
 
-void LiteralMap::Unlist(InstanceId id) {
+bool LiteralMap::ListBlock::IsEmpty() const {
+  return std::all_of(active.begin(), active.end(),
+                     [](const Entry& entry) { return entry.id == kNoInstance; });
+}
+
+std::vector<Index3> LiteralMap::Unlist(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : lists_.entries()) {
     ListBlock& lists = *entry.block;
+    bool listed = false;
     for (std::size_t i = 0; i < kBlockVoxels; ++i) {
       if (lists.active[i].id == id) {
+        lists.revision = NewRevision();
         lists.active[i] = lists.inactive[i];
         lists.inactive[i] = {};
+        listed = true;
       } else if (lists.inactive[i].id == id) {
         lists.inactive[i] = {};
       }
     }
+    if (listed) blocks.push_back(entry.index);
   }
+  return blocks;
+}
+
+void LiteralMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    if (lists_.Find(index)->IsEmpty()) empty.push_back(index);
+  }
+  lists_.Erase(empty);
 }
 
 void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
-  Unlist(id);
+  const std::vector<Index3> left = Unlist(id);
   volume.grid =
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
-  for (const auto& entry : volume.grid.entries()) {
+  Activate(id);
+  FreeEmptyLists(left);
+  CheckInDebugBuilds(*this);
+}
+
+void LiteralMap::Activate(InstanceId id) {
+  for (const auto& entry : volumes_.at(id).grid.entries()) {
     ListBlock& lists = lists_.FindOrAdd(entry.index);
+    lists.revision = NewRevision();
     for (int place = 0; place < kBlockVoxels; ++place) {
       if (!Bit(entry.block->observed, place)) continue;
       Entry& active = lists.active[At(place)];
@@ -141,8 +176,9 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 }
 
 void LiteralMap::Remove(InstanceId id) {
-  Unlist(id);
+  FreeEmptyLists(Unlist(id));
   volumes_.erase(id);
+  CheckInDebugBuilds(*this);
 }
 
 std::vector<InstanceId> LiteralMap::Objects() const {
@@ -157,37 +193,94 @@ Pose LiteralMap::ObjectLattice(InstanceId) const { return Pose::Identity(); }
 
 TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
   const auto volume = volumes_.find(id);
-  return volume == volumes_.end() ? TriangleMesh{}
-                                  : ExtractMesh(volume->second.grid, config_.voxel());
+  if (volume == volumes_.end()) return {};
+  GridMesh& mesh = object_meshes_[id];
+  mesh.Update(volume->second.grid, config_.voxel());
+  return Join({{&mesh}});
+}
+
+// Brings the field of the active objects' values in line with lists and volumes.
+void LiteralMap::UpdateActiveField() const {
+  TsdfGrid& field = active_.field;
+  std::vector<Index3> gone;
+  for (const auto& entry : field.entries()) {
+    if (lists_.Find(entry.index) == nullptr) gone.push_back(entry.index);
+  }
+  field.Erase(gone);
+  active_.made_from.Erase(gone);
+  for (const auto& entry : lists_.entries()) {
+    field.FindOrAdd(entry.index);
+    active_.made_from.FindOrAdd(entry.index);
+  }
+  const auto& lists = lists_.entries();
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, lists.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const ListBlock& list = *lists[i].block;
+          std::vector<std::uint64_t> from{list.revision};
+          std::vector<const TsdfBlock*> of;
+          for (const auto& [id, volume] : volumes_) {
+            of.push_back(volume.grid.Find(lists[i].index));
+            from.push_back(of.back() == nullptr ? 0 : of.back()->revision);
+          }
+          std::vector<std::uint64_t>& made_from = *active_.made_from.Find(lists[i].index);
+          if (from == made_from) continue;
+          made_from = std::move(from);
+          TsdfBlock& block = *field.Find(lists[i].index);
+          block = {};
+          auto source = of.begin();
+          for (const auto& [id, volume] : volumes_) {
+            const TsdfBlock* values = *source++;
+            if (values == nullptr) continue;
+            for (std::size_t k = 0; k < kBlockVoxels; ++k) {
+              if (list.active[k].id != id) continue;
+              block.distance[k] = values->distance[k];
+              block.weight[k] = values->weight[k];
+              block.SetColour(k, values->FixedColourAt(k), values->colour_count[k]);
+            }
+          }
+          block.UpdateMasks(config_.back());
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+MeshWork LiteralMap::UpdateMeshes() const {
+  UpdateActiveField();
+  const MeshWork work = active_.mesh.Update(active_.field, config_.voxel());
+  LabelTriangles(active_.mesh,
+                 [&](const Eigen::Vector3f& centroid) { return ActiveNear(centroid); });
+  return work;
+}
+
+InstanceId LiteralMap::ActiveNear(const Eigen::Vector3f& point) const {
+  const Index3 v = NearestVoxel(point, config_.voxel());
+  const ListBlock* lists = lists_.Find(BlockOf(v));
+  const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
+  return id == kNoInstance ? kBackground : id;
+}
+
+std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                             const RayCastOptions& options) const {
+  UpdateActiveField();
+  RayPass pass;
+  pass.voxel_m = config_.voxel_m;
+  pass.volumes.push_back({kBackground, &active_.field, Pose::Identity(), true});
+  pass.label = [&](const Eigen::Vector3f& point_W) { return ActiveNear(point_W); };
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
 }
 
 TriangleMesh LiteralMap::SceneMesh() const {
-  TsdfGrid field;
-  for (const auto* entry : lists_.Sorted()) {
-    auto block = std::make_unique<TsdfBlock>();
-    for (const auto& [id, volume] : volumes_) {
-      const TsdfBlock* of = volume.grid.Find(entry->index);
-      if (of == nullptr) continue;
-      for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-        if (entry->block->active[i].id != id) continue;
-        block->distance[i] = of->distance[i];
-        block->weight[i] = of->weight[i];
-        block->SetColour(i, of->FixedColourAt(i), of->colour_count[i]);
-      }
-    }
-    block->UpdateMasks(config_.back());
-    field.Add(entry->index, std::move(block));
-  }
-  TriangleMesh mesh = ExtractMesh(field, config_.voxel());
-  mesh.face_ids.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
-    const Index3 v = NearestVoxel(
-        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F, config_.voxel());
-    const ListBlock* lists = lists_.Find(BlockOf(v));
-    const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
-    mesh.face_ids.push_back(id == kNoInstance ? kBackground : id);
-  }
-  return mesh;
+  UpdateMeshes();
+  return Join({{&active_.mesh}});
+}
+
+const TsdfGrid* LiteralMap::GridOf(InstanceId id) const {
+  const auto volume = volumes_.find(id);
+  return volume == volumes_.end() ? nullptr : &volume->second.grid;
 }
 
 std::optional<VoxelValue> LiteralMap::ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const {
@@ -231,6 +324,8 @@ MapMemory LiteralMap::Memory() const {
     memory.blocks += volume.grid.size();
     memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
   }
+  memory.mesh_bytes = active_.field.size() * sizeof(TsdfBlock) + active_.mesh.Bytes();
+  for (const auto& [id, mesh] : object_meshes_) memory.mesh_bytes += mesh.Bytes();
   return memory;
 }
 

@@ -5,6 +5,7 @@
 #include "mapper/map_representation.h"
 #include "mapper/single_field_map.h"
 #include "mapper/tsdfpp_map.h"
+#include "mapper/volumes_map.h"
 
 namespace tsdfpp {
 
@@ -21,6 +22,8 @@ std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& confi
       return std::make_unique<LiteralMap>(config);
     case Method::kTsdfppAnchored:
       return std::make_unique<AnchoredMap>(config, LayersOf(method, config));
+    case Method::kVolumes:
+      return std::make_unique<VolumesMap>(config);
   }
   std::abort();
 }

@@ -12,11 +12,12 @@ struct Named {
   Method method;
   std::string_view name;
 };
-constexpr std::array<Named, 5> kMethods{{{Method::kTsdf, "tsdf"},
+constexpr std::array<Named, 6> kMethods{{{Method::kTsdf, "tsdf"},
                                          {Method::kTsdfMin, "tsdf/min"},
                                          {Method::kTsdfpp, "tsdf++"},
                                          {Method::kTsdfppLiteral, "tsdf++/literal"},
-                                         {Method::kTsdfppAnchored, "tsdf++/anchored"}}};
+                                         {Method::kTsdfppAnchored, "tsdf++/anchored"},
+                                         {Method::kVolumes, "volumes"}}};
 
 Expected<void> InRange(std::string_view field, double value, double lowest, double highest) {
   if (std::isfinite(value) && value >= lowest && value <= highest) return {};
@@ -111,6 +112,8 @@ int LayersOf(Method method, const MapConfig& config) {
       return config.layers == 0 ? 2 : config.layers;
     case Method::kTsdfppAnchored:
       return config.layers == 0 ? 4 : config.layers;
+    case Method::kVolumes:
+      return kMaxLayers;
   }
   std::abort();
 }

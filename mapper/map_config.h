@@ -10,9 +10,9 @@
 
 namespace tsdfpp {
 
-enum class Method { kTsdf, kTsdfMin, kTsdfpp, kTsdfppLiteral, kTsdfppAnchored };
+enum class Method { kTsdf, kTsdfMin, kTsdfpp, kTsdfppLiteral, kTsdfppAnchored, kVolumes };
 
-// "tsdf", "tsdf/min", "tsdf++", "tsdf++/literal", "tsdf++/anchored".
+// "tsdf", "tsdf/min", "tsdf++", "tsdf++/literal", "tsdf++/anchored", "volumes".
 std::string_view MethodName(Method method);
 std::vector<Method> AllMethods();
 // Errors: kUsage, naming the methods there are. "anchored" and "literal" are understood as well.
@@ -49,7 +49,8 @@ struct MapConfig {
   bool operator==(const MapConfig&) const = default;
 };
 
-// K for this method: 2 for tsdf++ and literal (the paper's), 4 for anchored, 1 for one field.
+// K for this method: 2 for tsdf++ and literal (the paper's), 4 for anchored, 1 for one field;
+// kMaxLayers for volumes, which keeps no lists.
 int LayersOf(Method method, const MapConfig& config);
 
 }  // namespace tsdfpp

@@ -8,6 +8,10 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/mesh_cache.h"
+#include "mapper/ray_cast.h"
+#include "mapper/section_file.h"
+#include "mapper/tsdf_block.h"
 
 namespace tsdfpp {
 
@@ -26,13 +30,17 @@ struct Listing {
 };
 
 struct MapMemory {
-  std::size_t blocks = 0;  // of voxel data and of lists
-  std::size_t bytes = 0;   // of those blocks and their tables
+  std::size_t blocks = 0;      // of voxel data and of lists
+  std::size_t bytes = 0;       // of those blocks and their tables
+  std::size_t mesh_bytes = 0;  // besides: of the meshes kept since one was asked for
 };
 
 class MapRepresentation {
  public:
   virtual ~MapRepresentation() = default;
+
+  virtual Method method() const = 0;
+  virtual const MapConfig& config() const = 0;
 
   // Paper III-E. The first pose given to an object is its pose at birth and moves nothing; nor does
   // one whose numbers equal the last. Objects must be given in increasing id within a frame.
@@ -45,6 +53,19 @@ class MapRepresentation {
   // Takes the object out of the map; unknown ids change nothing.
   virtual void Remove(InstanceId id) = 0;
 
+  // Gives an object another id: its values, listings, votes and poses are then the new one's, and
+  // the places in lists stay, but for an index that is a function of volumes and poses, where ties
+  // go by id. Errors: kUsage where `from` is not in the map, `to` is (a pose given is enough), or
+  // one of them is the background or no id; the map is then unchanged.
+  virtual Expected<void> Rename(InstanceId from, InstanceId to) = 0;
+
+  // Puts a volume into the map as a new object whose pose is T_WO, with the volume's lattice at
+  // T_WL; it arrives as if it had moved there (docs/map.md, "Adding an object"). The voxel size
+  // must be the map's, and every block must hold an observed voxel. Errors: kUsage where the id is
+  // in the map (a pose given is enough), the background or no id; the map is then unchanged.
+  virtual Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                             const Pose& T_WO) = 0;
+
   // A deep copy.
   virtual std::unique_ptr<MapRepresentation> Clone() const = 0;
 
@@ -54,6 +75,13 @@ class MapRepresentation {
   // T_WL, where an object's lattice is now in the world; the identity for methods that move values.
   virtual Pose ObjectLattice(InstanceId id) const = 0;
 
+  // Meshes are kept by block, and a block is meshed again only after a change in it or next to it.
+  // So meshing, though const, is not for two threads at once; a copy of the map starts without.
+
+  // Brings the kept meshes in line with the map, as SceneMesh() does before it puts them together;
+  // says how much there was to do since the last mesh. Methods that keep none do nothing.
+  virtual MeshWork UpdateMeshes() const { return {}; }
+
   // The whole surface of one object, hidden parts included, in the world at its current pose,
   // coloured. One-field methods give the triangles labelled so.
   virtual TriangleMesh ObjectMesh(InstanceId id) const = 0;
@@ -61,9 +89,18 @@ class MapRepresentation {
   // The visible scene: coloured, with face_ids.
   virtual TriangleMesh SceneMesh() const = 0;
 
+  // The map seen from a pose: options.surfaces images, the visible scene first. The n-th surface
+  // along a ray is the first one of the map without the objects of the n - 1 before it.
+  virtual std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                           const RayCastOptions& options) const = 0;
+
   // The object's voxel at an index of its lattice; nothing where it is unobserved. One field: the
   // voxel if it is labelled so.
   virtual std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const = 0;
+
+  // The stored voxels of the object, in its lattice (that of all, for one field); nullptr where the
+  // map has none. Valid until the map changes.
+  virtual const TsdfGrid* GridOf(InstanceId id) const = 0;
 
   // The objects listed at a global voxel, the active one first.
   virtual std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const = 0;
@@ -75,7 +112,22 @@ class MapRepresentation {
   virtual std::vector<Eigen::Vector3i> ListedVoxels() const = 0;
 
   virtual MapMemory Memory() const = 0;
+
+  // The first thing found in what is stored that docs/map.md rules out, in a sentence; nothing
+  // where all is well. Slow (mapper/map_invariants.h).
+  virtual std::optional<std::string> FindFault() const = 0;
+
+  // The map's content as named sections of a file (mapper/map_file.h), always of the same names.
+  virtual void Save(Sections& sections) const = 0;
+
+  // Makes the map the saved one, bit for bit. It must have the same method and settings and be as
+  // MakeMap made it; `sections` have the names that Save() gives them. Errors: kData, a fragment
+  // that says what no map can hold; the map is then unusable.
+  virtual Expected<void> Load(const Sections& sections) = 0;
 };
+
+// All objects with their hidden parts, by increasing id: ObjectMesh of each, with face_ids.
+TriangleMesh AllObjectsMesh(const MapRepresentation& map);
 
 // The config must be valid (MapConfig::Validate).
 std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& config);

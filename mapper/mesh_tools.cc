@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "mapper/map_representation.h"
+
 namespace tsdfpp {
 
 // The triangles for which keep[i] is set, and the vertices they use.
@@ -33,10 +35,10 @@ Index3 NearestVoxel(const Eigen::Vector3f& point, float voxel) {
   return {nearest(point.x()), nearest(point.y()), nearest(point.z())};
 }
 
-void Transform(TriangleMesh& mesh, const Pose& T) {
-  for (Eigen::Vector3f& vertex : mesh.vertices) {
-    vertex = (T * vertex.cast<double>()).cast<float>();
-  }
+TriangleMesh AllObjectsMesh(const MapRepresentation& map) {
+  TriangleMesh all;
+  for (const InstanceId id : map.Objects()) Append(all, map.ObjectMesh(id), id);
+  return all;
 }
 
 void Append(TriangleMesh& scene, const TriangleMesh& mesh, InstanceId id) {

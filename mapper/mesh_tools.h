@@ -11,8 +11,6 @@ namespace tsdfpp {
 
 // The triangles for which keep[i] is not 0, with the vertices that they use, in order.
 TriangleMesh KeepFaces(const TriangleMesh& mesh, const std::vector<std::uint8_t>& keep);
-// Vertices placed by T.
-void Transform(TriangleMesh& mesh, const Pose& T);
 // Appends a coloured mesh without face ids as faces of `id`.
 void Append(TriangleMesh& scene, const TriangleMesh& mesh, InstanceId id);
 // The voxel whose centre is nearest to a point; both in metres.

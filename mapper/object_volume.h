@@ -19,6 +19,13 @@ struct ObjectVolume {
 // Whether the numbers of two poses are the same.
 inline bool SameNumbers(const Pose& a, const Pose& b) { return a.matrix() == b.matrix(); }
 
+// T_WL from the poses at birth and now, where the volume stays in its object's frame.
+inline void PlaceLattice(ObjectVolume& volume) {
+  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
+  volume.T_WL =
+      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
+}
+
 // Reads voxels of a grid by index through a dense table of block pointers over the grid's bounding
 // box: for many reads of one object. The grid must not change meanwhile.
 class VoxelReader {

@@ -45,7 +45,15 @@ std::string_view PoseSourceName(PoseSource source) {
 }
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
-    : config_(config), map_(MakeMap(config.method, config.map)) {
+    : Pipeline(config, objects, MakeMap(config.method, config.map), {}) {}
+
+Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
+                   std::unique_ptr<MapRepresentation> map,
+                   std::map<InstanceId, std::map<int, Pose>> trajectories)
+    : config_(config), map_(std::move(map)), trajectories_(std::move(trajectories)) {
+  for (const auto& [id, poses] : trajectories_) {
+    if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
+  }
   for (const ObjectInfo& object : objects) {
     if (object.id != kBackground && !object.semantic_class.empty()) tracked_.insert(object.id);
   }

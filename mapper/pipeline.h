@@ -43,6 +43,12 @@ class Pipeline {
   // III-D). The config must be valid.
   Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects);
 
+  // Goes on from a map, which must have the config's method and settings, and T_WO of its objects
+  // by frame (mapper/map_file.h).
+  Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
+           std::unique_ptr<MapRepresentation> map,
+           std::map<InstanceId, std::map<int, Pose>> trajectories);
+
   // Maps one frame. The frame's mask must be there.
   StepTimes Process(const Frame& frame);
 

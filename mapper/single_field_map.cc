@@ -8,10 +8,13 @@
 #include <set>
 
 #include "mapper/allocation.h"
+#include "mapper/freeing.h"
 #include "mapper/layered_map.h"
-#include "mapper/marching_cubes.h"
+#include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
+#include "mapper/ray_pass.h"
+#include "mapper/scene_parts.h"
 
 namespace tsdfpp {
 namespace {
@@ -35,6 +38,7 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const auto is_known = [&](InstanceId, const Index3& index) {
     return field_.Find(index) != nullptr;
   };
+  const std::size_t blocks_before = field_.size();
   for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
     for (const Index3& index : indices) {
       field_.FindOrAdd(index);
@@ -59,6 +63,9 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
         }
       },
       tbb::simple_partitioner());
+  // A frame makes no voxel unobserved; it may have made blocks in vain.
+  FreeEmpty(EmptyFrom(field_, blocks_before, [](const TsdfBlock& b) { return !b.AnyObserved(); }));
+  CheckInDebugBuilds(*this);
 }
 
 void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
@@ -72,14 +79,25 @@ void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockPlace& place, 
   rule.colour_band = std::numeric_limits<float>::infinity();
   rule.weight_cap = static_cast<float>(config_.weight_cap);
   LabelVotes votes{labels.id.data(), labels.confidence.data(), config_.confidence_cap};
-  FuseVoxels(frame.kernel, place, rule, block, next, &votes);
+  const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next, &votes);
+  if (result.changed) block.revision = NewRevision();
   if (!votes.any_label_changed) return;
   for (const InstanceId id : labels.id) {
     if (id != kNoInstance) labels.ever |= EverBit(id);
   }
 }
 
-void SingleFieldMap::Vacate(InstanceId id) {
+void SingleFieldMap::FreeEmpty(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    if (!field_.Find(index)->AnyObserved()) empty.push_back(index);
+  }
+  field_.Erase(empty);
+  labels_.Erase(empty);
+}
+
+std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : labels_.entries()) {
     LabelBlock& labels = *entry.block;
     if ((labels.ever & EverBit(id)) == 0) continue;
@@ -92,13 +110,17 @@ void SingleFieldMap::Vacate(InstanceId id) {
       labels.confidence[i] = 0;
       changed = true;
     }
-    if (changed) block.UpdateMasks(config_.back());
+    if (!changed) continue;
+    block.UpdateMasks(config_.back());
+    blocks.push_back(entry.index);
   }
+  return blocks;
 }
 
 void SingleFieldMap::Remove(InstanceId id) {
-  Vacate(id);
+  FreeEmpty(Vacate(id));
   T_WO_.erase(id);
+  CheckInDebugBuilds(*this);
 }
 
 void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -122,7 +144,7 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
     source.Add(entry->index, std::move(block));
     source_labels.FindOrAdd(entry->index) = *entry->block;
   }
-  Vacate(id);
+  const std::vector<Index3> left = Vacate(id);
 
   const VoxelReader reader(source);
   const Pose T_inverse = T_rel.inverse();
@@ -150,28 +172,35 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   };
   for (std::size_t b = 0; b < touched.size(); ++b) {
     if (arrivals[b] == nullptr) continue;
-    const TsdfBlock& arrival = *arrivals[b];
-    TsdfBlock* block = nullptr;
-    LabelBlock* labels = nullptr;
-    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-      if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
-      if (block == nullptr) {
-        block = &field_.FindOrAdd(touched[b]);
-        labels = &labels_.FindOrAdd(touched[b]);
-      }
-      if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
-          std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
-        continue;
-      }
-      block->distance[i] = arrival.distance[i];
-      block->weight[i] = arrival.weight[i];
-      block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
-      labels->id[i] = id;
-      labels->confidence[i] = confidence_at(VoxelAt(touched[b], static_cast<int>(i)));
-      labels->ever |= EverBit(id);
-    }
-    if (block != nullptr) block->UpdateMasks(config_.back());
+    Arrive(id, touched[b], *arrivals[b],
+           [&](std::size_t i) { return confidence_at(VoxelAt(touched[b], static_cast<int>(i))); });
   }
+  FreeEmpty(left);
+  CheckInDebugBuilds(*this);
+}
+
+void SingleFieldMap::Arrive(InstanceId id, const Index3& index, const TsdfBlock& arrival,
+                            const std::function<std::uint16_t(std::size_t)>& confidence) {
+  TsdfBlock* block = nullptr;
+  LabelBlock* labels = nullptr;
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
+    if (block == nullptr) {
+      block = &field_.FindOrAdd(index);
+      labels = &labels_.FindOrAdd(index);
+    }
+    if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
+        std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
+      continue;
+    }
+    block->distance[i] = arrival.distance[i];
+    block->weight[i] = arrival.weight[i];
+    block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
+    labels->id[i] = id;
+    labels->confidence[i] = confidence(i);
+    labels->ever |= EverBit(id);
+  }
+  if (block != nullptr) block->UpdateMasks(config_.back());
 }
 
 template <typename Function>
@@ -199,18 +228,33 @@ std::vector<InstanceId> SingleFieldMap::Objects() const {
 
 Pose SingleFieldMap::ObjectLattice(InstanceId) const { return Pose::Identity(); }
 
+MeshWork SingleFieldMap::UpdateMeshes() const {
+  const MeshWork work = mesh_.Update(field_, config_.voxel());
+  LabelTriangles(mesh_, [&](const Eigen::Vector3f& centroid) { return LabelNear(centroid); });
+  return work;
+}
+
 TriangleMesh SingleFieldMap::SceneMesh() const {
-  TriangleMesh mesh = ExtractMesh(field_, config_.voxel());
-  mesh.face_ids.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
-    const Eigen::Vector3f centroid =
-        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0F;
-    const Index3 v = NearestVoxel(centroid, config_.voxel());
-    const LabelBlock* labels = labels_.Find(BlockOf(v));
-    const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
-    mesh.face_ids.push_back(id == kNoInstance ? kBackground : id);
-  }
-  return mesh;
+  UpdateMeshes();
+  return Join({{&mesh_}});
+}
+
+std::vector<RaySurface> SingleFieldMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                                 const RayCastOptions& options) const {
+  RayPass pass;
+  pass.voxel_m = config_.voxel_m;
+  pass.volumes.push_back({kBackground, &field_, Pose::Identity(), true});
+  pass.label = [&](const Eigen::Vector3f& point_W) { return LabelNear(point_W); };
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
+}
+
+InstanceId SingleFieldMap::LabelNear(const Eigen::Vector3f& point) const {
+  const Index3 v = NearestVoxel(point, config_.voxel());
+  const LabelBlock* labels = labels_.Find(BlockOf(v));
+  const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
+  return id == kNoInstance ? kBackground : id;
 }
 
 TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {
@@ -221,6 +265,8 @@ TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {
   mesh.face_ids.clear();
   return mesh;
 }
+
+const TsdfGrid* SingleFieldMap::GridOf(InstanceId) const { return &field_; }
 
 std::optional<VoxelValue> SingleFieldMap::ValueAt(InstanceId id,
                                                   const Eigen::Vector3i& voxel) const {
@@ -255,8 +301,10 @@ std::vector<Eigen::Vector3i> SingleFieldMap::ListedVoxels() const {
 }
 
 MapMemory SingleFieldMap::Memory() const {
-  return {field_.size(), field_.size() * (sizeof(TsdfBlock) + sizeof(LabelBlock)) +
-                             field_.TableBytes() + labels_.TableBytes()};
+  return {field_.size(),
+          field_.size() * (sizeof(TsdfBlock) + sizeof(LabelBlock)) + field_.TableBytes() +
+              labels_.TableBytes(),
+          mesh_.Bytes()};
 }
 
 }  // namespace tsdfpp

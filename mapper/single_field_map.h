@@ -2,7 +2,10 @@
 // "`tsdf`: one field").
 #pragma once
 
+#include <functional>
+
 #include "mapper/map_representation.h"
+#include "mapper/mesh_cache.h"
 #include "mapper/tsdf_block.h"
 #include "mapper/volume_fusion.h"
 
@@ -15,19 +18,33 @@ class SingleFieldMap final : public MapRepresentation {
  public:
   SingleFieldMap(const MapConfig& config, MoveRule rule);
 
+  Method method() const override {
+    return rule_ == MoveRule::kOverwrite ? Method::kTsdf : Method::kTsdfMin;
+  }
+  const MapConfig& config() const override { return config_; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
+  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
+  const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId id) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
+  std::optional<std::string> FindFault() const override;
+  void Save(Sections& sections) const override;
+  Expected<void> Load(const Sections& sections) override;
 
  private:
   struct LabelBlock {
@@ -46,7 +63,18 @@ class SingleFieldMap final : public MapRepresentation {
   // `next` as FuseVoxels() takes it.
   void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
                  const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
-  void Vacate(InstanceId id);
+  // The label of the voxel nearest to a point (metres), the background's where it has none.
+  InstanceId LabelNear(const Eigen::Vector3f& point) const;
+  // Makes the object's voxels unobserved and unlabelled; returns their blocks.
+  std::vector<Index3> Vacate(InstanceId id);
+  // Writes the values of a block that moved here, as `rule_` allows; confidence(i) is what voxel i
+  // brings along.
+  void Arrive(InstanceId id, const Index3& index, const TsdfBlock& arrival,
+              const std::function<std::uint16_t(std::size_t)>& confidence);
+  // Labels a voxel, or was given a pose.
+  bool IsKnown(InstanceId id) const;
+  // Frees those of these blocks that have no observed voxel.
+  void FreeEmpty(const std::vector<Index3>& blocks);
   template <typename Function>
   void ForEachVoxel(const Function& function) const;
 
@@ -55,6 +83,7 @@ class SingleFieldMap final : public MapRepresentation {
   TsdfGrid field_;
   BlockGrid<LabelBlock> labels_;  // the same blocks
   std::map<InstanceId, Pose> T_WO_;
+  mutable GridMesh mesh_;
 };
 
 }  // namespace tsdfpp

@@ -3,6 +3,7 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "mapper/cover_kernels.h"
 
@@ -47,7 +48,17 @@ SliceMasks MasksOf(const float* distance, const float* weight, float back) {
 
 }  // namespace
 
+std::uint64_t NewRevision() {
+  // Each thread takes a batch at a time, so that they do not wait for each other.
+  constexpr std::uint64_t kBatch = 4096;
+  static std::atomic<std::uint64_t> next_batch{1};
+  thread_local std::uint64_t next = 0;
+  if (next % kBatch == 0) next = kBatch * next_batch.fetch_add(1, std::memory_order_relaxed);
+  return next++;
+}
+
 bool TsdfBlock::UpdateMasks(float back) {
+  revision = NewRevision();
   const BlockMask old_observed = observed;
   const BlockMask old_negative = negative;
   const BlockMask old_band = band;

@@ -16,20 +16,23 @@ inline bool Bit(const BlockMask& mask, int place) {
   return ((mask[static_cast<std::size_t>(place >> 6)] >> static_cast<unsigned>(place & 63)) & 1U) !=
          0;
 }
-inline void SetBit(BlockMask& mask, int place) {
-  mask[static_cast<std::size_t>(place >> 6)] |= 1ULL << static_cast<unsigned>(place & 63);
-}
-
 inline bool Any(const BlockMask& mask) {
   std::uint64_t any = 0;
   for (const std::uint64_t slice : mask) any |= slice;
   return any != 0;
+}
+inline void SetBit(BlockMask& mask, int place) {
+  mask[static_cast<std::size_t>(place >> 6)] |= 1ULL << static_cast<unsigned>(place & 63);
 }
 
 // One number a voxel for the vectorised loops; -1 is yes and 0 is no where they answer a question.
 using Lanes = std::array<std::int32_t, kBlockVoxels>;
 
 using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
+
+// A number that no call in this process has returned before, above 0. Only its being new means
+// anything: it depends on threads.
+std::uint64_t NewRevision();
 
 // Aligned to cache lines, which whole vectors then do not straddle.
 struct alignas(64) TsdfBlock {
@@ -45,10 +48,16 @@ struct alignas(64) TsdfBlock {
   BlockMask coloured{};  // colour_count > 0
   BlockMask full{};      // of these it is known that the weight is at its cap
 
-  // Brings the masks but for `cover` in line with the values; true where one of observed, negative
-  // and band changed. `back` in metres.
+  // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
+  // changes values gives the block a new one (UpdateMasks does), which is how the cached meshes see
+  // it.
+  std::uint64_t revision = 0;
+
+  // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
+  // true where one of observed, negative and band changed. `back` in metres.
   bool UpdateMasks(float back);
   bool AnyNegative() const { return Any(negative); }
+  bool AnyObserved() const { return Any(observed); }
   void Clear(int place) {
     const auto i = static_cast<std::size_t>(place);
     distance[i] = 0;

@@ -3,9 +3,13 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <bit>
+#include <cstddef>
 
+#include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
+#include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
 namespace tsdfpp {
@@ -34,45 +38,52 @@ struct TsdfppMap::CoverChange {
   BlockMask gained{};
 };
 
-// What a frame did at each block of the index, by increasing id.
+// What a frame did at each block of the index, by increasing id. A block that nothing covers, or
+// did, has no lists.
 class TsdfppMap::Groups {
  public:
   struct Group {
+    Index3 index;
     ListBlock* lists = nullptr;
     std::int32_t first_change = kNone;
     std::int32_t first_vote = kNone;
+    bool emptied = false;
   };
   static constexpr std::int32_t kNone = -1;
 
   Groups(TsdfppMap& map, const std::vector<FusedBlock>& fused,
          const std::vector<CoverChange>& changes)
       : next_change_(changes.size(), kNone), next_vote_(fused.size(), kNone) {
-    const auto numbers = [&map](const auto& of) {
-      std::vector<std::int32_t> found(of.size());
+    const auto numbers = [&map](const auto& of, const auto& has_lists) {
+      std::vector<std::int32_t> found(of.size(), kNone);
       tbb::parallel_for(
           tbb::blocked_range<std::size_t>(0, of.size(), kLookUpsPerTask),
           [&](const tbb::blocked_range<std::size_t>& range) {
             for (std::size_t i = range.begin(); i != range.end(); ++i) {
+              if (!has_lists(of[i])) continue;
               const auto number = map.index_.NumberOf(of[i].index);
               found[i] = number ? static_cast<std::int32_t>(*number) : kNone;
             }
           },
           tbb::simple_partitioner());
       for (std::size_t i = 0; i < of.size(); ++i) {
-        if (found[i] != kNone) continue;
+        if (found[i] != kNone || !has_lists(of[i])) continue;
         map.ListsOf(of[i].index);
         found[i] = static_cast<std::int32_t>(*map.index_.NumberOf(of[i].index));
       }
       return found;
     };
-    const std::vector<std::int32_t> change_at = numbers(changes);
-    const std::vector<std::int32_t> vote_at = numbers(fused);
+    const std::vector<std::int32_t> change_at =
+        numbers(changes, [](const CoverChange&) { return true; });
+    const std::vector<std::int32_t> vote_at =
+        numbers(fused, [](const FusedBlock& from) { return Any(from.block->cover); });
     std::vector<std::int32_t> group_of(map.index_.size(), kNone);
     const auto group_at = [&](std::int32_t number) -> Group& {
       std::int32_t& group = group_of[static_cast<std::size_t>(number)];
       if (group == kNone) {
         group = static_cast<std::int32_t>(groups_.size());
-        groups_.push_back({map.index_.entries()[static_cast<std::size_t>(number)].block.get()});
+        const auto& entry = map.index_.entries()[static_cast<std::size_t>(number)];
+        groups_.push_back({entry.index, entry.block.get()});
       }
       return groups_[static_cast<std::size_t>(group)];
     };
@@ -80,11 +91,12 @@ class TsdfppMap::Groups {
       Chain(changes, i, group_at(change_at[i]).first_change, next_change_);
     }
     for (std::size_t i = 0; i < fused.size(); ++i) {
+      if (vote_at[i] == kNone) continue;
       Chain(fused, i, group_at(vote_at[i]).first_vote, next_vote_);
     }
   }
 
-  const std::vector<Group>& all() const { return groups_; }
+  std::vector<Group>& all() { return groups_; }
   template <typename Function>
   void ForEachChange(const Group& group, const Function& function) const {
     ForEach(group.first_change, next_change_, function);
@@ -156,25 +168,46 @@ void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
-  Deactivate(id);
+  const std::vector<Index3> left = Deactivate(id);
   volume.grid =
       ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
   Activate(id);
+  FreeEmptyLists(left);
+  CheckInDebugBuilds(*this);
 }
 
-void TsdfppMap::Deactivate(InstanceId id) {
+std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
+  std::vector<Index3> blocks;
   for (const auto& entry : volumes_.at(id).grid.entries()) {
     ListBlock* lists = index_.Find(entry.index);
     if (lists == nullptr) continue;
     // Overflow may have dropped the object from some of these; Remove() knows.
     ForEachVoxel(entry.block->cover, [&](int place) { ListOf(*lists, place).Remove(id); });
+    if (Any(entry.block->cover)) blocks.push_back(entry.index);
   }
+  return blocks;
+}
+
+bool TsdfppMap::IsEmpty(const ListBlock& lists) {
+  const auto first = lists.entries.begin();
+  return std::all_of(first, first + kBlockVoxels,
+                     [](const ListEntry& active) { return active.id == kNoInstance; });
+}
+
+void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
+  std::vector<Index3> empty;
+  for (const Index3& index : blocks) {
+    const ListBlock* lists = index_.Find(index);
+    if (lists != nullptr && IsEmpty(*lists)) empty.push_back(index);
+  }
+  index_.Erase(empty);
 }
 
 void TsdfppMap::Activate(InstanceId id) {
   const TsdfGrid& grid = volumes_.at(id).grid;
   for (const auto& entry : grid.entries()) {
     entry.block->cover = FindCover(grid, entry.index);
+    if (!Any(entry.block->cover)) continue;
     ListBlock& lists = ListsOf(entry.index);
     ForEachVoxel(entry.block->cover,
                  [&](int place) { ListOf(lists, place).PushFront(id, config_.moved_confidence); });
@@ -183,7 +216,11 @@ void TsdfppMap::Activate(InstanceId id) {
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
-  UpdateIndex(FuseIntoVolumes(view, config_, volumes_));
+  const FrameFreeing freeing(volumes_);
+  const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
+  UpdateIndex(fused);
+  freeing.FreeEmpty(fused, volumes_);
+  CheckInDebugBuilds(*this);
 }
 
 std::vector<TsdfppMap::CoverChange> TsdfppMap::UpdateCovers(const std::vector<FusedBlock>& fused) {
@@ -208,16 +245,18 @@ std::vector<TsdfppMap::CoverChange> TsdfppMap::UpdateCovers(const std::vector<Fu
 
 void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
   const std::vector<CoverChange> changes = UpdateCovers(fused);
-  const Groups groups(*this, fused, changes);
+  Groups groups(*this, fused, changes);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, groups.all().size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const Groups::Group& group = groups.all()[i];
+          Groups::Group& group = groups.all()[i];
           ListBlock& lists = *group.lists;
+          bool lost_any = false;
           groups.ForEachChange(group, [&](std::size_t k) {
             ForEachVoxel(changes[k].lost,
                          [&](int place) { ListOf(lists, place).Remove(changes[k].id); });
+            lost_any = lost_any || Any(changes[k].lost);
           });
           groups.ForEachVote(group, [&](std::size_t k) {
             const FusedBlock& from = fused[k];
@@ -231,9 +270,15 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
               if (!list.Lists(changes[k].id)) list.Append(changes[k].id, 1);
             });
           });
+          group.emptied = lost_any && IsEmpty(lists);
         }
       },
       tbb::simple_partitioner());
+  std::vector<Index3> empty;
+  for (const Groups::Group& group : groups.all()) {
+    if (group.emptied) empty.push_back(group.index);
+  }
+  index_.Erase(empty);
 }
 
 void TsdfppMap::Remove(InstanceId id) {
@@ -255,8 +300,10 @@ void TsdfppMap::Remove(InstanceId id) {
     });
   }
   volumes_.erase(removed);
-  if (!config_.relist_on_removal) return;
+  std::vector<Index3> blocks;
   for (const Vacated& voxel : vacated) {
+    if (blocks.empty() || blocks.back() != voxel.block) blocks.push_back(voxel.block);
+    if (!config_.relist_on_removal) continue;
     VoxelList list = ListOf(*index_.Find(voxel.block), voxel.place);
     for (const auto& [other, volume] : volumes_) {
       const TsdfBlock* block = volume.grid.Find(voxel.block);
@@ -264,12 +311,24 @@ void TsdfppMap::Remove(InstanceId id) {
       list.Append(other, 1);
     }
   }
+  FreeEmptyLists(blocks);
+  CheckInDebugBuilds(*this);
 }
 
-InstanceId TsdfppMap::ActiveAt(const Index3& voxel) const {
-  const ListBlock* lists = index_.Find(BlockOf(voxel));
-  if (lists == nullptr || lists->entries.empty()) return kNoInstance;
-  return lists->entries[static_cast<std::size_t>(PlaceInBlock(voxel))].id;
+LayeredMap::ActiveIds TsdfppMap::ActiveIn(const Index3& block) const {
+  const ListBlock* lists = index_.Find(block);
+  if (lists == nullptr || lists->entries.empty()) return {};
+  static_assert(sizeof(ListEntry) == 2 * sizeof(InstanceId) && offsetof(ListEntry, id) == 0);
+  return {&lists->entries.data()->id, 2};
+}
+
+std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                            const RayCastOptions& options) const {
+  if (!config_.relist_on_removal) return LayeredMap::CastRays(camera, T_WC, options);
+  // A removal lists objects that the lists do not know of.
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(*this, LayeredMap::CastRays(camera, T_WC, first), camera, T_WC, options);
 }
 
 std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {

@@ -10,16 +10,25 @@ class TsdfppMap final : public LayeredMap {
  public:
   TsdfppMap(const MapConfig& config, int layers);
 
+  Method method() const override { return Method::kTsdfpp; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
+  Expected<void> Rename(InstanceId from, InstanceId to) override;
+  Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                     const Pose& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;
+  std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
+                                   const RayCastOptions& options) const override;
+  std::optional<std::string> FindFault() const override;
+  void Save(Sections& sections) const override;
+  Expected<void> Load(const Sections& sections) override;
 
  protected:
-  InstanceId ActiveAt(const Index3& voxel) const override;
+  ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
   struct ListBlock {
@@ -35,10 +44,15 @@ class TsdfppMap final : public LayeredMap {
   // To be changed: the voxel is no longer taken for settled.
   VoxelList ListOf(ListBlock& lists, int place) const;
   void Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
-  void Deactivate(InstanceId id);
+  // The blocks of the index that lost a listing.
+  std::vector<Index3> Deactivate(InstanceId id);
+  // Puts the object first where it covers a voxel now.
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
   std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused);
+  // Frees those of these blocks whose lists are all empty.
+  void FreeEmptyLists(const std::vector<Index3>& blocks);
+  static bool IsEmpty(const ListBlock& lists);
 
   int layers_;
   BlockGrid<ListBlock> index_;

@@ -92,6 +92,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           const BlockPlace place = PlaceOf(*of.T_CL, of.entry->index, config.voxel());
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
+          block.revision = NewRevision();
           fused[k] = {of.id, of.entry->index, &block, result.in_band,
                       AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U)};
         }

@@ -163,13 +163,12 @@ Measured LastSeenStore::Retention(const SampleSet& samples, const Selection& hid
 }
 
 PreservationScores ScorePreservation(const SeenTracker& tracker, const Selection& within,
-                                     const Selection& reconstructed,
-                                     const LastSeenStore& last_seen) {
+                                     const Selection& reconstructed, const LastSeenStore& last_seen,
+                                     const Selection* any_label) {
   const SampleSet& samples = tracker.samples_O();
   const Selection seen = SelectSeen(tracker, within);
   const Selection visible = SelectSeenWith(tracker, SampleStatus::kVisible, within);
   const Selection hidden = SelectHidden(tracker, within);
-  const Selection behind_other = SelectSeenWith(tracker, SampleStatus::kBehindOther, within);
   const auto share = [&](const Selection& of, const std::string& why) {
     return ShareOf(samples, of, reconstructed, why);
   };
@@ -178,23 +177,34 @@ PreservationScores ScorePreservation(const SeenTracker& tracker, const Selection
   scores.completion = share(seen, "no sample was seen");
   scores.visible_completion = share(visible, "no sample is visible now");
   scores.preservation = share(hidden, "no seen sample is hidden now");
-  scores.preservation_behind_other =
-      share(behind_other, "no seen sample is behind another object now");
-  scores.preservation_behind_itself =
-      share(SelectSeenWith(tracker, SampleStatus::kBehindItself, within),
-            "no seen sample is behind its own object now");
-  scores.preservation_outside = share(SelectSeenWith(tracker, SampleStatus::kOutside, within),
-                                      "no seen sample is outside the image now");
   scores.retention = last_seen.Retention(samples, hidden, reconstructed);
-  scores.retention_behind_other = last_seen.Retention(samples, behind_other, reconstructed);
   scores.seen_area_cm2 = kCm2PerM2 * SelectedArea_m2(samples, seen);
   scores.visible_area_cm2 = kCm2PerM2 * SelectedArea_m2(samples, visible);
   scores.hidden_area_cm2 = kCm2PerM2 * SelectedArea_m2(samples, hidden);
-  scores.behind_other_area_cm2 = kCm2PerM2 * SelectedArea_m2(samples, behind_other);
-  scores.hole_area_cm2 = scores.preservation_behind_other.value
-                             ? Measured::Of((1 - *scores.preservation_behind_other.value) *
-                                            scores.behind_other_area_cm2)
-                             : scores.preservation_behind_other;
+
+  constexpr std::array kWhyNone{"no seen sample is behind another object now",
+                                "no seen sample is behind its own object now",
+                                "no seen sample is outside the image now"};
+  for (std::size_t k = 0; k < kHidingCauses.size(); ++k) {
+    const Selection by_cause = SelectSeenWith(tracker, kHidingCauses[k], within);
+    HiddenScores& of_cause = scores.by_cause[k];
+    of_cause.area_cm2 = kCm2PerM2 * SelectedArea_m2(samples, by_cause);
+    of_cause.preservation = share(by_cause, kWhyNone[k]);
+    of_cause.retention = last_seen.Retention(samples, by_cause, reconstructed);
+    of_cause.lost_area_cm2 =
+        of_cause.preservation.value
+            ? Measured::Of((1 - *of_cause.preservation.value) * of_cause.area_cm2)
+            : of_cause.preservation;
+    of_cause.any_label = any_label != nullptr
+                             ? ShareOf(samples, by_cause, *any_label, kWhyNone[k])
+                             : Measured::Undefined("not asked without regard to labels");
+  }
+  scores.preservation_behind_other = scores.by_cause[0].preservation;
+  scores.preservation_behind_itself = scores.by_cause[1].preservation;
+  scores.preservation_outside = scores.by_cause[2].preservation;
+  scores.retention_behind_other = scores.by_cause[0].retention;
+  scores.hole_area_cm2 = scores.by_cause[0].lost_area_cm2;
+  scores.behind_other_area_cm2 = scores.by_cause[0].area_cm2;
   return scores;
 }
 

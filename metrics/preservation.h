@@ -3,6 +3,7 @@
 // pose.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -83,6 +84,23 @@ class LastSeenStore {
   std::vector<std::uint8_t> state_;
 };
 
+// The ways in which a seen sample can be hidden, and their names in reports.
+inline constexpr std::array<SampleStatus, 3> kHidingCauses{
+    SampleStatus::kBehindOther, SampleStatus::kBehindItself, SampleStatus::kOutside};
+inline constexpr std::array<const char*, 3> kHidingCauseNames{"behind_other", "behind_itself",
+                                                              "outside"};
+
+// Of the samples that one cause hides: which forgetting a method suffers.
+struct HiddenScores {
+  double area_cm2 = 0;
+  Measured preservation;  // OP
+  Measured retention;
+  Measured lost_area_cm2;  // (1 - OP) x area
+  // OP that takes faces of any label: where it is above `preservation`, surface was kept under
+  // another object's name. Undefined where no such selection was given.
+  Measured any_label;
+};
+
 // All that one mesh and one frame say of one object or region.
 struct PreservationScores {
   Measured completion;          // of the seen samples; also the recall at tau
@@ -98,11 +116,13 @@ struct PreservationScores {
   double visible_area_cm2 = 0;
   double hidden_area_cm2 = 0;
   double behind_other_area_cm2 = 0;
+  std::array<HiddenScores, 3> by_cause;  // in the order of kHidingCauses
 };
 
 // `within`: the samples to score, e.g. a region. `reconstructed`: from the mesh under examination.
+// `any_label`: from all its faces, whatever their label; needed for the hidden samples only.
 PreservationScores ScorePreservation(const SeenTracker& tracker, const Selection& within,
-                                     const Selection& reconstructed,
-                                     const LastSeenStore& last_seen);
+                                     const Selection& reconstructed, const LastSeenStore& last_seen,
+                                     const Selection* any_label = nullptr);
 
 }  // namespace tsdfpp

@@ -5,6 +5,7 @@
 #include <open3d/core/Tensor.h>
 #include <open3d/t/geometry/RaycastingScene.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "metrics/mesh_tools.h"
@@ -15,17 +16,18 @@ using open3d::core::Tensor;
 
 namespace {
 
-// A triangle with an edge shorter than this is left out of the index: Open3D's closest point
-// divides by an edge's squared length, taken in single precision as a difference of products with
-// the query's distance (which for queries up to some 80 m away vanishes below this length), and
-// Debian's build aborts on the NaN. What is left out is a sliver of this width along its
-// neighbours.
-constexpr float kShortestEdge_m = 5e-6F;
+// A triangle with an edge shorter than this share of the farthest query's distance (or than
+// kShortestEdge_m) is left out of the index: Open3D's closest point divides by an edge's squared
+// length, taken in single precision as a difference of products with the query's distance, which
+// vanishes below this length, and Debian's build aborts on the NaN. What is left out is a sliver of
+// this width along its neighbours.
+constexpr double kShortestEdge = 6.25e-8;
+constexpr double kShortestEdge_m = 5e-6;
 
-bool IsSliver(const TriangleMesh& mesh, std::size_t triangle) {
+bool IsSliver(const TriangleMesh& mesh, std::size_t triangle, float shortest_m) {
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f edge = Corner(mesh, triangle, (i + 1) % 3) - Corner(mesh, triangle, i);
-    if (edge.norm() < kShortestEdge_m) return true;
+    if (edge.norm() < shortest_m) return true;
   }
   return false;
 }
@@ -38,7 +40,7 @@ struct SurfaceIndex::Impl {
   mutable open3d::t::geometry::RaycastingScene scene;
 };
 
-SurfaceIndex::SurfaceIndex(TriangleMesh mesh) : mesh_(std::move(mesh)) {
+SurfaceIndex::SurfaceIndex(TriangleMesh mesh, double farthest_query_m) : mesh_(std::move(mesh)) {
   if (mesh_.triangles.empty()) return;
   normals_.reserve(mesh_.triangles.size());
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -53,8 +55,10 @@ SurfaceIndex::SurfaceIndex(TriangleMesh mesh) : mesh_(std::move(mesh)) {
               mesh_.vertices.size() * sizeof(Eigen::Vector3f));
   auto impl = std::make_unique<Impl>();
   std::vector<std::array<std::uint32_t, 3>> kept;
+  const auto shortest_m =
+      static_cast<float>(std::max(kShortestEdge_m, kShortestEdge * farthest_query_m));
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-    if (IsSliver(mesh_, t)) continue;
+    if (IsSliver(mesh_, t, shortest_m)) continue;
     kept.push_back(mesh_.triangles[t]);
     impl->indexed.push_back(static_cast<std::uint32_t>(t));
   }
@@ -66,6 +70,8 @@ SurfaceIndex::SurfaceIndex(TriangleMesh mesh) : mesh_(std::move(mesh)) {
   // Open3D builds the tree at the first query: ask one now, so that later ones only read.
   impl_->scene.ComputeClosestPoints(Tensor::Zeros({1, 3}, open3d::core::Float32));
 }
+
+std::size_t SurfaceIndex::indexed() const { return impl_ == nullptr ? 0 : impl_->indexed.size(); }
 
 SurfaceIndex::~SurfaceIndex() = default;
 SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;

@@ -25,7 +25,9 @@ struct NearestSurface {
 // depend on the number of threads.
 class SurfaceIndex {
  public:
-  explicit SurfaceIndex(TriangleMesh mesh);
+  // Triangles with an edge shorter than 5 um are not indexed (Open3D fails on them); the limit
+  // grows with `farthest_query_m`, the longest distance that will be asked for.
+  explicit SurfaceIndex(TriangleMesh mesh, double farthest_query_m = 80);
   ~SurfaceIndex();
   SurfaceIndex(SurfaceIndex&&) noexcept;
   SurfaceIndex& operator=(SurfaceIndex&&) noexcept;
@@ -34,6 +36,8 @@ class SurfaceIndex {
   // everything (the centre of a sphere): no hierarchy helps there.
   NearestSurface Nearest(std::span<const Eigen::Vector3f> points) const;
 
+  // Triangles that distances are measured to.
+  std::size_t indexed() const;
   const TriangleMesh& mesh() const { return mesh_; }
   // Unit normal a triangle; zero where degenerate.
   const std::vector<Eigen::Vector3f>& normals() const { return normals_; }

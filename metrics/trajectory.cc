@@ -1,21 +1,25 @@
 #include "metrics/trajectory.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
+
+#include "metrics/relative_error.h"
 
 namespace tsdfpp {
 namespace {
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
 
-double Angle_rad(const Eigen::Matrix3d& R) {
-  return std::abs(Eigen::AngleAxisd(Eigen::Quaterniond(R).normalized()).angle());
+// Whether the points (whose mean is zero) are within 1e-5 of their extent of a line.
+bool OnOneLine(const Eigen::Matrix3Xd& centred) {
+  constexpr double kThinnest = 1e-5;
+  const Eigen::Matrix3d scatter = centred * centred.transpose();
+  const Eigen::Vector3d increasing =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+  return increasing[1] <= kThinnest * kThinnest * increasing[2];
 }
 
 Measured RmseOf(const std::vector<double>& errors, double unit, const char* why_empty) {
@@ -57,6 +61,7 @@ std::optional<ErrorSummary> SummariseErrors(std::span<const double> errors) {
       sorted.size() % 2 == 1 ? sorted[middle] : 0.5 * (sorted[middle - 1] + sorted[middle]);
   summary.smallest = sorted.front();
   summary.largest = sorted.back();
+  summary.squares_sum = squares;
   return summary;
 }
 
@@ -77,7 +82,21 @@ std::vector<double> TranslationErrors_m(const PosePairs& pairs) {
 std::vector<double> RotationErrors_rad(const PosePairs& pairs) {
   std::vector<double> errors;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    errors.push_back(Angle_rad(pairs.estimate[i].linear().transpose() * pairs.truth[i].linear()));
+    errors.push_back(
+        RotationAngle_rad(pairs.estimate[i].linear().transpose() * pairs.truth[i].linear()));
+  }
+  return errors;
+}
+
+double RotationAngle_rad(const Eigen::Matrix3d& R) {
+  return std::abs(Eigen::AngleAxisd(Eigen::Quaterniond(R).normalized()).angle());
+}
+
+std::vector<double> FullErrors(const PosePairs& pairs) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Eigen::Matrix4d E = (pairs.truth[i].inverse() * pairs.estimate[i]).matrix();
+    errors.push_back((E - Eigen::Matrix4d::Identity()).norm());
   }
   return errors;
 }
@@ -91,12 +110,16 @@ std::optional<Alignment> AlignHorn(const PosePairs& pairs, bool with_scale) {
     from.col(static_cast<Eigen::Index>(i)) = pairs.estimate[i].translation();
     to.col(static_cast<Eigen::Index>(i)) = pairs.truth[i].translation();
   }
-  const Eigen::Matrix3Xd centred = from.colwise() - from.rowwise().mean();
-  if (centred.squaredNorm() == 0) return std::nullopt;
+  const Eigen::Matrix3Xd from_centred = from.colwise() - from.rowwise().mean();
+  const Eigen::Matrix3Xd to_centred = to.colwise() - to.rowwise().mean();
+  if (from_centred.squaredNorm() == 0) return std::nullopt;
   const Eigen::Matrix4d T = Eigen::umeyama(from, to, with_scale);
   Alignment alignment;
-  alignment.scale = T.block<3, 1>(0, 0).norm();
+  if (with_scale) alignment.scale = T.block<3, 1>(0, 0).norm();
+  // A truth that stands still: any estimate fits best as a single point.
+  if (!(alignment.scale > 0)) return std::nullopt;
   alignment.R = T.topLeftCorner<3, 3>() / alignment.scale;
+  alignment.rotation_is_unique = !OnOneLine(from_centred) && !OnOneLine(to_centred);
   alignment.t = T.topRightCorner<3, 1>();
   return alignment;
 }
@@ -108,19 +131,6 @@ PosePairs Aligned(const PosePairs& pairs, const Alignment& alignment) {
     pose.linear() = (alignment.R * pose.linear()).eval();
   }
   return out;
-}
-
-RelativeErrors RelativePoseErrors(const PosePairs& pairs, std::size_t delta, bool overlapping) {
-  RelativeErrors errors;
-  const std::size_t step = overlapping ? 1 : delta;
-  for (std::size_t i = 0; i + delta < pairs.size(); i += step) {
-    const Pose truth = pairs.truth[i].inverse() * pairs.truth[i + delta];
-    const Pose estimate = pairs.estimate[i].inverse() * pairs.estimate[i + delta];
-    const Pose error = truth.inverse() * estimate;
-    errors.translation_m.push_back(error.translation().norm());
-    errors.rotation_rad.push_back(Angle_rad(error.linear()));
-  }
-  return errors;
 }
 
 PosePairs AnchoredAtFirst(const PosePairs& pairs) {
@@ -155,39 +165,6 @@ ObjectTrajectoryScores ScoreObjectTrajectory(const Trajectory& T_WO_estimate,
       alignment ? RmseOf(TranslationErrors_m(Aligned(cofusion, *alignment)), 1, untracked)
                 : Measured::Undefined("Horn alignment needs three tracked frames and motion");
   return scores;
-}
-
-Measured AddError_m(std::span<const Eigen::Vector3f> points_O, const Pose& T_WO_estimate,
-                    const Pose& T_WO_truth) {
-  if (points_O.empty()) return Measured::Undefined("the model has no points");
-  double sum = 0;
-  for (const Eigen::Vector3f& point : points_O) {
-    const Eigen::Vector3d p_O = point.cast<double>();
-    sum += (T_WO_estimate * p_O - T_WO_truth * p_O).norm();
-  }
-  return Measured::Of(sum / static_cast<double>(points_O.size()));
-}
-
-Measured AddSymmetricError_m(std::span<const Eigen::Vector3f> points_O, const Pose& T_WO_estimate,
-                             const Pose& T_WO_truth) {
-  if (points_O.empty()) return Measured::Undefined("the model has no points");
-  // In the estimate's object frame, where the numbers are small enough for single precision.
-  const Pose T_estimate_truth = T_WO_estimate.inverse() * T_WO_truth;
-  std::vector<double> nearest(points_O.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points_O.size(), 64),
-                    [&](const auto& range) {
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                        const Eigen::Vector3f moved =
-                            (T_estimate_truth * points_O[i].cast<double>()).template cast<float>();
-                        float smallest = std::numeric_limits<float>::infinity();
-                        for (const Eigen::Vector3f& point : points_O) {
-                          smallest = std::min(smallest, (moved - point).squaredNorm());
-                        }
-                        nearest[i] = std::sqrt(static_cast<double>(smallest));
-                      }
-                    });
-  const double sum = std::accumulate(nearest.begin(), nearest.end(), 0.0);
-  return Measured::Of(sum / static_cast<double>(points_O.size()));
 }
 
 }  // namespace tsdfpp

@@ -1,4 +1,5 @@
-// Trajectory and pose errors. Translations in metres, rotations in radians unless named _deg.
+// Absolute trajectory errors (relative_error.h has the relative ones, object_pose.h those over a
+// model's points). Translations in metres, rotations in radians unless named _deg.
 #pragma once
 
 #include <map>
@@ -29,6 +30,7 @@ struct ErrorSummary {
   double standard_deviation = 0;
   double smallest = 0;
   double largest = 0;
+  double squares_sum = 0;  // evo's sse
 };
 // Nothing where there are no errors to summarise.
 std::optional<ErrorSummary> SummariseErrors(std::span<const double> errors);
@@ -36,9 +38,15 @@ std::optional<ErrorSummary> SummariseErrors(std::span<const double> errors);
 // Pairs with each estimate moved by T * estimate * C; the truth stays.
 PosePairs Moved(const PosePairs& pairs, const Pose& T_left, const Pose& C_right);
 
-// Absolute errors a pair, in one common world: |t_est - t_gt|, and the angle of R_est^T R_gt.
+// Absolute errors a pair, in one common world: |t_est - t_gt|, and the angle
+// (0 to pi) of R_est^T R_gt.
 std::vector<double> TranslationErrors_m(const PosePairs& pairs);
+double RotationAngle_rad(const Eigen::Matrix3d& R);
 std::vector<double> RotationErrors_rad(const PosePairs& pairs);
+
+// The whole pose error a pair, evo's "full transformation": |T_gt^-1 T_est - I|, the Frobenius norm
+// of a 4x4 matrix, which mixes metres and rotation and so has no unit.
+std::vector<double> FullErrors(const PosePairs& pairs);
 
 // Least-squares truth ~ scale R estimate + t over the translations (Horn 1987, Umeyama 1991); scale
 // 1 unless asked for. Needs three pairs; fewer, or translations on one point, give nothing.
@@ -46,18 +54,12 @@ struct Alignment {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   Eigen::Vector3d t = Eigen::Vector3d::Zero();
   double scale = 1;
+  // False where the translations of either lie on one line (to 1e-5 of its length): the aligned
+  // translations are then defined, but a turn about that line is not, nor any rotation error.
+  bool rotation_is_unique = true;
 };
 std::optional<Alignment> AlignHorn(const PosePairs& pairs, bool with_scale = false);
 PosePairs Aligned(const PosePairs& pairs, const Alignment& alignment);
-
-// Relative pose errors between pairs i and i + delta: E = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), Q the
-// truth. `overlapping`: every i, otherwise i = 0, delta, 2 delta ...
-struct RelativeErrors {
-  std::vector<double> translation_m;
-  std::vector<double> rotation_rad;
-};
-RelativeErrors RelativePoseErrors(const PosePairs& pairs, std::size_t delta,
-                                  bool overlapping = false);
 
 // A mapper chooses an object's frame, so its trajectory is anchored once, at the first common frame
 // t0: T_est(t) T_est(t0)^-1 T_gt(t0) (facts/metrics.md). No alignment follows.
@@ -79,14 +81,5 @@ struct ObjectTrajectoryScores {
 ObjectTrajectoryScores ScoreObjectTrajectory(const Trajectory& T_WO_estimate,
                                              const Trajectory& T_WO_truth,
                                              const Pose& T_WC_estimate, const Pose& T_WC_truth);
-
-// ADD (Hinterstoisser 2012): mean distance between the model's points at both poses. Undefined
-// without points.
-Measured AddError_m(std::span<const Eigen::Vector3f> points_O, const Pose& T_WO_estimate,
-                    const Pose& T_WO_truth);
-// ADD-S, also ADI: mean distance from each point at the true pose to the nearest one at the
-// estimated pose. Quadratic in the points (4 million pairs take some 5 ms): subsample the model.
-Measured AddSymmetricError_m(std::span<const Eigen::Vector3f> points_O, const Pose& T_WO_estimate,
-                             const Pose& T_WO_truth);
 
 }  // namespace tsdfpp

@@ -210,6 +210,7 @@ Expected<void> WriteCofusion(FrameSource& source, const GeneratorInfo& generator
   }
   TSDFPP_ASSIGN(const std::vector<TrueModel> models, source.Truth());
   TSDFPP_RETURN_IF_ERROR(FinishCofusion(info, generator, frames, models, {}, staging.path()));
+  TSDFPP_RETURN_IF_ERROR(CheckReplaceable(out, overwrite));
   return staging.TakeThePlace();
 }
 

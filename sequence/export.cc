@@ -89,7 +89,8 @@ Expected<void> WriteEncoded(const std::filesystem::path& path, const Expected<st
 
 Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
                                       const std::filesystem::path& out,
-                                      const std::function<void(int, int)>& progress) {
+                                      const std::function<void(int, int)>& progress,
+                                      const std::atomic<bool>* stop) {
   const SequenceInfo& info = source.info();
   // A source without true surfaces is exported without.
   auto truth = source.Truth();
@@ -110,6 +111,10 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
       frame.mask = true_frame.mask;
       frame.T_WC = true_frame.T_WC;
     }
+    if (stop != nullptr && *stop) {
+      return EnvironmentError("{}: stopped after {} of {} frames; nothing is kept", out.string(), i,
+                              info.frame_count);
+    }
     if (i == 0) with_mask = !frame.mask.empty();
     has_poses |= !frame.T_WO.empty();
     TSDFPP_RETURN_IF_ERROR(CheckFrame(frame, info, format, with_mask));
@@ -128,6 +133,7 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
             ? "the masks and camera poses that the sensor gave: BOP's are the true ones"
             : "the truth: depth, masks and camera poses are those that the sensor gave");
   }
+  TSDFPP_RETURN_IF_ERROR(CheckReplaceable(out, false));
   TSDFPP_RETURN_IF_ERROR(staging.TakeThePlace());
   return report;
 }

@@ -1,6 +1,7 @@
 // Writes any stream of frames in another dataset's format.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -29,12 +30,13 @@ struct ExportReport {
 };
 
 // Formats: kTum, kBop, kKlg, kSevenScenes. Writes into `out`, which must be new or empty and
-// appears whole or not at all. docs/datasets.md lists the files.
-// Errors: those of the source; kUsage for another format or an `out` that may not be written; kData
-// where a frame does not fit the source's own description or the format; kEnvironment where the
-// disk refuses.
-Expected<ExportReport> ExportSequence(
-    FrameSource& source, DatasetFormat format, const std::filesystem::path& out,
-    const std::function<void(int done, int total)>& progress = {});
+// appears whole or not at all. `stop`, set by a signal handler, ends it between two frames.
+// docs/datasets.md lists the files. Errors: those of the source; kUsage for another format or an
+// `out` that may not be written; kData where a frame does not fit the source's own description or
+// the format; kEnvironment where the disk refuses or it was stopped.
+Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
+                                      const std::filesystem::path& out,
+                                      const std::function<void(int done, int total)>& progress = {},
+                                      const std::atomic<bool>* stop = nullptr);
 
 }  // namespace tsdfpp

@@ -15,6 +15,7 @@
 #include "core/files.h"
 #include "core/types.h"
 #include "sequence/exr_header.h"
+#include "sequence/image_encoders.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -51,20 +52,6 @@ class QuietStderr {
   std::lock_guard<std::mutex> lock_;  // two at once would restore each other's silence
   int saved_;
 };
-
-Expected<std::string> Encode(const char* extension, const cv::Mat& image,
-                             const std::vector<int>& settings, const std::string& file) {
-  std::vector<unsigned char> bytes;
-  std::string why = "the codec refused it";
-  try {
-    if (cv::imencode(extension, image, bytes, settings)) {
-      return std::string(bytes.begin(), bytes.end());
-    }
-  } catch (const cv::Exception& exception) {
-    why = exception.err;
-  }
-  return EnvironmentError("{}: cannot be encoded ({})", file, why);
-}
 
 // What `decode` makes of an image; empty where it cannot.
 template <typename Function>
@@ -192,30 +179,30 @@ Expected<cv::Mat> DecodeColour(const std::string& bytes, const std::string& file
 }
 
 Expected<std::string> EncodePng(const cv::Mat& image, const std::string& file) {
-  return Encode(".png", image, {}, file);
+  if (image.empty() || (image.type() != CV_8UC1 && image.type() != CV_16UC1)) {
+    return DataError("{}: the image is {}, expected 8-bit or 16-bit unsigned with 1 channel", file,
+                     ImageTypeName(image));
+  }
+  return PngFile(image);
 }
 
 Expected<std::string> EncodeColour(const cv::Mat& colour, const std::string& file) {
-  if (colour.type() != CV_8UC3) {
+  if (colour.empty() || colour.type() != CV_8UC3) {
     return DataError("{}: the colour image is {}, expected 8-bit RGB", file, ImageTypeName(colour));
   }
-  return Encode(".png", SwapRedAndBlue(colour), {}, file);
+  return PngFile(colour);
 }
 
 Expected<std::string> EncodeDepth(const cv::Mat& depth, const std::string& file) {
-  if (depth.type() != CV_32FC1) {
+  if (depth.empty() || depth.type() != CV_32FC1) {
     return DataError("{}: the depth image is {}, expected 32-bit float with 1 channel", file,
                      ImageTypeName(depth));
   }
-  EnableExr();
-  return Encode(".exr", depth,
-                {cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT, cv::IMWRITE_EXR_COMPRESSION,
-                 cv::IMWRITE_EXR_COMPRESSION_ZIP},
-                file);
+  return ExrFile(depth);
 }
 
 Expected<std::string> EncodeMask(const cv::Mat& mask, const std::string& file) {
-  if (mask.type() != CV_16UC1) {
+  if (mask.empty() || mask.type() != CV_16UC1) {
     return DataError("{}: the mask is {}, expected 16-bit unsigned with 1 channel", file,
                      ImageTypeName(mask));
   }
@@ -226,7 +213,7 @@ Expected<std::string> EncodeMask(const cv::Mat& mask, const std::string& file) {
   }
   cv::Mat bytes;
   mask.convertTo(bytes, CV_8U);
-  return Encode(".png", bytes, {}, file);
+  return PngFile(bytes);
 }
 
 Expected<cv::Mat> ReadColour(const fs::path& path, cv::Size expected,

@@ -2,8 +2,13 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <optional>
 #include <vector>
 
 #include "core/files.h"
@@ -14,7 +19,6 @@ namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kLock = "lock";
 constexpr const char* kNotes = "notes";
 constexpr const char* kSet = "set";
 
@@ -22,6 +26,32 @@ constexpr const char* kSet = "set";
 fs::path Normal(const fs::path& out) {
   const fs::path folder = fs::absolute(out).lexically_normal();
   return folder.has_filename() ? folder : folder.parent_path();
+}
+
+// The process in "<prefix><its number><suffix>".
+std::optional<pid_t> ProcessOf(const std::string& name, const std::string& prefix,
+                               const std::string& suffix) {
+  const auto number = cofusion::NumberOf(name, prefix, suffix);
+  return number && *number > 0 ? std::optional<pid_t>(*number) : std::nullopt;
+}
+
+// Whether nobody uses the folder any more. Another machine or container may not know the process,
+// so its lock counts too.
+bool IsAbandoned(const fs::path& folder, pid_t process) {
+  if (process == getpid() || kill(process, 0) == 0 || errno != ESRCH) return false;
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool free = flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  close(descriptor);
+  return free;
+}
+
+// Whether the path leads to the file that the descriptor holds.
+bool IsFileOf(const fs::path& path, int descriptor) {
+  struct stat held {};
+  struct stat named {};
+  return fstat(descriptor, &held) == 0 && stat(path.c_str(), &named) == 0 &&
+         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
 }
 
 }  // namespace
@@ -42,9 +72,8 @@ Expected<void> CheckReplaceable(const fs::path& out, bool overwrite) {
         folder.string());
   }
   if (!overwrite) {
-    return UsageError(
-        "{}: already holds a sequence, expected a new folder or leave to overwrite it",
-        folder.string());
+    return UsageError("{}: the folder already holds a sequence, expected a new or an empty folder",
+                      folder.string());
   }
   return {};
 }
@@ -59,6 +88,8 @@ fs::path StagingFolder::notes() const { return root_ / kNotes; }
 StagingFolder::~StagingFolder() {
   std::error_code ignored;
   if (mine_ && !keep_) fs::remove_all(root_, ignored);
+  // Last, and while it is held: who waits for it sees that it is gone.
+  if (lock_ >= 0 && kind_ == Kind::kShared) fs::remove(Sibling("lock"), ignored);
   if (lock_ >= 0) close(lock_);
 }
 
@@ -67,10 +98,19 @@ fs::path StagingFolder::Sibling(const std::string& suffix) const {
 }
 
 Expected<void> StagingFolder::Make() {
+  RemoveAbandoned();
   std::error_code code;
-  if (kind_ == Kind::kOwn) fs::remove_all(root_, code);
-  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(root_));
-  if (kind_ == Kind::kShared) TSDFPP_RETURN_IF_ERROR(Lock());
+  if (kind_ == Kind::kOwn) {
+    fs::remove_all(root_, code);
+    TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(root_));
+    // The lock is the folder's, by whatever name; without one its process is asked for.
+    lock_ = open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (lock_ >= 0) flock(lock_, LOCK_EX | LOCK_NB);
+  } else {
+    TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(out_.parent_path()));
+    TSDFPP_RETURN_IF_ERROR(Lock());
+    TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(root_));
+  }
   mine_ = true;
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(path_));
   // What a killed process was just writing (core/files.h).
@@ -82,14 +122,41 @@ Expected<void> StagingFolder::Make() {
   return {};
 }
 
+void StagingFolder::RemoveAbandoned() {
+  const std::string prefix = Sibling("").filename().string();
+  std::error_code code;
+  std::vector<fs::path> abandoned;
+  for (const auto& entry : fs::directory_iterator(out_.parent_path(), code)) {
+    const std::string name = entry.path().filename().string();
+    const auto making = ProcessOf(name, prefix, ".part");
+    // An earlier sequence that was moved aside goes only where another is in its place.
+    const auto replacing = fs::exists(out_, code) ? ProcessOf(name, prefix, ".old") : std::nullopt;
+    const auto process = making ? making : replacing;
+    if (process && IsAbandoned(entry.path(), *process)) abandoned.push_back(entry.path());
+  }
+  for (const fs::path& folder : abandoned) fs::remove_all(folder, code);
+}
+
 Expected<void> StagingFolder::Lock() {
-  lock_ = open((root_ / kLock).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  // A file beside the hidden folder, so that it stays where it is when folders are renamed.
+  const fs::path path = Sibling("lock");
   // The children of a process that was killed follow it in a moment.
-  constexpr int kTries = 40;
+  constexpr int kTries = 200;
   constexpr useconds_t kPause_us = 50000;
-  for (int i = 0; lock_ >= 0 && i < kTries; ++i) {
-    if (flock(lock_, LOCK_EX | LOCK_NB) == 0) return {};
-    usleep(kPause_us);
+  for (int i = 0; i < kTries; ++i) {
+    const int descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    const bool locked = descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+    const int fault = errno;
+    // Who held it before may have removed it after it was opened here.
+    if (locked && IsFileOf(path, descriptor)) {
+      lock_ = descriptor;
+      return {};
+    }
+    if (descriptor >= 0) close(descriptor);
+    if (!locked && fault != EWOULDBLOCK) {
+      return EnvironmentError("{}: cannot be locked ({})", path.string(), std::strerror(fault));
+    }
+    if (!locked) usleep(kPause_us);
   }
   return EnvironmentError("{}: another process is making this sequence", out_.string());
 }

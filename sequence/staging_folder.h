@@ -30,7 +30,9 @@ class StagingFolder {
   std::filesystem::path notes() const;
 
   // Makes the folder; a shared one may be there already, with what was in it but for half-written
-  // files. Errors: kEnvironment where the disk refuses or another process has it.
+  // files. Removes what killed processes left that were making the same set for themselves. What
+  // stands at `out` may have come while it waited: CheckReplaceable again.
+  // Errors: kEnvironment where the disk refuses or another process has it.
   Expected<void> Make();
   // Makes it empty, notes and all.
   Expected<void> Clear();
@@ -43,13 +45,15 @@ class StagingFolder {
 
  private:
   std::filesystem::path Sibling(const std::string& suffix) const;
+  // The folders of this name that processes left which were killed.
+  void RemoveAbandoned();
   Expected<void> Lock();
 
   std::filesystem::path out_;
   Kind kind_;
-  std::filesystem::path root_;  // what is hidden; of a shared one it holds lock, notes and set
+  std::filesystem::path root_;  // what is hidden; of a shared one it holds notes and set
   std::filesystem::path path_;
-  int lock_ = -1;      // descriptor of the locked file
+  int lock_ = -1;      // descriptor of a file beside root_ (kShared), or of root_ itself
   bool mine_ = false;  // made here, so ours to remove
   bool keep_ = false;
 };

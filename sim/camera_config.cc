@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "sim/camera_path.h"
+#include "sim/scene_readers.h"
 #include "sim/toml_writer.h"
 
 namespace tsdfpp {
@@ -76,7 +77,9 @@ void ReadRecorded(TomlReader& reader, const std::filesystem::path& folder, Recor
   if (IsAbove(path.position_W, path.target_W)) {
     reader.Fault("target", "is straight above or below the position");
   }
+  if (path.file.empty()) return;
   if (!folder.empty()) path.file = (folder / path.file).lexically_normal().string();
+  CheckFileIsThere(reader, "file", path.file);
 }
 
 Expected<HandJitter> ReadJitter(const toml::table& table, const TomlReader& camera) {

@@ -30,13 +30,20 @@ struct RawMaterial {
   std::filesystem::path picture;  // map_Kd; empty: none
 };
 
+// A file that a mesh refers to, whether it is there or not.
+struct Companion {
+  std::string name;            // as it stands in the file that names it
+  std::filesystem::path path;  // where that is
+};
+
 struct RawMesh {
   std::vector<Eigen::Vector3d> vertices;   // finite, in the file's unit
   std::vector<Colour> colours;             // per vertex, or empty
   std::vector<Eigen::Vector2d> texcoords;  // finite, v upwards
   std::vector<RawTriangle> triangles;      // indices are in range
   std::vector<RawMaterial> materials;
-  std::vector<std::string> remarks;  // sentences on what was left out
+  std::vector<Companion> companions;  // material libraries and their pictures
+  std::vector<std::string> remarks;   // sentences on what was left out
 };
 
 // A file of more triangles is refused while it is read.

@@ -217,6 +217,7 @@ void ObjReader::ReadLibrary(const std::string& name) {
   std::string plain = name;
   std::replace(plain.begin(), plain.end(), '\\', '/');
   const std::filesystem::path path = path_.parent_path() / plain;
+  mesh_.companions.push_back({plain, path});
   const auto bytes = ReadFile(path);
   if (!bytes) {
     mesh_.remarks.push_back(
@@ -254,6 +255,7 @@ void ObjReader::ReadLibrary(const std::string& name) {
           words[1].starts_with('-') ? std::string(words.back()) : RestOf(line, words[0]);
       std::replace(picture.begin(), picture.end(), '\\', '/');
       material->picture = path.parent_path() / picture;
+      mesh_.companions.push_back({picture, material->picture});
     }
   }
 }

@@ -26,7 +26,7 @@ void SetLook(mjSpec* spec, const Intrinsics& intrinsics) {
   spec->visual.map.zfar = static_cast<float>(kFar_m);
   spec->visual.global.offwidth = intrinsics.width;
   spec->visual.global.offheight = intrinsics.height;
-  spec->visual.quality.shadowsize = 1536;
+  spec->visual.quality.shadowsize = 1024;
   spec->visual.map.shadowscale = 1.0F;
 }
 

@@ -30,7 +30,12 @@ Expected<std::vector<SceneFile>> SceneFiles(const std::filesystem::path& folder)
   for (const auto& entry : std::filesystem::directory_iterator(folder, status)) {
     if (entry.path().extension() == ".toml") paths.push_back(entry.path());
   }
-  if (status) return UsageError("{}: {}", folder.string(), status.message());
+  if (status || paths.empty()) {
+    return UsageError("{}: {}, expected a folder with scenes", folder.string(),
+                      !std::filesystem::exists(folder, status)         ? "no such folder"
+                      : !std::filesystem::is_directory(folder, status) ? "is a file"
+                                                                       : "holds no .toml file");
+  }
   std::sort(paths.begin(), paths.end());
   std::vector<SceneFile> files;
   for (const std::filesystem::path& path : paths) {

@@ -151,7 +151,11 @@ void ReadModel(TomlReader& reader, const toml::table& table, const std::filesyst
   if (IsMeshFile(name)) {
     model.name = kMeshModel;
     model.file = (folder / name).lexically_normal();
-    if (!picture.empty()) model.picture = (folder / picture).lexically_normal();
+    CheckFileIsThere(reader, "model", model.file);
+    if (!picture.empty()) {
+      model.picture = (folder / picture).lexically_normal();
+      CheckFileIsThere(reader, "picture", model.picture);
+    }
   } else if (!name.empty() && FindModel(name) == nullptr) {
     std::vector<std::string> names;
     for (const ModelInfo& info : ModelCatalogue()) names.push_back(info.name);

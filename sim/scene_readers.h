@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <string_view>
 
 #include "core/toml_reader.h"
@@ -20,6 +21,9 @@ void CheckRange(TomlReader& reader, std::string_view key, T value, T low, T high
     reader.Fault(key, fmt::format("is {}, expected {} to {}", value, low, high));
   }
 }
+
+// A fault unless the file that the key names is there.
+void CheckFileIsThere(TomlReader& reader, std::string_view key, const std::filesystem::path& file);
 
 // Reads a whole number of 64 bits and no sign.
 void GetSeed(TomlReader& reader, const toml::table& table, std::string_view key,

@@ -53,11 +53,17 @@ SensorConfig MaskFaults(int times) {
   return config;
 }
 
-Expected<SensorConfig> OnePreset(std::string_view name) {
+Expected<SensorConfig> OnePreset(std::string_view name, std::string_view joined) {
   std::vector<std::string> names;
   for (const SensorPreset& preset : SensorPresets()) {
     if (preset.name == name) return preset.config;
     names.push_back(preset.name);
+  }
+  if (name.empty()) {
+    return UsageError(
+        "sensor preset '{}' leaves a name out, expected one name or several joined by "
+        "'+', e.g. kinect+masks_mild",
+        joined);
   }
   return UsageError(
       "sensor preset '{}' does not exist, expected one of, or several joined by '+': {}", name,
@@ -101,7 +107,7 @@ Expected<SensorConfig> SensorPresetNamed(std::string_view name) {
   std::size_t start = 0;
   while (start <= name.size()) {
     const std::size_t end = std::min(name.find('+', start), name.size());
-    TSDFPP_ASSIGN(const SensorConfig part, OnePreset(name.substr(start, end - start)));
+    TSDFPP_ASSIGN(const SensorConfig part, OnePreset(name.substr(start, end - start), name));
     if (!Join(part.depth, joined.depth) || !Join(part.colour, joined.colour) ||
         !Join(part.shutter, joined.shutter) || !Join(part.camera_pose, joined.camera_pose) ||
         !Join(part.masks, joined.masks)) {

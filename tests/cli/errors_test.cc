@@ -110,10 +110,44 @@ class CommandErrors : public testing::Test {
   std::string out_;
 };
 
+TEST_F(CommandErrors, MapFiles) {
+  const std::string file = folder_ / "tiny.map";
+  const std::string begun = folder_ / "begun";
+  ASSERT_EQ(
+      RunTsdfpp({"map", scene_, "--until", "2", "--save", file, "--out", begun}, folder_.path())
+          .exit_code,
+      0);
+  const std::vector<std::string> load = {"map", "--load", file, "--out", out_};
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = load;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  ExpectError(with({"--method", "tsdf"}), kUsage, {"--method", "--load"});
+  ExpectError(with({"--voxel", "0.02"}), kUsage, {"--voxel", "--load"});
+  ExpectError(with({"--until", "3"}), kUsage, {"--until 3", "sequence"});
+  ExpectError(with({scene_, "--until", "2"}), kUsage, {"--until 2", "goes to 2"});
+  ExpectError(with({scene_, "--until", "9"}), kUsage, {"--until 9", "up to 4"});
+  ExpectError(with({"--remove", "cup"}), kUsage, {"cup", "mug"});
+  ExpectError(with({"--save", folder_.path()}), kUsage, {"--save", "folder"});
+  ExpectError(with({"--save", file + "/a.map"}), kEnvironment, {file});
+  ExpectError({"map", "--load", folder_ / "none.map", "--out", out_}, kData, {"none.map"});
+  ExpectError({"map", "--load", scene_, "--out", out_}, kData, {"tiny.toml", "not a map file"});
+  const std::string other = folder_ / "other.toml";
+  std::string text = kTinyScene;
+  text.replace(text.find("tiny"), 4, "wide");
+  Write(other, text);
+  ExpectError(with({other}), kUsage, {"tiny", "wide"});
+  const std::string bytes = ReadFile(file).value();
+  Write(file, bytes.substr(0, bytes.size() / 2));
+  ExpectError(load, kData, {"tiny.map", "cut short"});
+}
+
 TEST_F(CommandErrors, Arguments) {
   ExpectError({}, kUsage, {"ubcommand"});
   ExpectError({"frobnicate"}, kUsage, {"frobnicate"});
-  ExpectError({"map"}, kUsage, {"SEQ"});
+  ExpectError({"map"}, kUsage, {"--out"});
+  ExpectError({"map", "--out", out_}, kUsage, {"SEQ", "--load"});
   ExpectError({"map", scene_}, kUsage, {"--out"});
   ExpectError({"map", scene_, "--out", out_, "--bogus"}, kUsage, {"--bogus"});
   ExpectError({"compare", scene_, "--out", out_, "--bogus", "1"}, kUsage, {"--bogus"});

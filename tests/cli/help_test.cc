@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/files.h"
+#include "core/gltf.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 
@@ -22,7 +25,7 @@ TEST(CommandHelp, EverySubcommandHasHelp) {
   const CommandOutput top = RunTsdfpp({"--help"}, folder.path());
   EXPECT_EQ(top.exit_code, 0);
   EXPECT_EQ(top.err, "");
-  for (const char* command : {"doctor", "generate", "map", "compare"}) {
+  for (const char* command : {"doctor", "generate", "map", "compare", "metric"}) {
     EXPECT_NE(top.out.find(command), std::string::npos) << command;
     const CommandOutput help = RunTsdfpp({command, "--help"}, folder.path());
     EXPECT_EQ(help.exit_code, 0) << command;
@@ -94,6 +97,71 @@ TEST(CommandJson, IsAllThatStdoutHolds) {
     }
   }
   EXPECT_FALSE(std::filesystem::exists((folder / "map") / "mesh" / "house-2.ply"));
+}
+
+// Every file of a folder but stats.json, whose times differ.
+std::map<std::string, std::string> FilesOf(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file() || entry.path().filename() == "stats.json") continue;
+    files[std::filesystem::relative(entry.path(), folder)] = ReadFile(entry.path()).value();
+  }
+  return files;
+}
+
+// Stopped, saved, loaded and gone on with, a run leaves what it leaves in one go; and a file alone
+// gives the meshes again.
+TEST(CommandMap, GoesOnFromAFileAsIfItHadNotStopped) {
+  const TempFolder folder;
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "map");
+    const CommandOutput output = RunTsdfpp(arguments, folder.path());
+    ASSERT_EQ(output.exit_code, 0) << output.err;
+  };
+  run({kMini, "--until", "4", "--save", folder / "whole.map", "--out", folder / "whole"});
+  run({kMini, "--until", "2", "--save", folder / "half.map", "--out", folder / "half"});
+  run({kMini, "--load", folder / "half.map", "--until", "4", "--save", folder / "both.map", "--out",
+       folder / "both"});
+  run({"--load", folder / "both.map", "--save", folder / "again.map", "--out", folder / "again"});
+  const auto whole = FilesOf(folder / "whole");
+  EXPECT_GE(whole.size(), 4U);
+  EXPECT_TRUE(FilesOf(folder / "both") == whole);
+  EXPECT_TRUE(FilesOf(folder / "again") == whole);
+  EXPECT_FALSE(FilesOf(folder / "half") == whole);
+  const std::string bytes = ReadFile(folder / "whole.map").value();
+  EXPECT_TRUE(ReadFile(folder / "both.map").value() == bytes);
+  EXPECT_TRUE(ReadFile(folder / "again.map").value() == bytes);
+}
+
+TEST(CommandMap, WritesGltfWithANodeAnObject) {
+  const TempFolder folder;
+  const std::vector<std::string> arguments{"map",           kMini, "--until", "2",
+                                           "--mesh-format", "glb", "--out",   folder / "map"};
+  const CommandOutput output = RunTsdfpp(arguments, folder.path());
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  const std::filesystem::path meshes = (folder / "map") / "mesh";
+  const auto scene = ReadGlb(meshes / "scene.glb");
+  ASSERT_TRUE(scene.has_value()) << scene.error().message;
+  ASSERT_EQ(scene->size(), 3U);
+  for (std::size_t i = 0; i < scene->size(); ++i) {
+    const NamedMesh& object = (*scene)[i];
+    EXPECT_EQ(object.id, i);
+    EXPECT_FALSE(object.mesh.triangles.empty());
+    const auto alone = ReadGlb(meshes / fmt::format("{}-{}.glb", object.name, object.id));
+    ASSERT_TRUE(alone.has_value()) << alone.error().message;
+    ASSERT_EQ(alone->size(), 1U);
+    EXPECT_EQ(alone->front().id, object.id);
+    EXPECT_GE(alone->front().mesh.triangles.size(), object.mesh.triangles.size());
+  }
+  EXPECT_FALSE(std::filesystem::exists(meshes / "scene.ply"));
+
+  std::vector<std::string> wrong = arguments;
+  wrong[5] = "stl";
+  wrong[7] = folder / "none";
+  const CommandOutput refused = RunTsdfpp(wrong, folder.path());
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.err, "tsdfpp: mesh format 'stl' is unknown, expected ply or glb\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "none"));
 }
 
 }  // namespace

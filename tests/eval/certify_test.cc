@@ -230,6 +230,19 @@ TEST_F(Certification, FindsDamageThatTheHashesDoNotShow) {
   EXPECT_TRUE(Named(Findings()).contains({"files", cofusion::kCameraTrajectory, 4}));
 }
 
+// A scene that cannot be composed again proves nothing.
+TEST_F(Certification, FindsADamagedScene) {
+  const std::string scene = Bytes(cofusion::kScene);
+  for (const std::string& damaged : {scene.substr(0, scene.size() / 2), std::string("no TOML"),
+                                     std::string(), "extra = 1\n" + scene}) {
+    Replace(cofusion::kScene, damaged);
+    const auto findings = Findings();
+    EXPECT_EQ(Named(findings), (Names{{"scene", cofusion::kScene, -1}}));
+    ASSERT_FALSE(findings.empty());
+    EXPECT_NE(findings[0].sentence.find("cannot be composed again"), std::string::npos);
+  }
+}
+
 TEST_F(Certification, TheRaysFindItToo) {
   cv::Mat mask = ReadMask(set_ / cofusion::MaskFile(1), {}).value();
   mask.setTo(0, mask == 1);

@@ -94,6 +94,13 @@ void SideBySide::Remove(InstanceId id) {
   Compare(fmt::format("the removal of {}", id));
 }
 
+void SideBySide::Rename(InstanceId from, InstanceId to) {
+  const auto renamed = map_->Rename(from, to);
+  EXPECT_TRUE(renamed.has_value()) << renamed.error().message;
+  dense_->Rename(from, to);
+  Compare(fmt::format("the renaming of {} to {}", from, to));
+}
+
 void SideBySide::CompareWholeBox() const {
   std::size_t different = 0;
   ForEachVoxel(box_, [&](const Eigen::Vector3i& v) {
@@ -115,6 +122,8 @@ void SideBySide::Compare(const std::string& event) {
     EXPECT_EQ(map_->ObjectLattice(id).matrix(), dense_->ObjectLattice(id).matrix()) << id;
   }
   EXPECT_TRUE(SameLists(*map_, *dense_));
+  const auto fault = map_->FindFault();
+  EXPECT_FALSE(fault.has_value()) << *fault;
 }
 
 }  // namespace tsdfpp

@@ -71,6 +71,7 @@ class SideBySide {
   void SetPosesAndFuse(const Frame& frame) { SetPosesAndFuse(frame, frame.mask); }
   void SetPosesAndFuse(const Frame& frame, const cv::Mat& labels);
   void Remove(InstanceId id);
+  void Rename(InstanceId from, InstanceId to);
   // Every voxel of the box, the unobserved and unlisted ones too.
   void CompareWholeBox() const;
 

@@ -131,8 +131,8 @@ TEST(MapConfigTest, TomlFaultsNameFileAndKey) {
 }
 
 TEST(MethodTest, NamesAreThereAndBack) {
-  const std::vector<std::string> names = {"tsdf", "tsdf/min", "tsdf++", "tsdf++/literal",
-                                          "tsdf++/anchored"};
+  const std::vector<std::string> names = {"tsdf",           "tsdf/min",        "tsdf++",
+                                          "tsdf++/literal", "tsdf++/anchored", "volumes"};
   ASSERT_EQ(AllMethods().size(), names.size());
   for (const std::string& name : names) {
     const auto method = MethodFromName(name);
@@ -159,9 +159,11 @@ TEST(MethodTest, LayersDependOnTheMethod) {
   EXPECT_EQ(LayersOf(Method::kTsdfpp, config), 2);
   EXPECT_EQ(LayersOf(Method::kTsdfppLiteral, config), 2);
   EXPECT_EQ(LayersOf(Method::kTsdfppAnchored, config), 4);
+  EXPECT_EQ(LayersOf(Method::kVolumes, config), 8);
   config.layers = 3;
   EXPECT_EQ(LayersOf(Method::kTsdfpp, config), 3);
   EXPECT_EQ(LayersOf(Method::kTsdfppAnchored, config), 3);
+  EXPECT_EQ(LayersOf(Method::kVolumes, config), 8);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/toy_scene.h"
+#include "tests/mapper/visible_triangles.h"
 
 namespace tsdfpp {
 namespace {
@@ -45,7 +46,7 @@ std::string MethodTestName(const ::testing::TestParamInfo<Method>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Methods, ObjectMeshTest,
                          ::testing::Values(Method::kTsdfpp, Method::kTsdfppAnchored,
-                                           Method::kTsdfppLiteral),
+                                           Method::kTsdfppLiteral, Method::kVolumes),
                          MethodTestName);
 INSTANTIATE_TEST_SUITE_P(Methods, EveryMesh, ::testing::ValuesIn(AllMethods()), MethodTestName);
 
@@ -136,56 +137,11 @@ TEST(SceneMeshTest, OfLiteralMixesTheActiveObjects) {
   EXPECT_EQ(CubesOf(mesh, kToyVoxel_m), CrossedCubesOfField(active, ToyBox()));
 }
 
-// The distance of an object at a global voxel, from the interface alone.
-double DistanceAtGlobal(const MapRepresentation& map, InstanceId id, const Eigen::Vector3i& v) {
-  const Eigen::Vector3d q = reference::SourcePoint(map.ObjectLattice(id).inverse(), v, kToyVoxel_m);
-  const reference::Neighbourhood place(q);
-  std::array<float, 8> distances{};
-  for (int i = 0; i < 8; ++i) {
-    if (place.Coefficient(i) == 0) continue;
-    const auto value = map.ValueAt(id, reference::CubeCorner(place.base, i));
-    if (value) distances[i] = value->distance_m;
-  }
-  return place.Interpolate(distances);
-}
-
-using Triangle = std::array<float, 10>;  // id, then three vertices
-
-Triangle AsTriangle(const TriangleMesh& mesh, std::size_t t, InstanceId id) {
-  Triangle triangle{static_cast<float>(id)};
-  for (int i = 0; i < 9; ++i) triangle[1 + i] = mesh.vertices[mesh.triangles[t][i / 3]][i % 3];
-  return triangle;
-}
-
-// docs/map.md, "Scene mesh of both", said again.
-std::multiset<Triangle> VisibleTriangles(const MapRepresentation& map) {
-  std::multiset<Triangle> visible;
-  for (const InstanceId id : map.Objects()) {
-    const TriangleMesh mesh = map.ObjectMesh(id);
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      const Eigen::Vector3d p =
-          CentroidOf(mesh, t) + 0.5 * kToyVoxel_m * NormalOf(mesh, t).normalized();
-      const Eigen::Vector3d nearest =
-          (p / kToyVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor();
-      const Eigen::Vector3i v = nearest.cast<int>();
-      const auto list = map.ListAt(v);
-      const bool hidden =
-          !list.empty() && list[0].id != id && DistanceAtGlobal(map, list[0].id, v) < -kToyVoxel_m;
-      if (!hidden) visible.insert(AsTriangle(mesh, t, id));
-    }
-  }
-  return visible;
-}
-
 TEST(SceneMeshTest, DropsWhatAnotherActiveObjectHides) {
   for (const Method method : {Method::kTsdfpp, Method::kTsdfppAnchored}) {
     SideBySide maps(method, ToyConfig(), ToyBox(), ToyIds());
     DriveToys(maps);
-    const TriangleMesh mesh = maps.map().SceneMesh();
-    std::multiset<Triangle> actual;
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      actual.insert(AsTriangle(mesh, t, mesh.face_ids[t]));
-    }
+    const std::multiset<Triangle> actual = TrianglesOf(maps.map().SceneMesh());
     std::size_t all = 0;
     for (const InstanceId id : ToyIds()) all += maps.map().ObjectMesh(id).triangles.size();
     EXPECT_LT(actual.size(), all) << "nothing is hidden";

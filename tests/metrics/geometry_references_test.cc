@@ -1,48 +1,23 @@
-// Against numbers that other programs made (shared/data/metric_refs/geometry/README): trimesh,
-// scipy, bop_toolkit.
+// Against numbers that other programs made (shared/data/metric_refs/geometry/README): trimesh.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "core/ply.h"
 #include "metrics/accuracy.h"
 #include "metrics/mesh_tools.h"
-#include "metrics/trajectory.h"
+#include "tests/metrics/reference_files.h"
 #include "tests/metrics/test_scenes.h"
 #include "tests/reference/brute_force_distance.h"
 
 namespace tsdfpp {
 namespace {
 
-const std::filesystem::path kData = std::filesystem::path(TSDFPP_SHARED_DIR) / "data";
-const std::filesystem::path kGeometry = kData / "metric_refs/geometry";
-
-TriangleMesh ReadObj(const std::filesystem::path& path) {
-  TriangleMesh mesh;
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    std::istringstream fields(line);
-    std::string kind;
-    fields >> kind;
-    if (kind == "v") {
-      Eigen::Vector3f p;
-      fields >> p.x() >> p.y() >> p.z();
-      mesh.vertices.push_back(p);
-    } else if (kind == "f") {
-      std::vector<std::uint32_t> corners;
-      for (std::string corner; fields >> corner;) {
-        corners.push_back(static_cast<std::uint32_t>(std::stoul(corner)) - 1);
-      }
-      for (std::size_t k = 2; k < corners.size(); ++k) {
-        mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
-      }
-    }
-  }
-  return mesh;
-}
+using testing::kData;
+using testing::ReadObj;
+const std::filesystem::path kGeometry = testing::kReferences / "geometry";
 
 TEST(GeometryReferences, AreasEqualTrimesh) {
   std::ifstream file(kGeometry / "mesh_properties.json");
@@ -92,37 +67,6 @@ TEST(GeometryReferences, AccuracyToTheSurfaceEqualsTrimesh) {
         expected["threshold_" + std::to_string(std::lround(1e3 * thresholds_m[k])) + "mm"];
     // One point in 3,846 may lie within rounding of a threshold.
     EXPECT_NEAR(*scores.precision[k].value, at["precision_to_mesh"], 1.0 / 3846 + 1e-9);
-  }
-}
-
-Pose PoseOf(const nlohmann::json& R, const nlohmann::json& t) {
-  Pose pose = Pose::Identity();
-  for (Eigen::Index r = 0; r < 3; ++r) {
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      pose.linear()(r, c) = R[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
-    }
-    pose.translation()[r] = t[static_cast<std::size_t>(r)];
-  }
-  return pose;
-}
-
-TEST(GeometryReferences, PoseErrorsEqualBopToolkit) {
-  std::ifstream file(kGeometry / "bop_pose_errors.json");
-  if (!file) GTEST_SKIP() << "no " << kGeometry;
-  const auto expected = nlohmann::json::parse(file);
-  const auto cloud = ReadPly(kGeometry / "mustard_model_points.ply");
-  ASSERT_TRUE(cloud) << cloud.error().message;
-  constexpr double kDouble = 1e-9;
-  constexpr double kFloat_m = 1e-7;  // ADD-S runs in single precision
-  for (const auto& pair : expected["cases"]) {
-    const Pose estimate = PoseOf(pair["R_est"], pair["t_est"]);
-    const Pose truth = PoseOf(pair["R_gt"], pair["t_gt"]);
-    EXPECT_NEAR(*AddError_m(cloud->vertices, estimate, truth).value, pair["add"], kDouble);
-    EXPECT_NEAR(*AddSymmetricError_m(cloud->vertices, estimate, truth).value, pair["adi"],
-                kFloat_m);
-    const PosePairs pairs = {{0}, {estimate}, {truth}};
-    EXPECT_NEAR(TranslationErrors_m(pairs)[0], pair["te"], kDouble);
-    EXPECT_NEAR(RotationErrors_rad(pairs)[0] * 180 / std::numbers::pi, pair["re_deg"], 1e-6);
   }
 }
 

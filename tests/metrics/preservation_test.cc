@@ -158,6 +158,45 @@ TEST_F(HiddenTable, KnownHole) {
   EXPECT_EQ(scores.preservation_outside.why_not, "no seen sample is outside the image now");
 }
 
+// The camera turns away from a table of which a plate hides the middle: each cause has its own set.
+TEST_F(HiddenTable, EachCauseHasItsOwnScores) {
+  LastSeenStore store(tracker_.samples_O().size());
+  store.Update(All(), visible_before_);
+  // Under the plate all is kept, but half of it under another label: so the label-aware score
+  // loses it.
+  const Selection all = All();
+  Selection kept = all;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    kept[i] = tracker_.samples_O().points[i].x() > 0 ? 1 : 0;
+  }
+  PreservationScores scores = ScorePreservation(tracker_, All(), kept, store, &all);
+  const HiddenScores& behind_other = scores.by_cause[0];
+  EXPECT_EQ(behind_other.area_cm2, scores.behind_other_area_cm2);
+  EXPECT_NEAR(*behind_other.preservation.value, 0.5, 0.02);
+  EXPECT_EQ(*behind_other.any_label.value, 1);
+  EXPECT_NEAR(*behind_other.lost_area_cm2.value, 1800, 0.5 * 0.5 * 0.67 * 240);
+  EXPECT_EQ(*behind_other.retention.value, *behind_other.preservation.value);
+  EXPECT_EQ(scores.by_cause[1].area_cm2, 0);
+  EXPECT_FALSE(scores.by_cause[1].lost_area_cm2.value);
+  EXPECT_EQ(scores.by_cause[2].any_label.why_not, "no seen sample is outside the image now");
+  EXPECT_FALSE(ScorePreservation(tracker_, All(), kept, store).by_cause[0].any_label.value);
+
+  // Looking the other way, all is outside; turned over, all is behind itself.
+  Frame away = testing::CastFrame([](double, double) { return testing::Hit{2, kTable}; });
+  away.T_WC = Pose(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()));
+  ASSERT_TRUE(tracker_.Observe(away, Pose::Identity()));
+  scores = ScorePreservation(tracker_, All(), kept, store, &all);
+  EXPECT_NEAR(scores.by_cause[2].area_cm2, 1e4, 1);
+  EXPECT_NEAR(*scores.by_cause[2].preservation.value, 0.5, kShare);
+  EXPECT_EQ(scores.by_cause[0].area_cm2, 0);
+  EXPECT_FALSE(scores.hole_area_cm2.value);
+  away.T_WC = Pose(Eigen::Translation3d(0, 0, 4)) * away.T_WC;
+  ASSERT_TRUE(tracker_.Observe(away, Pose::Identity()));
+  scores = ScorePreservation(tracker_, All(), kept, store, &all);
+  EXPECT_NEAR(scores.by_cause[1].area_cm2, 1e4, 1);
+  EXPECT_NEAR(*scores.preservation_behind_itself.value, 0.5, kShare);
+}
+
 // What was never mapped is not forgotten: the same hole before and after is a retention of 1.
 TEST_F(HiddenTable, RetentionIsolatesForgetting) {
   LastSeenStore store(tracker_.samples_O().size());

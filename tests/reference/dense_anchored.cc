@@ -1,5 +1,5 @@
-// docs/map.md, "`tsdf++/anchored`": volumes that stay in their objects' lattices, and an index that
-// is a pure function of volumes and poses.
+// docs/map.md, "`tsdf++/anchored`" (and "`volumes`", whose lists are asked of the volumes): volumes
+// that stay in their objects' lattices, and an index that is a pure function of volumes and poses.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -13,10 +13,8 @@ namespace {
 
 class DenseAnchored : public DenseMap {
  public:
-  DenseAnchored(const MapConfig& config, const Box& box)
-      : config_(config),
-        layers_(static_cast<std::size_t>(LayersOf(Method::kTsdfppAnchored, config))),
-        box_(box) {}
+  DenseAnchored(const MapConfig& config, const Box& box, int layers)
+      : config_(config), layers_(static_cast<std::size_t>(layers)), box_(box) {}
 
   void SetObjectPose(InstanceId id, const Pose& T_WO) override {
     poses_.Update(id, T_WO);
@@ -40,12 +38,22 @@ class DenseAnchored : public DenseMap {
     index_.reset();
     for (auto& [id, volume] : volumes_) {
       FuseObject(id, View(frame, labels, ObjectLattice(id), config_), config_, volume, nullptr);
+      volume.FreeEmptyBlocks();
     }
   }
 
   void Remove(InstanceId id) override {
     volumes_.erase(id);
     poses_.Forget(id);
+    index_.reset();
+  }
+
+  void Rename(InstanceId from, InstanceId to) override {
+    if (const auto found = volumes_.find(from); found != volumes_.end()) {
+      volumes_.insert_or_assign(to, found->second);
+      volumes_.erase(from);
+    }
+    poses_.Rename(from, to);
     index_.reset();
   }
 
@@ -109,8 +117,8 @@ class DenseAnchored : public DenseMap {
 
 }  // namespace
 
-std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box) {
-  return std::make_unique<DenseAnchored>(config, box);
+std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box, int layers) {
+  return std::make_unique<DenseAnchored>(config, box, layers);
 }
 
 }  // namespace tsdfpp::reference

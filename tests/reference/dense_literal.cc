@@ -38,6 +38,7 @@ class DenseLiteral : public DenseMap {
       pair.active = Listing{id, config_.moved_confidence};
       list_blocks_.AddBlockOf(v);
     }
+    FreeEmptyListBlocks();
   }
 
   void Fuse(const Frame& frame, const cv::Mat& labels) override {
@@ -54,12 +55,27 @@ class DenseLiteral : public DenseMap {
         FuseClamped(*seen, v);
       }
     });
+    FreeEmptyListBlocks();
   }
 
   void Remove(InstanceId id) override {
     TakeOffEverywhere(id);
     volumes_.erase(id);
     poses_.Forget(id);
+    FreeEmptyListBlocks();
+  }
+
+  void Rename(InstanceId from, InstanceId to) override {
+    if (const auto found = volumes_.find(from); found != volumes_.end()) {
+      volumes_.insert_or_assign(to, found->second);
+      volumes_.erase(from);
+    }
+    poses_.Rename(from, to);
+    ForEachVoxel(box_, [&](const Eigen::Vector3i& v) {
+      for (auto* listing : {&pairs_.At(v).active, &pairs_.At(v).inactive}) {
+        if (*listing && (*listing)->id == from) (*listing)->id = to;
+      }
+    });
   }
 
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {
@@ -96,6 +112,12 @@ class DenseLiteral : public DenseMap {
   }
 
  private:
+  // docs/map.md, "Freeing". The volumes have no empty blocks: what makes one writes to it.
+  void FreeEmptyListBlocks() {
+    list_blocks_.FreeUnless(
+        [this](const Eigen::Vector3i& v) { return pairs_(v).active.has_value(); });
+  }
+
   void TakeOffEverywhere(InstanceId id) {
     ForEachVoxel(box_, [&](const Eigen::Vector3i& v) { pairs_.At(v).Erase(id); });
   }

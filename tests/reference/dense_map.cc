@@ -35,7 +35,8 @@ std::unique_ptr<DenseMap> MakeDenseMap(Method method, const MapConfig& config, c
     case Method::kTsdfppLiteral:
       return MakeDenseLiteral(config, box);
     case Method::kTsdfppAnchored:
-      return MakeDenseAnchored(config, box);
+    case Method::kVolumes:
+      return MakeDenseAnchored(config, box, LayersOf(method, config));
   }
   return nullptr;
 }

@@ -29,6 +29,12 @@ class PoseBook {
   // T_WO(new) * T_WO(old)^-1; nothing for a first pose or one whose numbers are the old one's.
   std::optional<Pose> Update(InstanceId id, const Pose& T_WO);
   void Forget(InstanceId id) { poses_.erase(id); }
+  void Rename(InstanceId from, InstanceId to) {
+    if (const auto found = poses_.find(from); found != poses_.end()) {
+      poses_.insert_or_assign(to, found->second);
+      poses_.erase(from);
+    }
+  }
   // T_WO(now) * T_WO(birth)^-1, exactly the identity where the numbers are equal.
   Pose Lattice(InstanceId id) const;
 
@@ -47,6 +53,8 @@ class DenseMap {
   virtual void SetObjectPose(InstanceId id, const Pose& T_WO) = 0;
   virtual void Fuse(const Frame& frame, const cv::Mat& labels) = 0;
   virtual void Remove(InstanceId id) = 0;
+  // `from` is in the map, `to` is not.
+  virtual void Rename(InstanceId from, InstanceId to) = 0;
   virtual Pose ObjectLattice(InstanceId) const { return Pose::Identity(); }
   virtual std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const = 0;
   virtual std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const = 0;
@@ -64,7 +72,7 @@ std::unique_ptr<DenseMap> MakeDenseMap(Method method, const MapConfig& config, c
 std::unique_ptr<DenseMap> MakeDenseTsdf(const MapConfig& config, const Box& box, bool keep_minimum);
 std::unique_ptr<DenseMap> MakeDenseTsdfpp(const MapConfig& config, const Box& box);
 std::unique_ptr<DenseMap> MakeDenseLiteral(const MapConfig& config, const Box& box);
-std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box);
+std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box, int layers);
 
 // A voxel as the interface gives it.
 std::optional<VoxelValue> AsValue(const DenseVoxel& voxel);

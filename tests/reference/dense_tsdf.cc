@@ -20,6 +20,7 @@ class DenseTsdf : public DenseMap {
 
   void SetObjectPose(InstanceId id, const Pose& T_WO) override {
     if (const auto T_rel = poses_.Update(id, T_WO)) Move(id, *T_rel);
+    field_.FreeEmptyBlocks();
   }
 
   void Fuse(const Frame& frame, const cv::Mat& labels) override {
@@ -33,11 +34,20 @@ class DenseTsdf : public DenseMap {
       FuseSeen(*seen, config_, field_.grid.At(v), true);
       if (InBand(seen->s, config_)) Vote(seen->label, owners_.At(v));
     });
+    field_.FreeEmptyBlocks();
   }
 
   void Remove(InstanceId id) override {
     for (const Eigen::Vector3i& v : ObjectVoxels(id)) Vacate(v);
     poses_.Forget(id);
+    field_.FreeEmptyBlocks();
+  }
+
+  void Rename(InstanceId from, InstanceId to) override {
+    ForEachVoxel(field_.grid.box(), [&](const Eigen::Vector3i& v) {
+      if (owners_(v).label == from) owners_.At(v).label = to;
+    });
+    poses_.Rename(from, to);
   }
 
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {

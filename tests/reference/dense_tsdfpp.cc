@@ -66,6 +66,7 @@ class DenseTsdfpp : public DenseMap {
         DropOverflow(list);
       }
     });
+    for (auto& [id, volume] : volumes_) volume.FreeEmptyBlocks();
   }
 
   void Remove(InstanceId id) override {
@@ -82,6 +83,19 @@ class DenseTsdfpp : public DenseMap {
         DropOverflow(list);
       }
     }
+  }
+
+  void Rename(InstanceId from, InstanceId to) override {
+    if (const auto found = volumes_.find(from); found != volumes_.end()) {
+      volumes_.insert_or_assign(to, found->second);
+      volumes_.erase(from);
+    }
+    poses_.Rename(from, to);
+    ForEachVoxel(box_, [&](const Eigen::Vector3i& v) {
+      for (Listing& listing : lists_.At(v)) {
+        if (listing.id == from) listing.id = to;
+      }
+    });
   }
 
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& v) const override {

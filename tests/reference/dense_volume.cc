@@ -21,6 +21,16 @@ void BlockSet::AddBlockOf(const Eigen::Vector3i& voxel) {
   blocks_.insert({b.z(), b.y(), b.x()});
 }
 
+void BlockSet::FreeUnless(const std::function<bool(const Eigen::Vector3i&)>& held) {
+  std::erase_if(blocks_, [&](const std::array<int, 3>& zyx) {
+    const Eigen::Vector3i low = 8 * Eigen::Vector3i(zyx[2], zyx[1], zyx[0]);
+    bool any = false;
+    ForEachVoxel(Box{low, low + Eigen::Vector3i::Constant(7)},
+                 [&](const Eigen::Vector3i& v) { any = any || held(v); });
+    return !any;
+  });
+}
+
 void Allocate(const Frame& frame, const cv::Mat& labels, const Pose& T_WL, const MapConfig& config,
               const std::function<bool(InstanceId)>& wanted, BlockSet& blocks) {
   const double h = config.voxel_m;

@@ -20,6 +20,8 @@ class BlockSet {
   bool HasBlockOf(const Eigen::Vector3i& voxel) const;
   void AddBlockOf(const Eigen::Vector3i& voxel);
   void Clear() { blocks_.clear(); }
+  // Frees the blocks none of whose voxels are `held`.
+  void FreeUnless(const std::function<bool(const Eigen::Vector3i&)>& held);
   std::size_t size() const { return blocks_.size(); }
 
   template <typename Function>
@@ -40,6 +42,11 @@ void Allocate(const Frame& frame, const cv::Mat& labels, const Pose& T_WL, const
 
 struct DenseVolume {
   explicit DenseVolume(const Box& box) : grid(box) {}
+
+  // docs/map.md, "Freeing".
+  void FreeEmptyBlocks() {
+    blocks.FreeUnless([this](const Eigen::Vector3i& v) { return grid(v).observed(); });
+  }
 
   DenseGrid<DenseVoxel> grid;
   BlockSet blocks;

@@ -222,7 +222,7 @@ TEST(CofusionWriter, ReplacesOnlyItsOwnAndOnlyWhenAsked) {
   EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
   EXPECT_EQ(refused.error().message,
             (folder / "set").string() +
-                ": already holds a sequence, expected a new folder or leave to overwrite it");
+                ": the folder already holds a sequence, expected a new or an empty folder");
 
   source.info_.frame_count = 2;
   ASSERT_TRUE(write(folder / "set", true).has_value());

@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "core/files.h"
+#include "tests/core/temp_folder.h"
 #include "tests/sim/scene_files.h"
 
 namespace tsdfpp {
@@ -264,12 +266,14 @@ TEST(SceneConfig, ScenesSurviveTheirTrip) {
 
 // A mesh file is named relative to the scene's own folder.
 TEST(SceneConfig, MeshFilesStartAtTheScenesFolder) {
+  const test::TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "meshes/cow.obj", "").has_value());
   const auto config = ParseSceneConfig(
       With("model = \"mug\"", "model = \"../meshes/cow.obj\"\nscale = 0.06\nup = \"y\""), "s.toml",
-      "/somewhere/scenes");
+      folder / "scenes");
   ASSERT_TRUE(config.has_value()) << config.error().message;
   EXPECT_EQ(config->objects[1].model.name, kMeshModel);
-  EXPECT_EQ(config->objects[1].model.file, "/somewhere/meshes/cow.obj");
+  EXPECT_EQ(config->objects[1].model.file, folder / "meshes/cow.obj");
   EXPECT_EQ(config->objects[1].model.up, "y");
 }
 

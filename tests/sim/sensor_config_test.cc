@@ -175,9 +175,8 @@ TEST(SensorConfig, PresetsJoin) {
 }
 
 TEST(SensorConfig, UnknownPreset) {
-  for (const auto& [name, unknown] :
-       {std::pair{"xbox", "xbox"}, std::pair{"kinect+xbox", "xbox"}, std::pair{"kinect+", ""},
-        std::pair{"", ""}, std::pair{"kinect,d435", "kinect,d435"}}) {
+  for (const auto& [name, unknown] : {std::pair{"xbox", "xbox"}, std::pair{"kinect+xbox", "xbox"},
+                                      std::pair{"kinect,d435", "kinect,d435"}}) {
     const auto config = SensorPresetNamed(name);
     ASSERT_FALSE(config.has_value()) << name;
     EXPECT_EQ(config.error().kind, ErrorKind::kUsage);
@@ -185,6 +184,14 @@ TEST(SensorConfig, UnknownPreset) {
         "sensor preset '{}' does not exist, expected one of, or several joined by '+': exact, ",
         unknown);
     EXPECT_EQ(config.error().message.substr(0, start.size()), start);
+  }
+  for (const std::string name : {"", "+", "kinect+", "+kinect", "kinect++pose_drift"}) {
+    const auto config = SensorPresetNamed(name);
+    ASSERT_FALSE(config.has_value()) << name;
+    EXPECT_EQ(config.error().message,
+              "sensor preset '" + name +
+                  "' leaves a name out, expected one name or several joined by '+', e.g. "
+                  "kinect+masks_mild");
   }
 }
 

@@ -1,0 +1,211 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <numbers>
+#include <optional>
+
+#include "cli/metric.h"
+#include "eval/evaluation.h"
+#include "metrics/association.h"
+#include "metrics/object_pose.h"
+#include "metrics/trajectory_report.h"
+#include "sequence/timed_poses.h"
+
+namespace tsdfpp {
+namespace {
+
+struct Options {
+  std::string model;
+  std::string truth;
+  std::string estimate;
+  std::string camera;
+  std::string symmetries;
+  bool anchor = false;
+  double scale = 1;
+  double greatest_m = kGreatestAucError_m;
+  double max_difference_s = kMaxStampDifference_s;
+  std::size_t most_points = 2000;
+};
+
+// "z:180".
+Expected<Pose> SymmetryFromText(const std::string& word) {
+  const std::string axes = "xyz";
+  const std::size_t axis = word.empty() ? std::string::npos : axes.find(word.front());
+  double degrees = 0;
+  const char* const end = word.data() + word.size();
+  const bool shaped = axis != std::string::npos && word.size() > 2 && word[1] == ':';
+  if (shaped) {
+    const auto [at, status] = std::from_chars(word.data() + 2, end, degrees);
+    if (status == std::errc() && at == end && std::isfinite(degrees)) {
+      return Pose(Eigen::AngleAxisd(degrees * std::numbers::pi / 180,
+                                    Eigen::Vector3d::Unit(static_cast<Eigen::Index>(axis))));
+    }
+  }
+  return UsageError("--symmetry '{}': expected an axis of the model and degrees, e.g. z:180", word);
+}
+
+Expected<Intrinsics> CameraFromText(const std::string& text) {
+  std::vector<double> numbers;
+  for (const std::string& word : SplitList(text)) {
+    double number = 0;
+    const auto [end, status] = std::from_chars(word.data(), word.data() + word.size(), number);
+    if (status == std::errc() && end == word.data() + word.size()) numbers.push_back(number);
+  }
+  if (numbers.size() != 4 || SplitList(text).size() != 4 || !(numbers[0] > 0 && numbers[1] > 0)) {
+    return UsageError("--camera '{}': expected fx,fy,cx,cy in pixels", text);
+  }
+  return Intrinsics{0, 0, numbers[0], numbers[1], numbers[2], numbers[3]};
+}
+
+// At most this many of the points, evenly along their order; 0 for all.
+std::vector<Eigen::Vector3f> Thinned(const std::vector<Eigen::Vector3f>& points, std::size_t most) {
+  if (most == 0 || points.size() <= most) return points;
+  std::vector<Eigen::Vector3f> kept;
+  for (std::size_t i = 0; i < most; ++i) kept.push_back(points[i * points.size() / most]);
+  return kept;
+}
+
+// One measure over all true poses; the ones without an estimate are undefined.
+struct Series {
+  const char* name;
+  const char* unit;
+  double in_unit;  // what the number is multiplied with for the text
+  std::vector<Measured> errors;
+};
+
+Measured MeanOfDefined(const std::vector<Measured>& errors) {
+  double sum = 0;
+  int count = 0;
+  for (const Measured& error : errors) {
+    if (!error.value) continue;
+    sum += *error.value;
+    ++count;
+  }
+  return count == 0 ? Measured::Undefined("defined at no pose") : Measured::Of(sum / count);
+}
+
+Measured LargestOfDefined(const std::vector<Measured>& errors) {
+  std::optional<double> largest;
+  for (const Measured& error : errors) {
+    if (error.value) largest = std::max(largest.value_or(0), *error.value);
+  }
+  return largest ? Measured::Of(*largest) : Measured::Undefined("defined at no pose");
+}
+
+Expected<CommandResult> RunPose(const Options& options) {
+  std::optional<Intrinsics> camera;
+  if (!options.camera.empty()) {
+    TSDFPP_ASSIGN(camera, CameraFromText(options.camera));
+  }
+  std::vector<Pose> symmetries;
+  for (const std::string& word : SplitList(options.symmetries)) {
+    TSDFPP_ASSIGN(const Pose symmetry, SymmetryFromText(word));
+    symmetries.push_back(symmetry);
+  }
+  TSDFPP_ASSIGN(const TriangleMesh model, ReadSurfaceFile(options.model, options.scale));
+  if (model.vertices.empty()) return DataError("{}: holds no vertices", options.model);
+  const std::vector<Eigen::Vector3f> points = Thinned(model.vertices, options.most_points);
+  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth));
+  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate));
+
+  std::vector<Series> series = {{"ADD", "mm", 1e3, {}},         {"ADD-S", "mm", 1e3, {}},
+                                {"MSSD", "mm", 1e3, {}},        {"MSPD", "px", 1, {}},
+                                {"translation", "mm", 1e3, {}}, {"rotation", "deg", 1, {}}};
+  nlohmann::json frames = nlohmann::json::array();
+  std::size_t found = 0;
+  Pose C = Pose::Identity();  // from the true object frame to the estimate's
+  for (const auto& [stamp_s, T_true] : truth) {
+    const auto nearest = NearestInTime(estimate, stamp_s);
+    if (std::abs(nearest->first - stamp_s) > options.max_difference_s) {
+      for (Series& one : series) one.errors.push_back(Measured::Undefined("no estimate"));
+      continue;
+    }
+    if (options.anchor && found == 0) C = nearest->second.inverse() * T_true;
+    ++found;
+    const Pose T_estimate = nearest->second * C;
+    const PosePairs pair = {{0}, {T_estimate}, {T_true}};
+    const std::array<Measured, 6> errors = {
+        AddError_m(points, T_estimate, T_true),
+        AddSymmetricError_m(points, T_estimate, T_true),
+        Mssd_m(points, T_estimate, T_true, symmetries),
+        camera ? Mspd_px(points, T_estimate, T_true, *camera, symmetries)
+               : Measured::Undefined("MSPD needs --camera"),
+        Measured::Of(TranslationErrors_m(pair)[0]),
+        Measured::Of(RotationErrors_rad(pair)[0] * 180 / std::numbers::pi)};
+    for (std::size_t k = 0; k < series.size(); ++k) series[k].errors.push_back(errors[k]);
+    frames.push_back({{"t", stamp_s},
+                      {"add_m", ToJson(errors[0])},
+                      {"add_s_m", ToJson(errors[1])},
+                      {"mssd_m", ToJson(errors[2])},
+                      {"mspd_px", ToJson(errors[3])},
+                      {"translation_m", ToJson(errors[4])},
+                      {"rotation_deg", ToJson(errors[5])}});
+  }
+  if (found == 0) {
+    return DataError("{}: none of its {} poses is within {} s of one of {}", options.estimate,
+                     estimate.size(), options.max_difference_s, options.truth);
+  }
+  const Measured auc_add = AreaUnderCurve(series[0].errors, options.greatest_m);
+  const Measured auc_add_s = AreaUnderCurve(series[1].errors, options.greatest_m);
+  nlohmann::json json = {{"model", options.model},
+                         {"points", points.size()},
+                         {"model_points", model.vertices.size()},
+                         {"reference_poses", truth.size()},
+                         {"found", found},
+                         {"anchored", options.anchor},
+                         {"auc_limit_m", options.greatest_m},
+                         {"auc_add", ToJson(auc_add)},
+                         {"auc_add_s", ToJson(auc_add_s)},
+                         {"frames", frames}};
+  std::string text =
+      fmt::format("{} of {} true poses have an estimate; {} of the model's {} points\n", found,
+                  truth.size(), points.size(), model.vertices.size());
+  text += fmt::format("{:<12} {:>12} {:>12}\n", "", "mean", "max");
+  for (const Series& one : series) {
+    const Measured mean = MeanOfDefined(one.errors);
+    const Measured largest = LargestOfDefined(one.errors);
+    const std::string key = fmt::format("{}_{}", one.name, one.in_unit == 1 ? one.unit : "m");
+    json["mean"][key] = ToJson(mean);
+    json["max"][key] = ToJson(largest);
+    text += mean.value
+                ? fmt::format("{:<12} {:>12.4f} {:>12.4f} {}\n", one.name,
+                              one.in_unit * *mean.value, one.in_unit * *largest.value, one.unit)
+                : fmt::format("{:<12} undefined: {}\n", one.name,
+                              camera ? mean.why_not : "MSPD needs --camera");
+  }
+  text += fmt::format("AUC to {} m: ADD {}, ADD-S {}\n", options.greatest_m, ShareText(auc_add),
+                      ShareText(auc_add_s));
+  return CommandResult{json, text};
+}
+
+}  // namespace
+
+Run AddMetricPose(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("MODEL", options->model, "The object's mesh or points: .ply, .obj, .stl")
+      ->required();
+  app.add_option("REF", options->truth, "True poses: lines t tx ty tz qx qy qz qw")->required();
+  app.add_option("EST", options->estimate, "Estimated poses, the same")->required();
+  app.add_option("--scale", options->scale, "Metres a unit of MODEL, 0.001 for millimetres")
+      ->check(AboveZero())
+      ->capture_default_str();
+  app.add_option("--max-diff", options->max_difference_s,
+                 "Most seconds between a true pose and its estimate")
+      ->check(NotNegative())
+      ->capture_default_str();
+  app.add_flag("--anchor", options->anchor,
+               "The estimate's object frame is of its own choice: fit it at the first pose");
+  app.add_option("--auc", options->greatest_m, "Upper end of the area under the curve, metres")
+      ->check(AboveZero())
+      ->capture_default_str();
+  app.add_option("--points", options->most_points, "Most points of the model; 0 for all")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--symmetry", options->symmetries,
+                 "Turns of the model that change nothing, for MSSD and MSPD: AXIS:DEGREES,...");
+  app.add_option("--camera", options->camera,
+                 "For MSPD: fx,fy,cx,cy in pixels; the poses are then the camera's");
+  return [options] { return RunPose(*options); };
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,19 @@
+# Installs core and mapper, which need neither MuJoCo nor Open3D, for find_package(tsdfpp).
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(_tsdfpp_package ${CMAKE_INSTALL_LIBDIR}/cmake/tsdfpp)
+foreach(room core mapper)
+  set_target_properties(tsdfpp_${room} PROPERTIES EXPORT_NAME ${room})
+  target_compile_features(tsdfpp_${room} PUBLIC cxx_std_20)
+  # Headers include each other as "core/types.h", whatever folder holds the rooms.
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${room} DESTINATION include/tsdfpp
+          FILES_MATCHING PATTERN "*.h")
+endforeach()
+install(TARGETS tsdfpp_core tsdfpp_mapper EXPORT tsdfppTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT tsdfppTargets NAMESPACE tsdfpp:: DESTINATION ${_tsdfpp_package})
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tsdfppConfig.cmake.in
+                              ${PROJECT_BINARY_DIR}/tsdfppConfig.cmake INSTALL_DESTINATION ${_tsdfpp_package})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/tsdfppConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/tsdfppConfig.cmake ${PROJECT_BINARY_DIR}/tsdfppConfigVersion.cmake
+        DESTINATION ${_tsdfpp_package})

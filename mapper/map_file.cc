@@ -1,0 +1,161 @@
+#include "mapper/map_file.h"
+
+#include "core/files.h"
+#include "mapper/section_file.h"
+#include "mapper/volume_store.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr const char* kConfigSection = "CONF";
+constexpr const char* kRunSection = "RUN ";
+
+void PutText(std::string_view text, std::string& bytes) {
+  PutBytes(static_cast<std::uint32_t>(text.size()), bytes);
+  bytes += text;
+}
+
+std::string GetText(ByteReader& bytes) {
+  const auto size = bytes.Get<std::uint32_t>();
+  return std::string(bytes.Take(size));
+}
+
+std::string RunToBytes(const MappedRun& run) {
+  std::string bytes;
+  PutText(run.sequence, bytes);
+  PutText(run.poses, bytes);
+  PutBytes(static_cast<std::int32_t>(run.last_frame), bytes);
+  PutBytes(static_cast<std::uint32_t>(run.objects.size()), bytes);
+  for (const ObjectInfo& object : run.objects) {
+    PutBytes(object.id, bytes);
+    PutText(object.name, bytes);
+    PutText(object.semantic_class, bytes);
+  }
+  PutBytes(static_cast<std::uint32_t>(run.trajectories.size()), bytes);
+  for (const auto& [id, poses] : run.trajectories) {
+    PutBytes(id, bytes);
+    PutBytes(static_cast<std::uint32_t>(poses.size()), bytes);
+    for (const auto& [frame, T_WO] : poses) {
+      PutBytes(static_cast<std::int32_t>(frame), bytes);
+      SavePose(T_WO, bytes);
+    }
+  }
+  return bytes;
+}
+
+Expected<MappedRun> RunFromBytes(std::string_view all) {
+  ByteReader bytes(all);
+  MappedRun run;
+  run.sequence = GetText(bytes);
+  run.poses = GetText(bytes);
+  run.last_frame = bytes.Get<std::int32_t>();
+  const auto objects = bytes.Get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < objects && bytes.ok(); ++i) {
+    ObjectInfo object;
+    object.id = bytes.Get<InstanceId>();
+    object.name = GetText(bytes);
+    object.semantic_class = GetText(bytes);
+    run.objects.push_back(std::move(object));
+  }
+  const auto trajectories = bytes.Get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < trajectories && bytes.ok(); ++i) {
+    auto& poses = run.trajectories[bytes.Get<InstanceId>()];
+    const auto count = bytes.Get<std::uint32_t>();
+    for (std::uint32_t k = 0; k < count && bytes.ok(); ++k) {
+      const auto frame = bytes.Get<std::int32_t>();
+      TSDFPP_ASSIGN(poses[frame], LoadPose(bytes));
+    }
+  }
+  if (!bytes.AtEnd()) return DataError("it has another length than it says");
+  return run;
+}
+
+// The error of a part, whose message is a fragment, as one sentence.
+Error InSection(const std::string& where, std::string_view section, const Error& error) {
+  return {ErrorKind::kData,
+          fmt::format("{}: section '{}' is wrong: {}", where, section, error.message)};
+}
+
+std::string NamesOf(const Sections& sections) {
+  std::string names;
+  for (const auto& [name, bytes] : sections) names += (names.empty() ? "" : " ") + name;
+  return names;
+}
+
+struct Settings {
+  Method method = Method::kTsdfpp;
+  MapConfig config;
+};
+
+std::string SettingsToText(Method method, const MapConfig& config) {
+  toml::table table = config.ToToml();
+  table.insert("method", MethodName(method));
+  std::ostringstream text;
+  text << table << '\n';
+  return text.str();
+}
+
+Expected<Settings> SettingsFromText(const std::string& text) {
+  Settings settings;
+  TSDFPP_ASSIGN(toml::table table, ParseToml(text, "settings"));
+  const auto method = table["method"].value<std::string>();
+  if (!method) return DataError("no method is named");
+  TSDFPP_ASSIGN(settings.method, MethodFromName(*method));
+  table.erase("method");
+  TSDFPP_ASSIGN(settings.config, MapConfig::FromToml(table, "settings"));
+  return settings;
+}
+
+}  // namespace
+
+std::string MapToBytes(const MapRepresentation& map, const MappedRun* run) {
+  Sections sections;
+  sections[kConfigSection] = SettingsToText(map.method(), map.config());
+  if (run != nullptr) sections[kRunSection] = RunToBytes(*run);
+  map.Save(sections);
+  return PackSections(sections);
+}
+
+Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& where) {
+  TSDFPP_ASSIGN(Sections sections, UnpackSections(bytes, where));
+  const auto take = [&](const char* name) {
+    const auto section = sections.find(name);
+    if (section == sections.end()) return std::optional<std::string>();
+    std::optional<std::string> content(std::move(section->second));
+    sections.erase(section);
+    return content;
+  };
+  LoadedMap loaded;
+  const auto settings_text = take(kConfigSection);
+  if (!settings_text) return DataError("{}: has no section '{}'", where, kConfigSection);
+  const auto settings = SettingsFromText(*settings_text);
+  if (!settings) return tl::unexpected(InSection(where, kConfigSection, settings.error()));
+  if (const auto run_bytes = take(kRunSection)) {
+    auto run = RunFromBytes(*run_bytes);
+    if (!run) return tl::unexpected(InSection(where, kRunSection, run.error()));
+    loaded.run = std::move(*run);
+  }
+  loaded.map = MakeMap(settings->method, settings->config);
+  Sections expected;
+  loaded.map->Save(expected);
+  if (NamesOf(sections) != NamesOf(expected)) {
+    return DataError("{}: has sections '{}', expected '{}' for a map of method {}", where,
+                     NamesOf(sections), NamesOf(expected), MethodName(settings->method));
+  }
+  if (auto status = loaded.map->Load(sections); !status) {
+    return DataError("{}: its map is wrong: {}", where, status.error().message);
+  }
+  return loaded;
+}
+
+Expected<void> SaveMap(const std::filesystem::path& path, const MapRepresentation& map,
+                       const MappedRun* run) {
+  return WriteFile(path, MapToBytes(map, run));
+}
+
+Expected<LoadedMap> LoadMap(const std::filesystem::path& path) {
+  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
+  return MapFromBytes(bytes, path.string());
+}
+
+}  // namespace tsdfpp

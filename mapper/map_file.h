@@ -1,0 +1,46 @@
+// A whole map in one file (docs/map.md, "The map file").
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "mapper/map_representation.h"
+
+namespace tsdfpp {
+
+// What a run of the pipeline knows beside its map: needed to continue it, and to name the objects.
+struct MappedRun {
+  std::string sequence;             // its name
+  std::vector<ObjectInfo> objects;  // of the sequence
+  std::string poses;                // where they came from: PoseSourceName
+  int last_frame = 0;               // the file number of the last frame in the map
+  std::map<InstanceId, std::map<int, Pose>> trajectories;  // T_WO by frame, as the map had it
+};
+
+struct LoadedMap {
+  std::unique_ptr<MapRepresentation> map;
+  std::optional<MappedRun> run;
+};
+
+// The file's bytes: the same for maps that are equal, whatever their past and the number of
+// threads.
+std::string MapToBytes(const MapRepresentation& map, const MappedRun* run = nullptr);
+
+// `where` names the file in errors, which are kData and one sentence: a foreign, newer, truncated
+// or damaged file, or one whose content no map can have. The loaded map is the saved one: whatever
+// happens to both, they stay equal, bit for bit.
+Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& where);
+
+// The file appears whole or not at all. Errors: kEnvironment where the disk refuses.
+Expected<void> SaveMap(const std::filesystem::path& path, const MapRepresentation& map,
+                       const MappedRun* run = nullptr);
+
+// Errors: kData; those of MapFromBytes, or a missing file.
+Expected<LoadedMap> LoadMap(const std::filesystem::path& path);
+
+}  // namespace tsdfpp

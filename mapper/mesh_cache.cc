@@ -1,0 +1,248 @@
+#include "mapper/mesh_cache.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <tuple>
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kPartsPerTask = 32;
+constexpr std::size_t kPartsPerLink = 1024;
+// No block has these revisions.
+constexpr std::uint64_t kNeverSeen = ~0ULL;
+constexpr std::uint64_t kGone = ~0ULL - 1;
+
+// Bits of MeshPart::todo.
+constexpr std::uint32_t kCubes = 1;
+constexpr std::uint32_t kEdges = 2;
+constexpr std::uint32_t kVertices = 4;
+constexpr std::uint32_t kTriangles = 8;
+
+// Places in `around`. A part's vertices are made from the values of its block and of the next ones
+// along each axis, its cubes and triangles from the masks and edges of all upper ones.
+constexpr std::size_t kSelf = 13;
+constexpr std::array<std::size_t, 4> kReadMyValues{kSelf, 12, 10, 4};
+constexpr std::array<std::size_t, 8> kReadMyMasks{kSelf, 12, 10, 9, 4, 3, 1, 0};
+constexpr std::array<std::size_t, 7> kReadMyCubes{kSelf, 14, 16, 22, 17, 23, 25};
+
+template <typename Function>
+void ForEachInParallel(std::size_t count, const Function& function) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, count, kPartsPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
+      },
+      tbb::simple_partitioner());
+}
+
+}  // namespace
+
+void GridMesh::Mark(MeshPart* part, std::uint32_t what, Parts& list) {
+  if (part == nullptr || (part->todo & what) != 0) return;
+  part->todo |= what;
+  list.push_back(part);
+}
+
+template <typename Offsets>
+void GridMesh::MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t what, Parts& list) {
+  for (const std::size_t place : offsets) Mark(part.around[place], what, list);
+}
+
+// Makes `owned_` and `order_` those of the grid's blocks; returns how many were erased.
+std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
+  const auto& entries = grid.entries();
+  std::size_t same = 0;
+  while (same < owned_.size() && same < entries.size() &&
+         owned_[same]->index == entries[same].index) {
+    ++same;
+  }
+  if (same == owned_.size() && same == entries.size()) return 0;
+
+  // Blocks were added behind, or some were erased, or this is another grid.
+  struct Spare {
+    std::uint64_t key;
+    std::unique_ptr<MeshPart> part;
+  };
+  std::vector<Spare> spares;
+  for (std::size_t i = same; i < owned_.size(); ++i) {
+    const std::uint64_t key = PackIndex(owned_[i]->index);
+    spares.push_back({key, std::move(owned_[i])});
+  }
+  std::sort(spares.begin(), spares.end(),
+            [](const Spare& a, const Spare& b) { return a.key < b.key; });
+  owned_.resize(entries.size());
+  ForEachInParallel(entries.size() - same, [&](std::size_t k) {
+    const Index3& index = entries[same + k].index;
+    const std::uint64_t key = PackIndex(index);
+    const auto spare =
+        std::lower_bound(spares.begin(), spares.end(), key,
+                         [](const Spare& a, std::uint64_t wanted) { return a.key < wanted; });
+    std::unique_ptr<MeshPart>& part = owned_[same + k];
+    if (spare != spares.end() && spare->key == key) {
+      part = std::move(spare->part);
+    } else {
+      part = std::make_unique<MeshPart>();
+      part->index = index;
+      part->revision = kNeverSeen;
+    }
+  });
+  // What lay around an erased block has lost what it was made from.
+  for (const Spare& spare : spares) {
+    if (spare.part != nullptr) spare.part->revision = kGone;
+  }
+  std::size_t erased = 0;
+  for (const Spare& spare : spares) {
+    if (spare.part == nullptr) continue;
+    ++erased;
+    for (MeshPart* part : spare.part->around) {
+      if (part == nullptr || part->revision == kGone) continue;
+      Mark(part, kCubes, cubes_todo_);
+      Mark(part, kEdges, edges_todo_);
+    }
+  }
+
+  std::vector<std::pair<std::uint64_t, MeshPart*>> sorted(owned_.size());
+  for (std::size_t i = 0; i < owned_.size(); ++i) {
+    sorted[i] = {PackIndex(owned_[i]->index), owned_[i].get()};
+  }
+  std::sort(sorted.begin(), sorted.end());
+  order_.resize(sorted.size());
+  keys_.resize(sorted.size());
+  for (std::size_t i = 0; i < sorted.size(); ++i) std::tie(keys_[i], order_[i]) = sorted[i];
+  Link();
+  return erased;
+}
+
+// Tells each part which ones are around it. The nine rows of blocks along x that surround a part
+// are met in order as the parts are walked in order.
+void GridMesh::Link() {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, order_.size(), kPartsPerLink),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (int row = 0; row < 9; ++row) {
+          const auto key_left_of = [&](std::size_t i) {
+            const Index3 index = UnpackIndex(keys_[i]);
+            return PackIndex(index + Index3{-1, row % 3 - 1, row / 3 - 1});
+          };
+          auto at = std::lower_bound(keys_.begin(), keys_.end(), key_left_of(range.begin()));
+          for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const std::uint64_t left = key_left_of(i);
+            while (at != keys_.end() && *at < left) ++at;
+            auto near = at;
+            for (std::size_t x = 0; x < 3; ++x) {
+              const bool found = near != keys_.end() && *near == left + x;
+              order_[i]->around[3 * static_cast<std::size_t>(row) + x] =
+                  found ? order_[static_cast<std::size_t>(near - keys_.begin())] : nullptr;
+              if (found) ++near;
+            }
+          }
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+// Compares the parts with their blocks and notes what has to be made again.
+void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
+  const auto& entries = grid.entries();
+  enum : std::uint8_t { kSame, kValues, kMasks };
+  std::vector<std::uint8_t> change(entries.size(), kSame);
+  ForEachInParallel(entries.size(), [&](std::size_t i) {
+    MeshPart& part = *owned_[i];
+    part.block = entries[i].block.get();
+    if (part.block->revision == part.revision) return;
+    part.revision = part.block->revision;
+    change[i] = kValues;
+    if (part.observed == part.block->observed && part.negative == part.block->negative) return;
+    part.observed = part.block->observed;
+    part.negative = part.block->negative;
+    part.any_negative = part.block->AnyNegative();
+    change[i] = kMasks;
+  });
+  work.blocks = entries.size();
+  if (std::find_if(change.begin(), change.end(), [](auto c) { return c != kMasks; }) ==
+      change.end()) {
+    // All is new: no need to ask who reads what.
+    work.changed = entries.size();
+    for (MeshPart* part : order_) {
+      part->todo = kCubes | kEdges | kVertices | kTriangles;
+      part->is_labelled = false;
+    }
+    for (Parts* list : {&cubes_todo_, &edges_todo_, &vertices_todo_, &triangles_todo_}) {
+      *list = order_;
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (change[i] == kSame) continue;
+    ++work.changed;
+    MarkAround(*owned_[i], kReadMyValues, kVertices, vertices_todo_);
+    for (const std::size_t place : kReadMyMasks) {
+      if (MeshPart* part = owned_[i]->around[place]) part->is_labelled = false;
+    }
+    if (change[i] == kValues) continue;
+    MarkAround(*owned_[i], kReadMyMasks, kCubes, cubes_todo_);
+    MarkAround(*owned_[i], kReadMyValues, kEdges, edges_todo_);
+  }
+}
+
+MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
+  MeshWork work;
+  const std::size_t erased = MatchBlocks(grid);
+  MarkChanged(grid, work);
+  work.changed += erased;
+
+  std::vector<std::uint8_t> changed(cubes_todo_.size());
+  ForEachInParallel(cubes_todo_.size(),
+                    [&](std::size_t i) { changed[i] = FindCubes(*cubes_todo_[i]) ? 1 : 0; });
+  for (std::size_t i = 0; i < cubes_todo_.size(); ++i) {
+    Mark(cubes_todo_[i], kTriangles, triangles_todo_);
+    if (changed[i] != 0) MarkAround(*cubes_todo_[i], kReadMyCubes, kEdges, edges_todo_);
+  }
+
+  changed.assign(edges_todo_.size(), 0);
+  ForEachInParallel(edges_todo_.size(),
+                    [&](std::size_t i) { changed[i] = FindEdges(*edges_todo_[i]) ? 1 : 0; });
+  for (std::size_t i = 0; i < edges_todo_.size(); ++i) {
+    if (changed[i] == 0) continue;
+    Mark(edges_todo_[i], kVertices, vertices_todo_);
+    MarkAround(*edges_todo_[i], kReadMyMasks, kTriangles, triangles_todo_);
+  }
+
+  ForEachInParallel(vertices_todo_.size(),
+                    [&](std::size_t i) { MakeVertices(*vertices_todo_[i], voxel); });
+  ForEachInParallel(triangles_todo_.size(),
+                    [&](std::size_t i) { MakeTriangles(*triangles_todo_[i]); });
+
+  const auto finish = [&](Parts& list) {
+    for (MeshPart* part : list) {
+      if ((part->todo & (kVertices | kTriangles)) != 0) {
+        ++work.remade;
+        part->is_placed = false;
+        part->is_labelled = false;
+      }
+      part->todo = 0;
+    }
+    list.clear();
+  };
+  for (Parts* list : {&vertices_todo_, &triangles_todo_, &cubes_todo_, &edges_todo_}) finish(*list);
+  return work;
+}
+
+std::size_t GridMesh::Bytes() const {
+  std::size_t bytes = order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
+                      owned_.capacity() * sizeof(owned_[0]);
+  for (const MeshPart* part : order_) {
+    bytes += sizeof(MeshPart) + part->positions.capacity() * sizeof(part->positions[0]) +
+             part->colours.capacity() * sizeof(part->colours[0]) +
+             part->triangles.capacity() * sizeof(part->triangles[0]) +
+             part->placed.capacity() * sizeof(part->placed[0]) +
+             part->face_ids.capacity() * sizeof(part->face_ids[0]) + part->hidden.capacity() +
+             part->renamed.capacity() * sizeof(part->renamed[0]);
+  }
+  return bytes;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,65 @@
+// The mesh of a grid, kept block by block, so that only what changed is made again. It is the same,
+// byte for byte, as the mesh made from scratch (docs/map.md, "Marching cubes").
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "mapper/mesh_part.h"
+
+namespace tsdfpp {
+
+// What an update of cached meshes had to do, in blocks.
+struct MeshWork {
+  std::size_t blocks = 0;   // that there are
+  std::size_t changed = 0;  // whose values changed since the last update, new and erased ones too
+  std::size_t remade = 0;   // whose vertices or triangles were made again
+
+  MeshWork& operator+=(const MeshWork& other) {
+    blocks += other.blocks;
+    changed += other.changed;
+    remade += other.remade;
+    return *this;
+  }
+};
+
+// A copy starts empty: it is a cache, and its parts name the blocks of one grid.
+class GridMesh {
+ public:
+  GridMesh() = default;
+  GridMesh(const GridMesh&) {}
+  GridMesh(GridMesh&&) noexcept = default;
+  GridMesh& operator=(const GridMesh&) = delete;
+  GridMesh& operator=(GridMesh&&) noexcept = default;
+  ~GridMesh() = default;
+
+  // Brings the parts in line with the grid, whichever grid that is; `voxel` in metres, always the
+  // same. A block counts as changed where its revision is another one.
+  MeshWork Update(const TsdfGrid& grid, float voxel);
+
+  // By block, in Index3's order. The caller may change what a part says of the scene.
+  const std::vector<MeshPart*>& parts() const { return order_; }
+
+  // Bytes of parts and of what they hold.
+  std::size_t Bytes() const;
+
+ private:
+  using Parts = std::vector<MeshPart*>;
+
+  std::size_t MatchBlocks(const TsdfGrid& grid);
+  void Link();
+  void Mark(MeshPart* part, std::uint32_t what, Parts& list);
+  template <typename Offsets>
+  void MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t what, Parts& list);
+  void MarkChanged(const TsdfGrid& grid, MeshWork& work);
+
+  std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i
+  Parts order_;
+  std::vector<std::uint64_t> keys_;  // PackIndex of order_
+  Parts cubes_todo_;
+  Parts edges_todo_;
+  Parts vertices_todo_;
+  Parts triangles_todo_;
+};
+
+}  // namespace tsdfpp

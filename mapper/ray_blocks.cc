@@ -1,0 +1,257 @@
+#include "mapper/ray_blocks.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kBlocksPerTask = 64;
+
+std::size_t At(int i) { return static_cast<std::size_t>(i); }
+
+// The block and those one further along x, y, z (bits 0, 1, 2 of the place).
+using UpperNeighbours = std::array<const TsdfBlock*, 8>;
+
+// Nine bits: the row's eight voxels and the first one of the next block.
+using CornerRows = std::array<std::array<std::uint32_t, kCorners>, kCorners>;
+
+CornerRows RowsOf(const UpperNeighbours& blocks, BlockMask TsdfBlock::*mask) {
+  CornerRows rows{};
+  for (int z = 0; z < kCorners; ++z) {
+    for (int y = 0; y < kCorners; ++y) {
+      const int place = (y >> 3) * 2 + (z >> 3) * 4;
+      const auto row = [&](int upper) -> std::uint32_t {
+        const TsdfBlock* block = blocks[At(place + upper)];
+        if (block == nullptr) return 0;
+        return static_cast<std::uint32_t>((block->*mask)[At(z & 7)] >>
+                                          static_cast<unsigned>(8 * (y & 7))) &
+               0xFFU;
+      };
+      rows[At(z)][At(y)] = row(0) | (row(1) & 1U) << 8U;
+    }
+  }
+  return rows;
+}
+
+// Fills `crossed` and its box; false where no cube is crossed.
+bool FindCrossed(const UpperNeighbours& blocks, CrossedCubes& out) {
+  const CornerRows negative = RowsOf(blocks, &TsdfBlock::negative);
+  const CornerRows observed = RowsOf(blocks, &TsdfBlock::observed);
+  out.bits = {};
+  out.low = {kBlockSide, kBlockSide, kBlockSide};
+  out.high = {0, 0, 0};
+  std::uint32_t columns = 0;
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    for (std::size_t y = 0; y < kBlockSide; ++y) {
+      std::uint32_t all = 0x1FF;
+      std::uint32_t any_negative = 0;
+      std::uint32_t any_positive = 0;
+      for (std::size_t corner = 0; corner < 4; ++corner) {
+        const std::uint32_t o = observed[z + (corner >> 1U)][y + (corner & 1U)];
+        const std::uint32_t n = negative[z + (corner >> 1U)][y + (corner & 1U)];
+        all &= o;
+        any_negative |= n;
+        any_positive |= o & ~n;
+      }
+      all &= all >> 1U;
+      any_negative |= any_negative >> 1U;
+      any_positive |= any_positive >> 1U;
+      const std::uint32_t row = all & any_negative & any_positive & 0xFFU;
+      if (row == 0) continue;
+      columns |= row;
+      out.bits[2 * z + (y >> 2U)] |= row << (8 * (y & 3U));
+      out.low[1] = std::min(out.low[1], static_cast<std::uint8_t>(y));
+      out.high[1] = std::max(out.high[1], static_cast<std::uint8_t>(y + 1));
+      out.low[2] = std::min(out.low[2], static_cast<std::uint8_t>(z));
+      out.high[2] = std::max(out.high[2], static_cast<std::uint8_t>(z + 1));
+    }
+  }
+  if (columns == 0) return false;
+  out.low[0] = static_cast<std::uint8_t>(std::countr_zero(columns));
+  out.high[0] = static_cast<std::uint8_t>(std::bit_width(columns));
+  return true;
+}
+
+void CopyDistances(const UpperNeighbours& blocks, RayBlock& out) {
+  for (int z = 0; z < kCorners; ++z) {
+    for (int y = 0; y < kCorners; ++y) {
+      const int place = (y >> 3) * 2 + (z >> 3) * 4;
+      const std::size_t from = At(PlaceInBlock({0, y, z}));
+      float* to = &out.distance[At((z * kCorners + y) * kCorners)];
+      if (const TsdfBlock* block = blocks[At(place)]) {
+        std::memcpy(to, &block->distance[from], kBlockSide * sizeof(float));
+      } else {
+        std::fill(to, to + kBlockSide, 0.0F);
+      }
+      const TsdfBlock* next = blocks[At(place + 1)];
+      to[kBlockSide] = next == nullptr ? 0 : next->distance[from];
+    }
+  }
+}
+
+// A camera before one lattice, lengths in voxels.
+class LatticeView {
+ public:
+  LatticeView(const RayCamera& camera, const RayVolume& volume, double voxel_m, double near_m)
+      : camera_(camera.intrinsics), voxel_m_(voxel_m), near_m_(near_m) {
+    const Pose T_CL =
+        volume.lattice_is_world ? camera.T_WC.inverse() : Pose(camera.T_WC.inverse() * volume.T_WL);
+    rotation_ = T_CL.linear() * voxel_m;
+    translation_ = T_CL.translation();
+    // Unit normals of the image's sides, inwards.
+    const Intrinsics& k = camera_;
+    sides_ = {Eigen::Vector3d(k.fx, 0, k.cx + 0.5), Eigen::Vector3d(-k.fx, 0, k.width - 0.5 - k.cx),
+              Eigen::Vector3d(0, k.fy, k.cy + 0.5),
+              Eigen::Vector3d(0, -k.fy, k.height - 0.5 - k.cy)};
+    for (Eigen::Vector3d& side : sides_) side.normalize();
+  }
+
+  // Whether the ball around a block's cubes may be in view.
+  bool MaySee(const Index3& block) const {
+    const Eigen::Vector3d middle =
+        rotation_ * Eigen::Vector3d(block.x * kBlockSide + 4, block.y * kBlockSide + 4,
+                                    block.z * kBlockSide + 4) +
+        translation_;
+    const double radius = 4 * std::sqrt(3.0) * voxel_m_;
+    if (middle.z() < near_m_ - radius) return false;
+    return std::all_of(sides_.begin(), sides_.end(),
+                       [&](const Eigen::Vector3d& side) { return side.dot(middle) >= -radius; });
+  }
+
+  BlockFootprint FootprintOf(const Index3& block, const CrossedCubes& cubes) const {
+    constexpr double kNearestCorner_m = 1e-3;
+    constexpr double kMargin_pixels = 0.01;  // of rounding
+    double near = 1e30;
+    double far = -1e30;
+    double u_low = 1e30;
+    double u_high = -1e30;
+    double v_low = 1e30;
+    double v_high = -1e30;
+    for (unsigned i = 0; i < 8; ++i) {
+      const auto along = [&](unsigned axis, int index) {
+        return index * kBlockSide + ((i >> axis & 1U) != 0 ? cubes.high[axis] : cubes.low[axis]);
+      };
+      const Eigen::Vector3d p_C =
+          rotation_ * Eigen::Vector3d(along(0, block.x), along(1, block.y), along(2, block.z)) +
+          translation_;
+      near = std::min(near, p_C.z());
+      far = std::max(far, p_C.z());
+      const double u = camera_.fx * p_C.x() / p_C.z() + camera_.cx;
+      const double v = camera_.fy * p_C.y() / p_C.z() + camera_.cy;
+      u_low = std::min(u_low, u);
+      u_high = std::max(u_high, u);
+      v_low = std::min(v_low, v);
+      v_high = std::max(v_high, v);
+    }
+    BlockFootprint footprint;
+    if (far < near_m_) return footprint;
+    footprint.near_m = static_cast<float>(std::max(near, 0.0) * (1 - 1e-6));
+    if (near < kNearestCorner_m) {  // reaches behind the camera: no bounds
+      footprint.u_high = camera_.width - 1;
+      footprint.v_high = camera_.height - 1;
+      return footprint;
+    }
+    const auto first = [](double low) {
+      return static_cast<int>(std::max(0.0, std::ceil(low - kMargin_pixels)));
+    };
+    const auto last = [](double high, int size) {
+      return static_cast<int>(std::min(size - 1.0, std::floor(high + kMargin_pixels)));
+    };
+    footprint.u_low = first(std::min(u_low, 1e9));
+    footprint.u_high = last(std::max(u_high, -1.0), camera_.width);
+    footprint.v_low = first(std::min(v_low, 1e9));
+    footprint.v_high = last(std::max(v_high, -1.0), camera_.height);
+    return footprint;
+  }
+
+ private:
+  const Intrinsics& camera_;
+  double voxel_m_;
+  double near_m_;
+  Eigen::Matrix3d rotation_;     // metres a voxel
+  Eigen::Vector3d translation_;  // metres
+  std::array<Eigen::Vector3d, 4> sides_;
+};
+
+}  // namespace
+
+RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& camera,
+                        double voxel_m, double near_m, const ContestedBox& contested) {
+  struct Candidate {
+    std::uint32_t volume;
+    const TsdfGrid::Entry* entry;
+  };
+  std::vector<LatticeView> views;
+  std::vector<Candidate> candidates;
+  for (std::uint32_t i = 0; i < volumes.size(); ++i) {
+    views.emplace_back(camera, volumes[i], voxel_m, near_m);
+    const std::size_t first = candidates.size();
+    for (const auto& entry : volumes[i].grid->entries()) {
+      if (views.back().MaySee(entry.index)) candidates.push_back({i, &entry});
+    }
+    std::sort(
+        candidates.begin() + static_cast<std::ptrdiff_t>(first), candidates.end(),
+        [](const Candidate& a, const Candidate& b) { return a.entry->index < b.entry->index; });
+  }
+  // First the crossed cubes, then, for the blocks that have some, the distances.
+  const auto neighbours_of = [&](const Candidate& candidate) {
+    UpperNeighbours blocks{candidate.entry->block.get()};
+    for (int k = 1; k < 8; ++k) {
+      blocks[At(k)] = volumes[candidate.volume].grid->Find(candidate.entry->index +
+                                                           Index3{k & 1, (k >> 1) & 1, k >> 2});
+    }
+    return blocks;
+  };
+  const auto for_each_candidate = [&](const auto& function) {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, candidates.size(), kBlocksPerTask),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
+        },
+        tbb::simple_partitioner());
+  };
+  std::vector<CrossedCubes> crossed(candidates.size());
+  std::vector<BlockFootprint> footprints(candidates.size());
+  for_each_candidate([&](std::size_t i) {
+    const UpperNeighbours blocks = neighbours_of(candidates[i]);
+    const bool any_negative = std::any_of(blocks.begin(), blocks.end(), [](const TsdfBlock* b) {
+      return b != nullptr && b->AnyNegative();
+    });
+    if (!any_negative || !FindCrossed(blocks, crossed[i])) return;
+    footprints[i] = views[candidates[i].volume].FootprintOf(candidates[i].entry->index, crossed[i]);
+  });
+  constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
+  RayBlocks found;
+  std::vector<std::uint32_t> number(candidates.size(), kOutOfView);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const BlockFootprint& footprint = footprints[i];
+    if (footprint.u_high < footprint.u_low || footprint.v_high < footprint.v_low) continue;
+    number[i] = static_cast<std::uint32_t>(found.footprints.size());
+    found.footprints.push_back(footprint);
+  }
+  found.blocks = std::make_unique_for_overwrite<RayBlock[]>(found.footprints.size());
+  for_each_candidate([&](std::size_t i) {
+    if (number[i] == kOutOfView) return;
+    const auto& [volume, entry] = candidates[i];
+    RayBlock& block = found.blocks[number[i]];
+    block.index = entry->index;
+    block.volume = volume;
+    block.cubes = crossed[i];
+    const Index3 first = VoxelAt(block.index, 0);
+    const auto& [low, high, bits] = block.cubes;
+    block.contested =
+        contested && contested(volumes[volume], first + Index3{low[0], low[1], low[2]},
+                               first + Index3{high[0], high[1], high[2]});
+    CopyDistances(neighbours_of(candidates[i]), block);
+  });
+  return found;
+}
+
+}  // namespace tsdfpp

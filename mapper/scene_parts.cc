@@ -1,0 +1,257 @@
+#include "mapper/scene_parts.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "mapper/object_volume.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kPartsPerTask = 32;
+constexpr std::uint16_t kUnused = 0xFFFF;  // more than any vertex of a part
+constexpr std::uint16_t kUsed = 0;
+
+template <typename Function>
+void ForEachPart(const std::vector<MeshPart*>& parts, const Function& function) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, parts.size(), kPartsPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) function(*parts[i]);
+      },
+      tbb::simple_partitioner());
+}
+
+// The positions in the world of the vertices that a part's triangles name.
+class CornersOf {
+ public:
+  explicit CornersOf(const MeshPart& part) {
+    for (std::size_t which = 0; which < 8; ++which) {
+      const MeshPart* near = part.around[UpperPlace(which)];
+      if (near != nullptr) positions_[which] = near->PositionsInWorld().data();
+    }
+  }
+  const Eigen::Vector3f& operator()(std::uint16_t name) const {
+    return positions_[name >> kLocalVertexBits][name & kLocalVertexMask];
+  }
+
+ private:
+  std::array<const Eigen::Vector3f*, 8> positions_{};
+};
+
+// Numbers the vertices of a part that some visible triangle names.
+void RenameVertices(MeshPart& part) {
+  part.renamed.clear();
+  if (part.positions.empty()) return;
+  bool any_hidden = false;
+  for (std::size_t which = 0; which < 8; ++which) {
+    const MeshPart* user = part.around[LowerPlace(which)];
+    any_hidden = any_hidden || (user != nullptr && !user->hidden.empty());
+  }
+  if (!any_hidden) return;
+  part.renamed.assign(part.positions.size(), kUnused);
+  for (std::size_t which = 0; which < 8; ++which) {
+    const MeshPart* user = part.around[LowerPlace(which)];
+    if (user == nullptr) continue;
+    for (std::size_t t = 0; t < user->triangles.size(); ++t) {
+      if (!user->hidden.empty() && user->hidden[t] != 0) continue;
+      for (const std::uint16_t corner : user->triangles[t]) {
+        if (corner >> kLocalVertexBits == which) part.renamed[corner & kLocalVertexMask] = kUsed;
+      }
+    }
+  }
+  part.visible_vertices = 0;
+  for (std::uint16_t& name : part.renamed) {
+    if (name == kUsed) name = static_cast<std::uint16_t>(part.visible_vertices++);
+  }
+}
+
+std::size_t VisibleTriangles(const MeshPart& part) {
+  std::size_t count = part.triangles.size();
+  for (const std::uint8_t hidden : part.hidden) count -= hidden;
+  return count;
+}
+
+// A part and its place in the joined mesh.
+struct Piece {
+  const MeshPart* part;
+  const JoinedMesh* of;
+  std::size_t first_triangle;
+};
+
+void WriteVertices(const Piece& piece, TriangleMesh& mesh) {
+  const MeshPart& part = *piece.part;
+  const std::vector<Eigen::Vector3f>& positions = part.PositionsInWorld();
+  std::size_t to = part.first_vertex;
+  if (!piece.of->visible_only || part.renamed.empty()) {
+    std::copy(positions.begin(), positions.end(),
+              mesh.vertices.begin() + static_cast<std::ptrdiff_t>(to));
+    std::copy(part.colours.begin(), part.colours.end(),
+              mesh.colours.begin() + static_cast<std::ptrdiff_t>(to));
+    return;
+  }
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (part.renamed[i] == kUnused) continue;
+    mesh.vertices[to] = positions[i];
+    mesh.colours[to++] = part.colours[i];
+  }
+}
+
+void WriteTriangles(const Piece& piece, TriangleMesh& mesh) {
+  const MeshPart& part = *piece.part;
+  const bool visible_only = piece.of->visible_only;
+  std::array<std::uint32_t, 8> first{};
+  std::array<const std::uint16_t*, 8> renamed{};
+  bool any_renamed = false;
+  for (std::size_t which = 0; which < 8; ++which) {
+    const MeshPart* near = part.around[UpperPlace(which)];
+    if (near == nullptr) continue;
+    first[which] = near->first_vertex;
+    if (!visible_only || near->renamed.empty()) continue;
+    renamed[which] = near->renamed.data();
+    any_renamed = true;
+  }
+  const bool all = !visible_only || part.hidden.empty();
+  std::size_t to = piece.first_triangle;
+  for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+    if (!all && part.hidden[t] != 0) continue;
+    std::array<std::uint32_t, 3>& corners = mesh.triangles[to];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t which = part.triangles[t][i] >> kLocalVertexBits;
+      std::uint32_t local = part.triangles[t][i] & kLocalVertexMask;
+      if (any_renamed && renamed[which] != nullptr) local = renamed[which][local];
+      corners[i] = first[which] + local;
+    }
+    if (piece.of->id != kNoInstance) {
+      mesh.face_ids[to] = piece.of->id;
+    } else if (!part.face_ids.empty()) {
+      mesh.face_ids[to] = part.face_ids[t];
+    }
+    ++to;
+  }
+}
+
+}  // namespace
+
+MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now,
+                            bool is_world_now) {
+  const bool moved = !SameNumbers(T_WL, T_WL_now) || lattice_is_world != is_world_now;
+  T_WL = T_WL_now;
+  lattice_is_world = is_world_now;
+  const MeshWork work = mesh.Update(grid, voxel);
+  if (moved || work.changed > 0 || work.remade > 0) version = NewRevision();
+  ForEachPart(mesh.parts(), [&](MeshPart& part) {
+    if (part.is_placed && !moved) return;
+    part.is_placed = true;
+    part.placed.clear();
+    if (lattice_is_world) return;
+    part.placed.reserve(part.positions.size());
+    for (const Eigen::Vector3f& p : part.positions) {
+      part.placed.push_back((T_WL * p.cast<double>()).cast<float>());
+    }
+  });
+  return work;
+}
+
+void BlockBox::Extend(const Index3& index) {
+  if (is_empty) low = high = index;
+  is_empty = false;
+  low = {std::min(low.x, index.x), std::min(low.y, index.y), std::min(low.z, index.z)};
+  high = {std::max(high.x, index.x), std::max(high.y, index.y), std::max(high.z, index.z)};
+}
+
+bool BlockBox::Holds(const Index3& index) const {
+  return !is_empty && index.x >= low.x && index.y >= low.y && index.z >= low.z &&
+         index.x <= high.x && index.y <= high.y && index.z <= high.z;
+}
+
+BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
+  BlockBox box;
+  for (const MeshPart* part : object.mesh.parts()) {
+    if (part->any_negative) box.Extend(part->index);
+  }
+  if (box.is_empty) return box;
+  // What is covered is at most a voxel from a negative one, and a look-up voxel at most two from
+  // the block of its triangle: not as much as a block together.
+  if (object.lattice_is_world) {
+    box.low = box.low + Index3{-1, -1, -1};
+    box.high = box.high + Index3{1, 1, 1};
+    return box;
+  }
+  BlockBox placed;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner(
+        (i & 1) != 0 ? (box.high.x + 2) * kBlockSide : (box.low.x - 1) * kBlockSide,
+        (i & 2) != 0 ? (box.high.y + 2) * kBlockSide : (box.low.y - 1) * kBlockSide,
+        (i & 4) != 0 ? (box.high.z + 2) * kBlockSide : (box.low.z - 1) * kBlockSide);
+    placed.Extend(BlockOf(FloorOf(object.T_WL * (corner * voxel_m) / voxel_m)));
+  }
+  return placed;
+}
+
+void LabelTriangles(const GridMesh& mesh,
+                    const std::function<InstanceId(const Eigen::Vector3f&)>& label_at) {
+  ForEachPart(mesh.parts(), [&](MeshPart& part) {
+    if (part.is_labelled) return;
+    part.is_labelled = true;
+    part.face_ids.clear();
+    const CornersOf corner(part);
+    for (const auto& [a, b, c] : part.triangles) {
+      part.face_ids.push_back(label_at((corner(a) + corner(b) + corner(c)) / 3.0F));
+    }
+  });
+}
+
+void HideTriangles(const GridMesh& mesh, const std::function<bool(const MeshPart&)>& in_doubt,
+                   const IsHidden& is_hidden) {
+  ForEachPart(mesh.parts(), [&](MeshPart& part) {
+    part.hidden.clear();
+    if (part.triangles.empty() || !in_doubt(part)) return;
+    const CornersOf corner(part);
+    for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+      const auto& [a, b, c] = part.triangles[t];
+      if (!is_hidden(corner(a), corner(b), corner(c))) continue;
+      part.hidden.resize(part.triangles.size(), 0);
+      part.hidden[t] = 1;
+    }
+  });
+  ForEachPart(mesh.parts(), RenameVertices);
+}
+
+TriangleMesh Join(const std::vector<JoinedMesh>& meshes) {
+  std::vector<Piece> pieces;
+  std::size_t vertices = 0;
+  std::size_t triangles = 0;
+  bool labelled = false;
+  for (const JoinedMesh& of : meshes) {
+    for (MeshPart* part : of.mesh->parts()) {
+      part->first_vertex = static_cast<std::uint32_t>(vertices);
+      if (part->positions.empty() && part->triangles.empty()) continue;
+      pieces.push_back({part, &of, triangles});
+      vertices += of.visible_only && !part->renamed.empty() ? part->visible_vertices
+                                                            : part->positions.size();
+      triangles += of.visible_only ? VisibleTriangles(*part) : part->triangles.size();
+      labelled = labelled || of.id != kNoInstance || !part->face_ids.empty();
+    }
+  }
+  TriangleMesh mesh;
+  mesh.vertices.resize(vertices);
+  mesh.colours.resize(vertices);
+  mesh.triangles.resize(triangles);
+  if (labelled) mesh.face_ids.resize(triangles);
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, pieces.size(), kPartsPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          WriteVertices(pieces[i], mesh);
+          WriteTriangles(pieces[i], mesh);
+        }
+      },
+      tbb::simple_partitioner());
+  return mesh;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,41 @@
+// Grids, volumes and lists as bytes (docs/map.md, "The map file"). What can be derived from the
+// values (masks, covers, an anchored index) is not stored; blocks are in the order of Index3, so
+// that equal maps have equal bytes.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/error.h"
+#include "mapper/byte_stream.h"
+#include "mapper/map_config.h"
+#include "mapper/volume_fusion.h"
+#include "mapper/voxel_list.h"
+
+namespace tsdfpp {
+
+void SaveGrid(const TsdfGrid& grid, std::string& bytes);
+// Masks are up to date but for `cover`. Errors: kData, a fragment such as "a block is out of
+// order", for values that no map holds.
+Expected<TsdfGrid> LoadGrid(ByteReader& bytes, const MapConfig& config);
+
+void SavePose(const Pose& T, std::string& bytes);
+// Errors: kData, a fragment, where it is not rigid or beyond 100 km.
+Expected<Pose> LoadPose(ByteReader& bytes);
+
+// Values, T_WO at birth and now; where the lattice is follows from these.
+void SaveVolumes(const ObjectVolumes& volumes, std::string& bytes);
+Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config);
+
+// The lists of a block: kBlockVoxels lists of the same number of entries, one after the other.
+struct ListsOfBlock {
+  Index3 index;
+  std::vector<ListEntry> entries;
+};
+// `blocks` in the order of Index3.
+void SaveLists(const std::vector<ListsOfBlock>& blocks, int layers, std::string& bytes);
+// Errors: kData, a fragment, where a block is out of order or empty, or a list has a gap, an object
+// twice, or a confidence out of range.
+Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers);
+
+}  // namespace tsdfpp

@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# The mapper installs on its own: builds core and mapper alone, installs them to a prefix that is thrown away, builds
+# examples/ against that prefix and runs it.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+build=build/mapper-only
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+run() { # its output only where it fails
+  "$@" >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
+}
+run cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release "-DTSDFPP_ROOMS=core;mapper"
+run cmake --build "$build"
+run cmake --install "$build" --prefix "$work/prefix"
+run cmake -S examples -B "$work/example" -G Ninja -DCMAKE_BUILD_TYPE=Release "-DCMAKE_PREFIX_PATH=$work/prefix"
+run cmake --build "$work/example"
+(cd "$work" && example/move_a_ball)
+[[ -s $work/ball.tsdfpp ]] || { echo "install: the example saved no map" >&2; exit 1; }
+if ldd "$work/example/move_a_ball" | grep -iE 'mujoco|open3d'; then
+  echo "install: the mapper needs one of these" >&2
+  exit 1
+fi
+echo "install: the example builds and runs against the installed mapper"

@@ -1,0 +1,72 @@
+// The hash of blocks against a map of the standard library.
+#include "mapper/block_grid.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "tests/mapper/toy_scene.h"
+
+namespace tsdfpp {
+namespace {
+
+void ExpectSame(const BlockGrid<int>& grid, const std::map<Index3, int>& expected,
+                const std::vector<Index3>& order) {
+  ASSERT_EQ(grid.size(), expected.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    ASSERT_EQ(grid.entries()[i].index, order[i]) << "entry " << i;
+    ASSERT_EQ(*grid.entries()[i].block, expected.at(order[i]));
+    ASSERT_EQ(grid.Find(order[i]), grid.entries()[i].block.get());
+  }
+}
+
+// A small box, so that what was erased comes back and searches run over each other.
+TEST(BlockGrid, ErasesAndAddsAsAMapDoesAndKeepsTheOrder) {
+  Dice dice(3);
+  BlockGrid<int> grid;
+  std::map<Index3, int> expected;
+  std::vector<Index3> order;
+  std::size_t erasures = 0;
+  for (int round = 0; round < 300; ++round) {
+    for (int i = dice.Whole(20); i > 0; --i) {
+      const Index3 index{dice.Whole(8) - 4, dice.Whole(8) - 4, dice.Whole(8) - 4};
+      if (grid.Find(index) != nullptr) continue;
+      grid.FindOrAdd(index) = expected[index] = round * 100 + i;
+      order.push_back(index);
+    }
+    std::vector<Index3> erased;
+    const int share = 1 + dice.Whole(12);
+    for (const Index3& index : order) {
+      if (dice.Whole(share) == 0) erased.push_back(index);
+    }
+    if (round % 2 == 0) std::sort(erased.begin(), erased.end());
+    grid.Erase(erased);
+    for (const Index3& index : erased) {
+      expected.erase(index);
+      std::erase(order, index);
+      ASSERT_EQ(grid.Find(index), nullptr);
+    }
+    erasures += erased.size();
+    ExpectSame(grid, expected, order);
+    ExpectSame(BlockGrid<int>(grid), expected, order);
+  }
+  EXPECT_GT(erasures, 1000U);
+}
+
+TEST(BlockGrid, ErasingAllLeavesNothing) {
+  BlockGrid<int> grid;
+  std::vector<Index3> all;
+  for (int i = 0; i < 1000; ++i) {
+    all.push_back({i, -i, 3 * i});
+    grid.FindOrAdd(all.back()) = i;
+  }
+  const std::size_t table = grid.TableBytes();
+  grid.Erase(all);
+  EXPECT_TRUE(grid.empty());
+  for (const Index3& index : all) EXPECT_EQ(grid.Find(index), nullptr);
+  for (const Index3& index : all) grid.FindOrAdd(index) = 1;
+  EXPECT_EQ(grid.TableBytes(), table);
+}
+
+}  // namespace
+}  // namespace tsdfpp

@@ -1,0 +1,240 @@
+// A map that was saved and loaded is the same map; a file that is not whole is refused.
+#include "mapper/map_file.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "core/files.h"
+#include "mapper/section_file.h"
+#include "tests/core/temp_folder.h"
+#include "tests/mapper/compare_maps.h"
+#include "tests/mapper/every_method.h"
+#include "tests/mapper/map_snapshot.h"
+
+namespace tsdfpp {
+namespace {
+
+using reference::MakePose;
+using test::TempFolder;
+
+class MapFile : public EveryMethodTest {
+ protected:
+  static LoadedMap Loaded(const std::string& bytes) {
+    auto loaded = MapFromBytes(bytes, "map.tsdf");
+    EXPECT_TRUE(loaded.has_value()) << loaded.error().message;
+    return std::move(*loaded);
+  }
+};
+TSDFPP_FOR_EVERY_METHOD(MapFile);
+
+MappedRun SomeRun() {
+  MappedRun run;
+  run.sequence = "toys";
+  run.objects = {{kBackground, "background", ""}, {kBrick, "brick", "toy"}};
+  run.poses = "gt";
+  run.last_frame = 3;
+  run.trajectories[kBrick] = {{1, Pose::Identity()}, {3, MakePose(1, {1, 2, 3}, {4, 5, 6})}};
+  return run;
+}
+
+TEST_P(MapFile, TheLoadedMapIsTheSavedOneAndStaysSo) {
+  MapConfig config = ToyConfig();
+  config.confidence_cap = 7;
+  const auto saved = DrivenMap(GetParam(), config, 3);
+  // A pose that is set and not yet acted on, and one of an object that nobody has seen.
+  saved->SetObjectPose(kTray, MakePose(0.2, Eigen::Vector3d::UnitZ(), {0.05, 0.1, 0.03}));
+  saved->SetObjectPose(9, MakePose(0.2, Eigen::Vector3d::UnitZ(), {0.05, 0.1, 0.03}));
+  const std::string file = MapToBytes(*saved);
+  const auto loaded = Loaded(file).map;
+  EXPECT_EQ(loaded->method(), GetParam());
+  EXPECT_EQ(loaded->config(), config);
+  EXPECT_EQ(loaded->FindFault(), std::nullopt);
+  EXPECT_TRUE(MapToBytes(*loaded) == file);
+  EXPECT_TRUE(SnapshotOf(*loaded, ToyIds()) == SnapshotOf(*saved, ToyIds()));
+  for (int i = 3; i < 6; ++i) {
+    for (const auto& map : {saved.get(), loaded.get()}) {
+      SetPosesThenFuse(*map, DriveFrame(i));
+      if (i == 4) map->Remove(kBall);
+      if (i == 4) map->SetObjectPose(9, Pose::Identity());
+    }
+    ASSERT_TRUE(MapToBytes(*loaded) == MapToBytes(*saved)) << "frame " << i;
+  }
+  EXPECT_FALSE(MapToBytes(*loaded) == file);
+  EXPECT_TRUE(SnapshotOf(*loaded, ToyIds()) == SnapshotOf(*saved, ToyIds()));
+  EXPECT_EQ(loaded->Memory().blocks, saved->Memory().blocks);
+}
+
+// The same content by another path: blocks come in another order.
+TEST_P(MapFile, TheBytesAreThoseOfTheContentAndForAnyThreads) {
+  const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
+  const std::string file = MapToBytes(*map);
+  for (const std::size_t threads : {1U, 2U, 4U}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    EXPECT_TRUE(MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 2)) == file) << threads;
+    EXPECT_TRUE(MapToBytes(*Loaded(file).map) == file) << threads;
+  }
+  EXPECT_TRUE(MapToBytes(*map->Clone()) == file);
+}
+
+TEST_P(MapFile, AnEmptyMapIsAMap) {
+  const auto map = MakeMap(GetParam(), ToyConfig());
+  const auto loaded = Loaded(MapToBytes(*map)).map;
+  EXPECT_TRUE(loaded->Objects().empty());
+  SetPosesThenFuse(*map, DriveFrame(0));
+  SetPosesThenFuse(*loaded, DriveFrame(0));
+  EXPECT_TRUE(MapToBytes(*loaded) == MapToBytes(*map));
+}
+
+TEST_P(MapFile, ARunComesBack) {
+  const MappedRun run = SomeRun();
+  const auto loaded = Loaded(MapToBytes(*MakeMap(GetParam(), ToyConfig()), &run));
+  ASSERT_TRUE(loaded.run.has_value());
+  EXPECT_EQ(loaded.run->sequence, run.sequence);
+  EXPECT_EQ(loaded.run->objects, run.objects);
+  EXPECT_EQ(loaded.run->poses, run.poses);
+  EXPECT_EQ(loaded.run->last_frame, run.last_frame);
+  ASSERT_EQ(loaded.run->trajectories.size(), 1U);
+  for (const int frame : {1, 3}) {
+    EXPECT_EQ(loaded.run->trajectories.at(kBrick).at(frame).matrix(),
+              run.trajectories.at(kBrick).at(frame).matrix());
+  }
+  EXPECT_FALSE(Loaded(MapToBytes(*loaded.map)).run.has_value());
+}
+
+// Every byte of a file is under a checksum, so a file that differs in one is refused.
+TEST_P(MapFile, EveryFlippedByteIsRefused) {
+  const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1));
+  Dice dice(17);
+  constexpr int kFlips = 2000;
+  for (int i = 0; i < kFlips; ++i) {
+    std::string damaged = file;
+    // A quarter of them in the header and the first parts, which are small beside the rest.
+    const auto size = static_cast<int>(file.size());
+    const auto at = static_cast<std::size_t>(dice.Whole(i % 4 == 0 ? 200 : size));
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 + dice.Whole(255)));
+    const auto loaded = MapFromBytes(damaged, "map.tsdf");
+    ASSERT_FALSE(loaded.has_value()) << "byte " << at;
+    ASSERT_EQ(loaded.error().kind, ErrorKind::kData);
+    ASSERT_EQ(loaded.error().message.rfind("map.tsdf: ", 0), 0U) << loaded.error().message;
+  }
+}
+
+// Where parts begin and end, within their headers and contents, and everywhere near both ends.
+TEST_P(MapFile, EveryTruncationIsRefused) {
+  const MappedRun run = SomeRun();
+  const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1), &run);
+  std::vector<std::size_t> lengths;
+  for (std::size_t length = 0; length < 300; ++length) lengths.push_back(length);
+  for (std::size_t back = 1; back < 100; ++back) lengths.push_back(file.size() - back);
+  Dice dice(23);
+  for (int i = 0; i < 200; ++i) {
+    lengths.push_back(static_cast<std::size_t>(dice.Whole(static_cast<int>(file.size()))));
+  }
+  for (std::size_t at = 32; at < file.size();) {  // the parts
+    std::uint32_t stored = 0;
+    std::memcpy(&stored, &file[at + 8], sizeof(stored));
+    for (const std::size_t length : {at, at + 4, at + 15, at + 16, at + 16 + stored / 2}) {
+      lengths.push_back(length);
+    }
+    at += 16 + stored;
+  }
+  for (const std::size_t length : lengths) {
+    const auto loaded = MapFromBytes(file.substr(0, length), "map.tsdf");
+    ASSERT_FALSE(loaded.has_value()) << length << " bytes of " << file.size();
+  }
+  EXPECT_NE(MapFromBytes(file.substr(0, 1000), "map.tsdf").error().message.find("cut short"),
+            std::string::npos);
+  EXPECT_NE(MapFromBytes(file + "x", "map.tsdf").error().message.find("longer"), std::string::npos);
+}
+
+// Content that passes the checksums and was made up: it is refused, or a map in order.
+TEST_P(MapFile, MadeUpContentIsRefusedOrInOrder) {
+  const MappedRun run = SomeRun();
+  auto map = DrivenMap(GetParam(), ToyConfig(), 1);
+  const std::string file = MapToBytes(*map, &run);
+  const auto sections = UnpackSections(file, "map.tsdf");
+  ASSERT_TRUE(sections.has_value());
+  Dice dice(29);
+  int refused = 0;
+  constexpr int kRounds = 400;
+  for (int i = 0; i < kRounds; ++i) {
+    Sections changed = *sections;
+    auto section = changed.begin();
+    std::advance(section, dice.Whole(static_cast<int>(changed.size())));
+    std::string& bytes = section->second;
+    if (bytes.empty()) continue;
+    const auto size = static_cast<int>(bytes.size());
+    const auto at = static_cast<std::size_t>(dice.Whole(i % 2 == 0 ? std::min(size, 400) : size));
+    if (dice.Whole(8) == 0) {
+      bytes.resize(at);
+    } else {
+      bytes[at] = static_cast<char>(bytes[at] ^ (1 + dice.Whole(255)));
+    }
+    auto loaded = MapFromBytes(PackSections(changed), "map.tsdf");
+    if (!loaded) {
+      ++refused;
+      ASSERT_EQ(loaded.error().kind, ErrorKind::kData) << loaded.error().message;
+      continue;
+    }
+    SetPosesThenFuse(*loaded->map, DriveFrame(1));
+    EXPECT_FALSE(loaded->map->SceneMesh().triangles.empty());
+  }
+  EXPECT_GT(refused, kRounds / 20);
+}
+
+TEST(MapFileErrors, EachIsOneSentenceThatNamesTheFile) {
+  const TempFolder folder;
+  const auto error_of = [&](const std::string& bytes) {
+    const auto path = folder / "a.map";
+    EXPECT_TRUE(WriteFile(path, bytes).has_value());
+    const auto loaded = LoadMap(path);
+    EXPECT_FALSE(loaded.has_value());
+    EXPECT_EQ(loaded.error().kind, ErrorKind::kData);
+    EXPECT_EQ(loaded.error().message.rfind(path.string(), 0), 0U) << loaded.error().message;
+    EXPECT_EQ(loaded.error().message.find('\n'), std::string::npos) << loaded.error().message;
+    return loaded.error().message.substr(path.string().size());
+  };
+  const std::string file = MapToBytes(*MakeMap(Method::kTsdfpp, ToyConfig()));
+  EXPECT_EQ(error_of(""), ": is not a map file");
+  EXPECT_EQ(error_of("ply\nformat binary_little_endian 1.0\n"), ": is not a map file");
+  EXPECT_EQ(error_of(file.substr(0, 20)), ": is cut short, within its header");
+  std::string newer = file;
+  newer[12] = 2;
+  EXPECT_EQ(error_of(newer), ": is a map file of version 2, expected 1 or less");
+  std::string swapped = file;
+  std::swap(swapped[8], swapped[11]);
+  std::swap(swapped[9], swapped[10]);
+  EXPECT_EQ(error_of(swapped), ": was written by a machine of the other byte order");
+  std::string damaged = file;
+  damaged[24] = static_cast<char>(damaged[24] ^ 1);
+  EXPECT_EQ(error_of(damaged), ": is damaged, its header's checksum is wrong");
+  damaged = file;
+  damaged.back() = static_cast<char>(damaged.back() ^ 1);
+  EXPECT_EQ(error_of(damaged), ": is damaged, the checksum of part 3 of 3 is wrong");
+
+  Sections sections = UnpackSections(file, "").value();
+  sections["CONF"] = "method = \"tsdf++\"\nvoxel_m = -1.0\n";
+  EXPECT_NE(error_of(PackSections(sections)).find("'voxel_m' is -1"), std::string::npos);
+  sections["CONF"] = "method = \"octree\"\n";
+  EXPECT_NE(error_of(PackSections(sections)).find("method 'octree' is unknown"), std::string::npos);
+  sections["CONF"] = "method = \"tsdf++\"\nwings = 2\n";
+  EXPECT_NE(error_of(PackSections(sections)).find("wings"), std::string::npos);
+  sections["CONF"] = "method = \"tsdf\"\n";
+  EXPECT_EQ(error_of(PackSections(sections)),
+            ": has sections 'LIST VOLS', expected 'FIEL LABL POSE' for a map of method tsdf");
+  sections.erase("CONF");
+  EXPECT_EQ(error_of(PackSections(sections)), ": has no section 'CONF'");
+}
+
+TEST(MapFileErrors, AMissingFileAndAFullDisk) {
+  const TempFolder folder;
+  EXPECT_EQ(LoadMap(folder / "none.map").error().kind, ErrorKind::kData);
+  const auto map = MakeMap(Method::kTsdfpp, ToyConfig());
+  ASSERT_TRUE(WriteFile(folder / "file", "x").has_value());
+  EXPECT_EQ(SaveMap(folder / "file/a.map", *map).error().kind, ErrorKind::kEnvironment);
+  ASSERT_TRUE(SaveMap(folder / "new/a.map", *map).has_value());
+  EXPECT_TRUE(LoadMap(folder / "new/a.map").has_value());
+}
+
+}  // namespace
+}  // namespace tsdfpp

@@ -1,0 +1,205 @@
+// Objects that are renamed, taken out of one map and put into another.
+#include "mapper/map_objects.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "mapper/object_volume.h"
+#include "tests/mapper/compare_maps.h"
+#include "tests/mapper/every_method.h"
+#include "tests/mapper/map_snapshot.h"
+
+namespace tsdfpp {
+namespace {
+
+using reference::MakePose;
+using reference::Scene;
+
+constexpr InstanceId kNew = 7;
+
+bool IsOneField(Method method) { return method == Method::kTsdf || method == Method::kTsdfMin; }
+// Whether values stay in the object's own frame.
+bool IsAnchored(Method method) {
+  return method == Method::kTsdfppAnchored || method == Method::kVolumes;
+}
+
+class MapObjects : public EveryMethodTest {};
+TSDFPP_FOR_EVERY_METHOD(MapObjects);
+
+// The renamed brick goes on moving and being seen under its new name, and the ball goes on as it.
+TEST_P(MapObjects, ARenamedObjectIsTheSameObject) {
+  std::vector<InstanceId> ids = ToyIds();
+  ids.push_back(kNew);
+  SideBySide maps(GetParam(), ToyConfig(), ToyBox(), ids);
+  Scene scene = TableWithToys();
+  const auto frame_as = [&](InstanceId from, InstanceId to, Frame frame) {
+    frame.mask.setTo(to, frame.mask == from);
+    if (frame.T_WO.contains(from)) {
+      frame.T_WO[to] = frame.T_WO.at(from);
+      frame.T_WO.erase(from);
+    }
+    return frame;
+  };
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.T_WO[kBrick].translation().x() += 0.05;
+  maps.SetPosesAndFuse(RenderToys(scene, 0.4));
+  maps.Rename(kBrick, kNew);
+  scene.T_WO[kBrick].translation().x() += 0.03;
+  maps.SetPosesAndFuse(frame_as(kBrick, kNew, RenderToys(scene, 0.6)));
+  maps.Rename(kBall, kBrick);
+  maps.SetObjectPose(kNew, MakePose(0.4, {0.1, 0, 1}, {0.05, 0.03, 0.06}));
+  maps.SetObjectPose(kBrick, MakePose(0.4, {0.1, 0, 1}, {0.05, 0.05, 0.06}));
+  maps.Remove(kNew);
+  maps.Remove(kBrick);
+  maps.CompareWholeBox();
+}
+
+TEST_P(MapObjects, RenamingThereAndBackChangesNothing) {
+  const auto map = DrivenMap(GetParam(), ToyConfig(), 3);
+  const std::string before = SnapshotOf(*map, ToyIds());
+  ASSERT_TRUE(map->Rename(kBrick, kNew).has_value());
+  EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kBackground, kBall, kTray, kNew}));
+  EXPECT_FALSE(SnapshotOf(*map, ToyIds()) == before);
+  ASSERT_TRUE(map->Rename(kNew, kBrick).has_value());
+  EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
+}
+
+TEST_P(MapObjects, WhatCannotBeRenamedOrAddedIsRefused) {
+  const auto map = DrivenMap(GetParam(), ToyConfig(), 1);
+  map->SetObjectPose(9, Pose::Identity());  // never seen
+  const std::string before = SnapshotOf(*map, ToyIds());
+  const auto message = [](const Expected<void>& status) {
+    EXPECT_FALSE(status.has_value());
+    EXPECT_EQ(status.error().kind, ErrorKind::kUsage);
+    return status.error().message;
+  };
+  EXPECT_EQ(message(map->Rename(17, kNew)), "object 17 is not in the map");
+  EXPECT_EQ(message(map->Rename(kBrick, kBall)),
+            "object 2 is in the map already, expected a new id");
+  EXPECT_EQ(message(map->Rename(kBrick, kBrick)),
+            "object 1 is in the map already, expected a new id");
+  EXPECT_EQ(message(map->Rename(kBrick, 9)), "object 9 is in the map already, expected a new id");
+  EXPECT_EQ(message(map->Rename(kBackground, kNew)),
+            "id 0 is the background, expected an object's");
+  EXPECT_EQ(message(map->Rename(kBrick, kNoInstance)),
+            "id 65535 is kept for 'no object', expected an object's");
+  const Pose here = Pose::Identity();
+  EXPECT_EQ(message(map->Add(kBall, {}, here, here)),
+            "object 2 is in the map already, expected a new id");
+  EXPECT_EQ(message(map->Add(kBackground, {}, here, here)),
+            "id 0 is the background, expected an object's");
+  EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
+}
+
+// Out and in again: volumes with a lattice of their own, or none but the world's, are what they
+// were.
+TEST_P(MapObjects, AnObjectThatIsAddedHasTheVolumeThatItWasGiven) {
+  const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
+  const TsdfGrid volume = CopyVolume(*map, kBrick);
+  const Pose T_WL = map->ObjectLattice(kBrick);
+  EXPECT_EQ(SameNumbers(T_WL, Pose::Identity()), !IsAnchored(GetParam()));
+  const auto before = map->Clone();
+  map->Remove(kBrick);
+  const Pose T_WO = DriveFrame(1).T_WO.at(kBrick);
+  ASSERT_TRUE(map->Add(kNew, volume, T_WL, T_WO).has_value());
+  EXPECT_EQ(map->FindFault(), std::nullopt);
+  std::size_t compared = 0;
+  for (const auto& v : before->ObservedVoxels(kBrick)) {
+    const auto expected = before->ValueAt(kBrick, v);
+    // One field takes what is at most a voxel in front, as in a move.
+    if (IsOneField(GetParam()) && expected->distance_m > ToyConfig().voxel()) continue;
+    ASSERT_TRUE(SameValue(map->ValueAt(kNew, v), expected)) << Text(v);
+    ++compared;
+  }
+  EXPECT_GT(compared, 150U);
+  if (!IsOneField(GetParam())) {
+    EXPECT_TRUE(SameVoxels(map->ObservedVoxels(kNew), before->ObservedVoxels(kBrick)));
+  }
+  if (IsAnchored(GetParam())) {
+    // The product of the poses is rounded.
+    EXPECT_LT((map->ObjectLattice(kNew).matrix() - T_WL.matrix()).cwiseAbs().maxCoeff(), 1e-14);
+  } else if (!IsOneField(GetParam())) {
+    for (const auto& v : map->ListedVoxels()) {
+      const auto list = map->ListAt(v);
+      for (std::size_t i = 0; i < list.size(); ++i) {
+        if (list[i].id != kNew) continue;
+        ASSERT_EQ(i, 0U) << Text(v) << Text(list);
+        ASSERT_EQ(list[i].confidence, ToyConfig().moved_confidence);
+      }
+    }
+  }
+  // It is an object like the others: it moves by its pose, and can be saved, seen and removed.
+  map->SetObjectPose(kNew, T_WO);
+  map->SetObjectPose(kNew, MakePose(0, Eigen::Vector3d::UnitZ(), {0.0, 0.0, 0.1}) * T_WO);
+  EXPECT_EQ(map->FindFault(), std::nullopt);
+  EXPECT_FALSE(map->ObjectMesh(kNew).triangles.empty());
+  map->Remove(kNew);
+  EXPECT_EQ(map->FindFault(), std::nullopt);
+}
+
+// Into an empty map of each method, from an anchored one that has turned the object.
+TEST_P(MapObjects, AnObjectComesFromAnotherMapAtItsPlace) {
+  const auto other = DrivenMap(Method::kTsdfppAnchored, ToyConfig(), 4);
+  const auto map = MakeMap(GetParam(), ToyConfig());
+  const Pose T_WL = other->ObjectLattice(kBrick);
+  ASSERT_FALSE(SameNumbers(T_WL, Pose::Identity()));
+  ASSERT_TRUE(map->Add(kNew, *other->GridOf(kBrick), T_WL, DriveFrame(3).T_WO.at(kBrick)));
+  EXPECT_EQ(map->FindFault(), std::nullopt);
+  EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kNew}));
+  const TriangleMesh mesh = map->ObjectMesh(kNew);
+  const TriangleMesh expected = other->ObjectMesh(kBrick);
+  // Resampling erodes a surface at its rim (the reference tests say exactly how) and rounds edges.
+  EXPECT_GT(mesh.triangles.size(), expected.triangles.size() / 4);
+  for (const Eigen::Vector3f& p : mesh.vertices) {
+    float nearest = 1;
+    for (const Eigen::Vector3f& e : expected.vertices) nearest = std::min(nearest, (p - e).norm());
+    ASSERT_LT(nearest, static_cast<float>(kToyVoxel_m));
+  }
+}
+
+// Renames among the other events, at random, against the reference.
+class RandomRenames : public ::testing::TestWithParam<std::tuple<Method, int>> {};
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomRenames,
+                         ::testing::Combine(::testing::ValuesIn(AllMethods()),
+                                            ::testing::Range(0, 4)));
+
+TEST_P(RandomRenames, EveryEventLeavesTheSameVoxels) {
+  const auto [method, seed] = GetParam();
+  Dice dice(static_cast<std::uint64_t>(seed) + 100);
+  std::vector<InstanceId> ids = ToyIds();
+  for (const InstanceId id : {4, 5, 6}) ids.push_back(id);
+  SideBySide maps(method, ToyConfig(), ToyBox(), ids);
+  Scene scene = TableWithToys();
+  std::map<InstanceId, InstanceId> name{{kBrick, kBrick}, {kBall, kBall}, {kTray, kTray}};
+  std::map<InstanceId, InstanceId> other{{kBrick, 4}, {kBall, 5}, {kTray, 6}};
+  for (int event = 0; event < 8 && !HasFailure(); ++event) {
+    const auto toy = static_cast<InstanceId>(1 + dice.Whole(3));
+    const bool is_known = event > 0;
+    switch (is_known ? dice.Whole(4) : 3) {
+      case 0:
+        maps.Rename(name[toy], other[toy]);
+        std::swap(name[toy], other[toy]);
+        break;
+      case 1:
+        scene.T_WO[toy].translation() +=
+            Eigen::Vector3d(dice.Uniform(-0.03, 0.03), dice.Uniform(-0.03, 0.03), 0);
+        maps.SetObjectPose(name[toy], scene.T_WO[toy]);
+        break;
+      default: {
+        const Frame seen = RenderToys(scene, dice.Uniform(0, 6.28));
+        Frame frame = seen;
+        frame.mask = seen.mask.clone();
+        frame.T_WO.clear();
+        for (const auto& [from, to] : name) {
+          frame.mask.setTo(to, seen.mask == from);
+          frame.T_WO[to] = seen.T_WO.at(from);
+        }
+        maps.SetPosesAndFuse(frame);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp
