@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "bench/figures.h"
 #include "bench/mesh.h"
 #include "bench/rays.h"
 #include "bench/render.h"
@@ -88,6 +89,16 @@ void AddMesh(CLI::App& app, Chosen& chosen) {
   grid->callback([=, &chosen] { chosen = [=] { return RunVoxelBlockGrid(*options); }; });
 }
 
+void AddFigures(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<FigureOptions>();
+  CLI::App* command = app.add_subcommand("figures", "What docs/map-figures.md shows, as CSV");
+  command->add_option("--out", options->out, "Output folder")->capture_default_str();
+  command->add_option("--parts", options->parts, "Some of them")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->callback([=, &chosen] { chosen = [=] { return RunFigures(*options); }; });
+}
+
 }  // namespace
 }  // namespace tsdfpp
 
@@ -109,6 +120,7 @@ int main(int argc, char** argv) {
   tsdfpp::AddRender(app, chosen);
   tsdfpp::AddRays(app, chosen);
   tsdfpp::AddMesh(app, chosen);
+  tsdfpp::AddFigures(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {
         return command->get_name() == argv[1];

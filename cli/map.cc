@@ -95,14 +95,14 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
   const PipelineConfig& config = start.config;
   Pipeline& pipeline = *start.pipeline;
   TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
-  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
-
-  RunTimes times;
   const int frames = start.last - start.first + 1;
   if (options.views > 0 && frames == 0) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
                       options.views);
   }
+  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
+
+  RunTimes times;
   Pose T_WC = Pose::Identity();  // of the last frame
   {
     ProgressBar bar("map");
@@ -195,7 +195,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--views", options->views,
                  "Surfaces along each ray of the last camera to write as pictures: 1 is what is "
                  "visible, 2 adds what is behind it")
-      ->check(CLI::Range(0, kMaxLayers));
+      ->check(WholeBetween(0, kMaxLayers));
   app.add_option(
       "--load", options->load,
       "Begin with the map in this file: with a sequence, go on after the map's last frame; "

@@ -334,10 +334,10 @@ Run AddMetricPanoptic(CLI::App& app) {
   app.add_option("--encoding", options->encoding,
                  "class-instance: class x divisor + instance, class 0 void; objects: an id an "
                  "object, 0 the background; coco: RGB ids and JSON, as panopticapi")
-      ->check(CLI::IsMember({"class-instance", "objects", "coco"}))
+      ->check(OneOf({"class-instance", "objects", "coco"}))
       ->capture_default_str();
   app.add_option("--divisor", options->divisor, "Of class-instance")
-      ->check(CLI::Range(1, 1 << kInstanceBits))
+      ->check(WholeBetween(1, 1 << kInstanceBits))
       ->capture_default_str();
   app.add_option("--things", options->things,
                  "Of class-instance: the classes that have instances, by commas; adds their mean "

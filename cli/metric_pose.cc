@@ -199,7 +199,7 @@ Run AddMetricPose(CLI::App& app) {
       ->check(AboveZero())
       ->capture_default_str();
   app.add_option("--points", options->most_points, "Most points of the model; 0 for all")
-      ->check(CLI::Range(0, 1'000'000))
+      ->check(WholeBetween(0, 1'000'000))
       ->capture_default_str();
   app.add_option("--symmetry", options->symmetries,
                  "Turns of the model that change nothing, for MSSD and MSPD: AXIS:DEGREES,...");

@@ -140,7 +140,7 @@ Run AddMetricSurface(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--max-samples", options->config.max_samples,
                  "Most samples of a mesh: the density falls until it holds")
-      ->check(CLI::Range(1, 100'000'000))
+      ->check(WholeBetween(1, 100'000'000))
       ->capture_default_str();
   app.add_option("--seed", options->config.seed, "Of the samples")->capture_default_str();
   return [options, scale, truth_scale] {

@@ -140,7 +140,7 @@ Run AddMetricTrajectory(CLI::App& app) {
   app.add_option("EST", options->estimate, "Estimated trajectory, the same")->required();
   app.add_option("--align", options->align,
                  "Before APE, fit the estimate to the truth: none, se3 (turn, move), sim3 (scale)")
-      ->check(CLI::IsMember({"none", "se3", "sim3"}))
+      ->check(OneOf({"none", "se3", "sim3"}))
       ->capture_default_str();
   app.add_option("--delta", options->deltas,
                  "Stretches of RPE, by commas: frames 10f, metres 0.1m, seconds 1s (TUM's rule)")

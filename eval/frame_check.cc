@@ -16,7 +16,7 @@ constexpr double kUnitTolerance = 0.01;
 
 // Where an edge runs through a pixel, the renderer's grid for vertices (1/256 pixel) may show a
 // surface just beyond its end: a point off its model by that shift, stretched by the incidence. A
-// tenth of a pixel is the shift seen at 88 degrees; a pixel is as wide as its distance.
+// tenth of a pixel is that shift at an incidence of 88 degrees; a pixel's width is z / f.
 constexpr double kEdgeReach_m = 1e-3;
 constexpr double kEdgeReach_px = 0.1;
 // It is rare (four pixels of 480 frames of the room), so many at once are a fault.

@@ -155,8 +155,8 @@ void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
   const std::vector<Index3> left = Unlist(id);
-  volume.grid =
-      ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m, config_.back());
+  volume.grid = ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m,
+                             config_.back(), config_.resampling);
   Activate(id);
   FreeEmptyLists(left);
   CheckInDebugBuilds(*this);

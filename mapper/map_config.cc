@@ -50,6 +50,17 @@ Expected<Method> MethodFromName(std::string_view name) {
   return UsageError("method '{}' is unknown, expected one of {}", name, known);
 }
 
+std::string_view ResamplingName(Resampling resampling) {
+  return resampling == Resampling::kAll ? "all" : "observed";
+}
+
+Expected<Resampling> ResamplingFromName(std::string_view name) {
+  for (const Resampling resampling : {Resampling::kAll, Resampling::kObserved}) {
+    if (name == ResamplingName(resampling)) return resampling;
+  }
+  return UsageError("resampling '{}' is unknown, expected all or observed", name);
+}
+
 Expected<void> MapConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("voxel_m", voxel_m, 0.0005, 1.0));
   TSDFPP_RETURN_IF_ERROR(InRange("trunc_front_voxels", trunc_front_voxels, 1, 100));
@@ -57,7 +68,7 @@ Expected<void> MapConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("layers", layers, 0, kMaxLayers));
   TSDFPP_RETURN_IF_ERROR(InRange("weight_cap", weight_cap, 1, 60000));
   TSDFPP_RETURN_IF_ERROR(InRange("confidence_cap", confidence_cap, 1, 10000));
-  TSDFPP_RETURN_IF_ERROR(InRange("moved_confidence", moved_confidence, 1, 10000));
+  TSDFPP_RETURN_IF_ERROR(InRange("moved_confidence", moved_confidence, 1, confidence_cap));
   return {};
 }
 
@@ -72,6 +83,7 @@ Expected<void> MapConfig::SetProfile(std::string_view profile) {
 
 Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::string& where) {
   MapConfig config;
+  std::string resampling(ResamplingName(config.resampling));
   TomlReader reader(table, where);
   reader.Get("voxel_m", config.voxel_m)
       .Get("trunc_front_voxels", config.trunc_front_voxels)
@@ -81,8 +93,12 @@ Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::str
       .Get("confidence_cap", config.confidence_cap)
       .Get("moved_confidence", config.moved_confidence)
       .Get("contradiction", config.contradiction)
-      .Get("relist_on_removal", config.relist_on_removal);
+      .Get("relist_on_removal", config.relist_on_removal)
+      .Get("resampling", resampling);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
+  const Expected<Resampling> named = ResamplingFromName(resampling);
+  if (!named) return UsageError("{}: {}", where, named.error().message);
+  config.resampling = *named;
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
   }
@@ -98,7 +114,8 @@ toml::table MapConfig::ToToml() const {
                      {"confidence_cap", confidence_cap},
                      {"moved_confidence", moved_confidence},
                      {"contradiction", contradiction},
-                     {"relist_on_removal", relist_on_removal}};
+                     {"relist_on_removal", relist_on_removal},
+                     {"resampling", ResamplingName(resampling)}};
 }
 
 int LayersOf(Method method, const MapConfig& config) {

@@ -22,6 +22,17 @@ Expected<Method> MethodFromName(std::string_view name);
 // (docs/map.md).
 inline constexpr double kColourBand_voxels = 2;
 
+// Which neighbours of its source point a moved voxel needs (docs/map.md, "Resampling").
+enum class Resampling {
+  kAll,       // all eight observed
+  kObserved,  // the nearest one; the mean is taken over those that are observed
+};
+
+// "all", "observed".
+std::string_view ResamplingName(Resampling resampling);
+// Errors: kUsage.
+Expected<Resampling> ResamplingFromName(std::string_view name);
+
 struct MapConfig {
   double voxel_m = 0.01;
   double trunc_front_voxels = 10;  // F / h
@@ -29,9 +40,10 @@ struct MapConfig {
   int layers = 0;                  // K; 0 is the method's own default (LayersOf)
   int weight_cap = 50;             // observations after which a voxel forgets (docs/map.md)
   int confidence_cap = 10;         // votes at which a listing saturates
-  int moved_confidence = 1;        // of an object in a voxel that it was moved to
+  int moved_confidence = 1;        // of an object in a voxel that it was moved to; up to the cap
   bool contradiction = true;  // tsdf++ and anchored: pixels of others clear what o wrongly claims
   bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped
+  Resampling resampling = Resampling::kAll;  // of the methods that move values
 
   float voxel() const { return static_cast<float>(voxel_m); }
   float front() const { return static_cast<float>(trunc_front_voxels * voxel_m); }

@@ -38,7 +38,7 @@ Expected<void> CheckRename(InstanceId from, bool from_is_known, InstanceId to, b
 
 TsdfGrid InWorldLattice(const TsdfGrid& volume, const Pose& T_WL, const MapConfig& config) {
   if (!SameNumbers(T_WL, Pose::Identity())) {
-    return ResampleGrid(volume, T_WL, config.voxel_m, config.back());
+    return ResampleGrid(volume, T_WL, config.voxel_m, config.back(), config.resampling);
   }
   TsdfGrid copy = volume;
   for (const auto& entry : copy.entries()) entry.block->UpdateMasks(config.back());

@@ -137,6 +137,20 @@ bool InCrossedCube(const PatchBits& crossed, const PulledPoints& points, std::si
   return false;
 }
 
+bool AllEight(const PatchBits& bits, std::int32_t place) {
+  const auto z = At(place >> 8);
+  const auto y = At((place >> 4) & 15);
+  const std::uint32_t all =
+      bits[z][y] & bits[z][y + 1] & bits[z + 1][y] & static_cast<std::uint32_t>(bits[z + 1][y + 1]);
+  return (all >> static_cast<unsigned>(place & 15) & 3U) == 3U;
+}
+
+// The patch's place of the corner nearest to point i.
+std::int32_t NearestCorner(const PulledPoints& points, std::size_t i) {
+  const auto upper = [&](std::size_t axis) { return points.fraction[axis][i] >= 0.5F ? 1 : 0; };
+  return points.corner[i] + 256 * upper(2) + 16 * upper(1) + upper(0);
+}
+
 PulledPoints PointsOf(const std::array<double, 12>& T, double voxel_m, const Index3& block) {
   PulledPoints points;
   PullBackPoints(T, voxel_m, {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide},
@@ -190,21 +204,20 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
 }
 
 bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_inverse,
-                   double voxel_m, const Index3& index, TsdfBlock& out) {
+                   double voxel_m, const Index3& index, TsdfBlock& out, Resampling resampling) {
   const PulledPoints points = PointsOf(T_inverse, voxel_m, index);
   const PatchBlocks blocks(reader, points);
   if (!blocks.any()) return false;
   const PatchBits observed = blocks.Bits(&TsdfBlock::observed);
+  const bool all_count = resampling == Resampling::kAll;
+  const auto interpolate = all_count ? InterpolateAll : InterpolateObserved;
   Lanes wanted;
   bool any = false;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    const std::int32_t place = points.corner[i];
-    const auto z = At(place >> 8);
-    const auto y = At((place >> 4) & 15);
-    const std::uint32_t all = observed[z][y] & observed[z][y + 1] & observed[z + 1][y] &
-                              static_cast<std::uint32_t>(observed[z + 1][y + 1]);
-    wanted[i] = (all >> static_cast<unsigned>(place & 15) & 3U) == 3U ? -1 : 0;
-    any = any || wanted[i] != 0;
+    const bool written = all_count ? AllEight(observed, points.corner[i])
+                                   : BitAt(observed, NearestCorner(points, i));
+    wanted[i] = written ? -1 : 0;
+    any = any || written;
   }
   if (!any) return false;
   const auto keep_wanted = [&](auto& values) {
@@ -212,16 +225,16 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
   };
   PatchValues values;
   blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.distance[i]; }, values);
-  InterpolateAll(values, points, wanted.data(), out.distance.data());
+  interpolate(values, points, wanted.data(), out.distance.data());
   blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.weight[i]; }, values);
-  InterpolateAll(values, points, wanted.data(), out.weight.data());
+  interpolate(values, points, wanted.data(), out.weight.data());
   PatchValues counts;
   blocks.Fill([](const TsdfBlock& block,
                  std::size_t i) { return static_cast<float>(block.colour_count[i]); },
               counts);
   std::array<float, kBlockVoxels> count{};
   std::array<float, kBlockVoxels> total{};
-  InterpolateAll(counts, points, wanted.data(), count.data());
+  interpolate(counts, points, wanted.data(), count.data());
   std::array<PatchValues, 3> channels;
   for (std::size_t channel = 0; channel < 3; ++channel) {
     blocks.Fill([channel](const TsdfBlock& block,
@@ -241,7 +254,8 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
   return true;
 }
 
-TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back) {
+TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back,
+                      Resampling resampling) {
   const VoxelReader reader(grid);
   const std::vector<Index3> candidates = BlocksTouchedBy(reader, T_rel, voxel_m);
   std::vector<std::unique_ptr<TsdfBlock>> made(candidates.size());
@@ -251,7 +265,9 @@ TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, f
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           auto block = std::make_unique<TsdfBlock>();
-          if (!ResampleBlock(reader, T_inverse, voxel_m, candidates[i], *block)) continue;
+          if (!ResampleBlock(reader, T_inverse, voxel_m, candidates[i], *block, resampling)) {
+            continue;
+          }
           block->UpdateMasks(back);
           made[i] = std::move(block);
         }

@@ -2,6 +2,7 @@
 // values are when the volume moves there (docs/map.md, "Cover" and "Move"; paper III-E).
 #pragma once
 
+#include "mapper/map_config.h"
 #include "mapper/object_volume.h"
 #include "mapper/pull_back_kernels.h"
 
@@ -20,13 +21,15 @@ struct PulledCover {
 bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW, double voxel_m,
                   float back, const Index3& index, PulledCover& out);
 
-// The values at the voxels of the block `index`, unobserved where one of the eight neighbours is;
-// masks are not set. False where no voxel is observed.
+// The values at the voxels of the block `index`, unobserved where one of the eight neighbours is
+// (or, by `resampling`, the nearest one); masks are not set. False where no voxel is observed.
 bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_inverse,
-                   double voxel_m, const Index3& index, TsdfBlock& out);
+                   double voxel_m, const Index3& index, TsdfBlock& out,
+                   Resampling resampling = Resampling::kAll);
 
 // Moves the values of a volume by T_rel (paper III-E): the new grid, masks up to date but for
 // `cover`.
-TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back);
+TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back,
+                      Resampling resampling = Resampling::kAll);
 
 }  // namespace tsdfpp

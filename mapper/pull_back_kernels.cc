@@ -129,6 +129,45 @@ void All(const PatchValues& values, const PulledPoints& points, const std::int32
   Interpolate<false>(values, points, wanted, out);
 }
 
+// The product of the distances to the opposite faces of the cube.
+template <class D, class V>
+V Coefficient(D d, std::size_t corner, const std::array<V, 3>& upper) {
+  V coefficient = hn::Set(d, 1.0F);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const bool is_upper = ((corner >> axis) & 1U) != 0;
+    coefficient =
+        hn::Mul(coefficient, is_upper ? upper[axis] : hn::Sub(hn::Set(d, 1.0F), upper[axis]));
+  }
+  return coefficient;
+}
+
+void Observed(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+              float* out) {
+  const hn::ScalableTag<float> df;
+  const hn::RebindToSigned<decltype(df)> di;
+  using V = hn::VFromD<decltype(df)>;
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
+    const auto at = hn::LoadU(di, &points.corner[i]);
+    std::array<V, 3> upper;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      upper[axis] = hn::LoadU(df, &points.fraction[axis][i]);
+    }
+    std::array<V, 8> c;
+    V total = hn::Zero(df);
+    V sum = hn::Zero(df);
+    for (std::size_t k = 0; k < 8; ++k) {
+      c[k] = hn::GatherIndex(df, values.data() + kCorner[k], at);
+      const auto observed = hn::Eq(c[k], c[k]);
+      const V coefficient = hn::IfThenElseZero(observed, Coefficient(df, k, upper));
+      total = hn::Add(total, coefficient);
+      sum = hn::Add(sum, hn::Mul(coefficient, hn::IfThenElseZero(observed, c[k])));
+    }
+    const V all = Trilinear8(df, c, upper[0], upper[1], upper[2]);
+    hn::StoreU(hn::IfThenElse(hn::Eq(all, all), all, hn::Div(sum, total)), df, out + i);
+  }
+}
+
 void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
              const PulledPoints& points, const std::int32_t* wanted,
              const std::array<std::uint16_t*, 3>& out, float* totals) {
@@ -137,7 +176,6 @@ void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& coun
   const hn::Rebind<std::uint16_t, decltype(df)> du;
   using V = hn::VFromD<decltype(df)>;
   const V zero = hn::Zero(df);
-  const V one = hn::Set(df, 1.0F);
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
     if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
     const auto at = hn::LoadU(di, &points.corner[i]);
@@ -148,17 +186,14 @@ void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& coun
     V total = zero;
     std::array<V, 3> sum{zero, zero, zero};
     for (std::size_t k = 0; k < 8; ++k) {
-      V coefficient = one;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const bool is_upper = ((k >> axis) & 1U) != 0;
-        coefficient = hn::Mul(coefficient, is_upper ? upper[axis] : hn::Sub(one, upper[axis]));
-      }
-      const V coloured = hn::GatherIndex(df, count.data() + kCorner[k], at);
-      coefficient = hn::IfThenElseZero(hn::Gt(coloured, zero), coefficient);
+      // Unobserved corners are NaN, in every channel.
+      const auto coloured = hn::Gt(hn::GatherIndex(df, count.data() + kCorner[k], at), zero);
+      const V coefficient = hn::IfThenElseZero(coloured, Coefficient(df, k, upper));
       total = hn::Add(total, coefficient);
       for (std::size_t channel = 0; channel < 3; ++channel) {
         const V level = hn::GatherIndex(df, channels[channel].data() + kCorner[k], at);
-        sum[channel] = hn::Add(sum[channel], hn::Mul(coefficient, level));
+        sum[channel] =
+            hn::Add(sum[channel], hn::Mul(coefficient, hn::IfThenElseZero(coloured, level)));
       }
     }
     hn::StoreU(total, df, totals + i);
@@ -181,6 +216,7 @@ namespace tsdfpp {
 HWY_EXPORT(Points);
 HWY_EXPORT(Counted);
 HWY_EXPORT(All);
+HWY_EXPORT(Observed);
 HWY_EXPORT(Colours);
 
 void PullBackPoints(const std::array<double, 12>& T, double voxel_m, const Index3& first,
@@ -196,6 +232,11 @@ void InterpolateCounted(const PatchValues& values, const PulledPoints& points,
 void InterpolateAll(const PatchValues& values, const PulledPoints& points,
                     const std::int32_t* wanted, float* out) {
   HWY_DYNAMIC_DISPATCH(All)(values, points, wanted, out);
+}
+
+void InterpolateObserved(const PatchValues& values, const PulledPoints& points,
+                         const std::int32_t* wanted, float* out) {
+  HWY_DYNAMIC_DISPATCH(Observed)(values, points, wanted, out);
 }
 
 void InterpolateColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,

@@ -37,6 +37,11 @@ void InterpolateCounted(const PatchValues& values, const PulledPoints& points,
 void InterpolateAll(const PatchValues& values, const PulledPoints& points,
                     const std::int32_t* wanted, float* out);
 
+// The same over the corners that are not NaN, whose coefficients are made to sum to 1; where none
+// is NaN, as InterpolateAll.
+void InterpolateObserved(const PatchValues& values, const PulledPoints& points,
+                         const std::int32_t* wanted, float* out);
+
 // Means of three channels over the corners with `count` > 0, weighted by the trilinear
 // coefficients, rounded; and the sum of these coefficients (0: no colour at all).
 void InterpolateColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,

@@ -156,7 +156,8 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           auto block = std::make_unique<TsdfBlock>();
-          if (ResampleBlock(reader, T_inverse_rows, config_.voxel_m, touched[i], *block)) {
+          if (ResampleBlock(reader, T_inverse_rows, config_.voxel_m, touched[i], *block,
+                            config_.resampling)) {
             arrivals[i] = std::move(block);
           }
         }
@@ -165,10 +166,12 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   const auto confidence_at = [&](const Index3& v) {
     const Eigen::Vector3d q =
         T_inverse * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
-    const Index3 nearest{static_cast<int>(std::floor(q.x() + 0.5)),
-                         static_cast<int>(std::floor(q.y() + 0.5)),
-                         static_cast<int>(std::floor(q.z() + 0.5))};
-    return source_labels.Find(BlockOf(nearest))->confidence[At(PlaceInBlock(nearest))];
+    const auto nearest = [](double x) {  // as ResampleBlock takes it
+      return static_cast<int>(std::floor(x)) +
+             (static_cast<float>(x - std::floor(x)) >= 0.5F ? 1 : 0);
+    };
+    const Index3 from{nearest(q.x()), nearest(q.y()), nearest(q.z())};
+    return source_labels.Find(BlockOf(from))->confidence[At(PlaceInBlock(from))];
   };
   for (std::size_t b = 0; b < touched.size(); ++b) {
     if (arrivals[b] == nullptr) continue;

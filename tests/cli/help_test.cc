@@ -131,6 +131,15 @@ TEST(CommandMap, GoesOnFromAFileAsIfItHadNotStopped) {
   const std::string bytes = ReadFile(folder / "whole.map").value();
   EXPECT_TRUE(ReadFile(folder / "both.map").value() == bytes);
   EXPECT_TRUE(ReadFile(folder / "again.map").value() == bytes);
+
+  // Without a sequence there is no camera.
+  const CommandOutput refused =
+      RunTsdfpp({"map", "--load", folder / "both.map", "--views", "2", "--out", folder / "none"},
+                folder.path());
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.err,
+            "tsdfpp: --views 2 needs a camera: name the sequence and map a frame of it\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "none"));
 }
 
 TEST(CommandMap, WritesGltfWithANodeAnObject) {

@@ -130,10 +130,21 @@ TEST(Sentences, HelpReadsWell) {
   const test::TempFolder folder;
   const std::string help = RunTsdfpp({"generate", "--help"}, folder.path()).out;
   EXPECT_NE(help.find("--no-antialias  "), std::string::npos) << help;
-  for (const char* command : {"generate", "verify", "export", "map", "compare"}) {
-    const std::string text = RunTsdfpp({command, "--help"}, folder.path()).out;
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"generate"},
+                                             {"verify"},
+                                             {"export"},
+                                             {"map"},
+                                             {"compare"},
+                                             {"metric", "trajectory"},
+                                             {"metric", "surface"},
+                                             {"metric", "panoptic"},
+                                             {"metric", "pose"}}) {
+    std::vector<std::string> words = command;
+    words.emplace_back("--help");
+    const std::string text = RunTsdfpp(words, folder.path()).out;
     for (const char* odd : {"{false}", "{true}", " in [", "INT:INT", "FLOAT:FLOAT"}) {
-      EXPECT_EQ(text.find(odd), std::string::npos) << command << ": " << odd;
+      EXPECT_EQ(text.find(odd), std::string::npos) << command.back() << ": " << odd;
     }
   }
 }

@@ -71,9 +71,11 @@ TEST(MapConfigTest, EachBadFieldIsNamedWithItsValue) {
       {"trunc_back_voxels", "-3", [](MapConfig& c) { c.trunc_back_voxels = -3; }},
       {"trunc_back_voxels", "nan", [nan](MapConfig& c) { c.trunc_back_voxels = nan; }},
       {"layers", "-1", [](MapConfig& c) { c.layers = -1; }},
+      {"layers", "9", [](MapConfig& c) { c.layers = 9; }},
       {"weight_cap", "0", [](MapConfig& c) { c.weight_cap = 0; }},
       {"confidence_cap", "0", [](MapConfig& c) { c.confidence_cap = 0; }},
       {"moved_confidence", "-2", [](MapConfig& c) { c.moved_confidence = -2; }},
+      {"moved_confidence", "11", [](MapConfig& c) { c.moved_confidence = c.confidence_cap + 1; }},
   };
   for (const Case& bad : cases) {
     MapConfig config;
@@ -96,10 +98,19 @@ TEST(MapConfigTest, TomlRoundTrip) {
   config.moved_confidence = 4;
   config.contradiction = false;
   config.relist_on_removal = true;
+  config.resampling = Resampling::kObserved;
   ASSERT_TRUE(config.Validate().has_value());
   const auto again = MapConfig::FromToml(config.ToToml(), "memory");
   ASSERT_TRUE(again.has_value()) << again.error().message;
   EXPECT_EQ(*again, config);
+}
+
+TEST(MapConfigTest, LayersGoUpToEight) {
+  for (int layers = 0; layers <= 8; ++layers) {
+    MapConfig config;
+    config.layers = layers;
+    EXPECT_TRUE(config.Validate().has_value()) << layers;
+  }
 }
 
 TEST(MapConfigTest, AbsentKeysKeepTheirDefaults) {
@@ -121,6 +132,9 @@ TEST(MapConfigTest, TomlFaultsNameFileAndKey) {
       {"weight_cap", toml::table{{"weight_cap", 1.5}}},  // not a whole number
       {"voxel_m", toml::table{{"voxel_m", -1.0}}},       // invalid
       {"confidence_cap", toml::table{{"confidence_cap", 0}}},
+      {"layers", toml::table{{"layers", 9}}},
+      {"resampling", toml::table{{"resampling", "some"}}},
+      {"resampling", toml::table{{"resampling", true}}},
   };
   for (const Case& bad : cases) {
     const auto config = MapConfig::FromToml(bad.table, "my-map.toml");

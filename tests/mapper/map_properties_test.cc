@@ -216,6 +216,50 @@ TEST(AnchoredProperties, TheIndexDependsOnPosesAndNotOnTheirPath) {
   EXPECT_TRUE(SnapshotOf(*walked, ToyIds()) == SnapshotOf(*still, ToyIds()));
 }
 
+// Ten thousand small steps of two toys, the index asked for now and then; the last one ends at the
+// same numbers as the one direct move.
+TEST(AnchoredProperties, TenThousandSmallMovesLeaveTheIndexOfOneMove) {
+  constexpr int kMoves = 10000;
+  constexpr int kMovesBetweenQueries = 997;
+  const auto walked = MappedToys(Method::kTsdfppAnchored, ToyConfig(), 3);
+  const auto direct = walked->Clone();
+  const auto still = walked->Clone();
+  Scene scene = TableWithToys();
+  Dice dice(11);
+  for (int i = 0; i < kMoves; ++i) {
+    const InstanceId id = i % 2 == 0 ? kBrick : kBall;
+    Pose& T_WO = scene.T_WO.at(id);
+    // Up to 0.2 voxels and half a degree; each is drawn to where neither was before, so that what
+    // it leaves behind in the index is nobody else's to clear.
+    const Eigen::Vector3d to_end =
+        Eigen::Vector3d(0.3, id == kBrick ? 0.25 : -0.25, T_WO.translation().z()) -
+        T_WO.translation();
+    T_WO.translation() +=
+        0.01 * to_end + Eigen::Vector3d(dice.Uniform(-0.004, 0.004), dice.Uniform(-0.004, 0.004),
+                                        dice.Uniform(-0.001, 0.001));
+    T_WO.linear() = (Eigen::AngleAxisd(dice.Uniform(-0.009, 0.009), Eigen::Vector3d::UnitZ()) *
+                     Eigen::Quaterniond(T_WO.linear()).normalized())
+                        .toRotationMatrix();
+    walked->SetObjectPose(id, T_WO);
+    if (i % kMovesBetweenQueries == 0) {
+      ASSERT_FALSE(walked->ListedVoxels().empty());
+    }
+  }
+  for (const InstanceId id : {kBrick, kBall}) {
+    direct->SetObjectPose(id, scene.T_WO.at(id));
+    EXPECT_EQ(walked->ObjectLattice(id).matrix(), direct->ObjectLattice(id).matrix());
+  }
+  EXPECT_TRUE(SameLists(*walked, *direct));
+  EXPECT_FALSE(SameLists(*walked, *still)) << "nothing was moved";
+  EXPECT_TRUE(SnapshotOf(*walked, ToyIds()) == SnapshotOf(*direct, ToyIds()));
+  std::string walked_scene;
+  std::string direct_scene;
+  AppendMesh(walked->SceneMesh(), walked_scene);
+  AppendMesh(direct->SceneMesh(), direct_scene);
+  EXPECT_GT(walked_scene.size(), 20000U);
+  EXPECT_TRUE(walked_scene == direct_scene);
+}
+
 TEST(TsdfppProperties, OnAStaticSceneItsVolumesAreAnchoreds) {
   MapConfig config = ToyConfig();
   config.layers = 4;
@@ -260,6 +304,25 @@ TEST(TsdfppProperties, MovesErodeVolumesButNotAnchoredOnes) {
     last = now;
   }
   EXPECT_LT(last, at_first * 3 / 4);
+}
+
+// Where all neighbours are observed the two ways to resample are one; the other adds the rim.
+TEST(TsdfppProperties, ObservedResamplingKeepsTheRimAndTheSameInside) {
+  MapConfig config = ToyConfig();
+  const auto all = MappedToys(Method::kTsdfpp, config, 3);
+  config.resampling = Resampling::kObserved;
+  const auto observed = MappedToys(Method::kTsdfpp, config, 3);
+  const std::size_t at_first = all->ObservedVoxels(kBrick).size();
+  const Pose pose = MakePose(0.45, Eigen::Vector3d::UnitZ(), {-0.13, 0.04, kTableTop_m + 0.045});
+  all->SetObjectPose(kBrick, pose);
+  observed->SetObjectPose(kBrick, pose);
+  for (const auto& v : all->ObservedVoxels(kBrick)) {
+    ASSERT_TRUE(SameValue(observed->ValueAt(kBrick, v), all->ValueAt(kBrick, v))) << Text(v);
+  }
+  // A tenth: rounding gives and takes at the rim alike, so that the volume stays about as large.
+  EXPECT_LT(all->ObservedVoxels(kBrick).size(), at_first * 9 / 10);
+  EXPECT_GT(observed->ObservedVoxels(kBrick).size(), at_first * 9 / 10);
+  EXPECT_LT(observed->ObservedVoxels(kBrick).size(), at_first * 11 / 10);
 }
 
 // The table is mapped bare, then the tray, flat enough for its band to reach through to the table,

@@ -208,6 +208,22 @@ TEST_P(ReferenceTest, InvalidDepthAndNoLabel) {
   maps.CompareWholeBox();
 }
 
+// Moves and turns of one voxel and half a voxel too, where the nearest neighbour is a tie.
+TEST_P(ReferenceTest, ResamplingFromTheObservedNeighbours) {
+  MapConfig observed = config();
+  observed.resampling = Resampling::kObserved;
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin(observed);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.T_WO[kBrick].translation() += Eigen::Vector3d(kToyVoxel_m / 2, kToyVoxel_m, 0);
+  maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
+  scene.T_WO[kBall] = MakePose(0.7, {0.2, 0.1, 1}, {0.10, -0.06, kTableTop_m + 0.06});
+  maps.SetPosesAndFuse(RenderToys(scene, 0.8));
+  scene.T_WO[kBrick] = MakePose(0.9, Eigen::Vector3d::UnitZ(), {0.08, 0.09, kTableTop_m + 0.03});
+  maps.SetPosesAndFuse(RenderToys(scene, 1.2));
+  maps.CompareWholeBox();
+}
+
 TEST_P(ReferenceTest, WithoutContradiction) {
   MapConfig trusting = config();
   trusting.contradiction = false;
@@ -216,87 +232,6 @@ TEST_P(ReferenceTest, WithoutContradiction) {
   maps.SetPosesAndFuse(RenderToys(scene, 0.2));
   scene.Erase(kBall);
   maps.SetPosesAndFuse(RenderToys(scene, 0.3));
-}
-
-// Frames, moves and removals in a random order, with wrong labels and holes in depth.
-class RandomSequenceTest : public ::testing::TestWithParam<std::tuple<Method, int>> {};
-
-INSTANTIATE_TEST_SUITE_P(Seeds, RandomSequenceTest,
-                         ::testing::Combine(::testing::ValuesIn(AllMethods()),
-                                            ::testing::Range(0, 10)),
-                         [](const auto& parameters) {
-                           return TestName(std::get<0>(parameters.param)) + "_seed_" +
-                                  std::to_string(std::get<1>(parameters.param));
-                         });
-
-MapConfig RandomConfig(Method method, Dice& dice) {
-  MapConfig config = ToyConfig(dice.Whole(2) == 0 ? 4 : 2);
-  config.weight_cap = dice.Whole(2) == 0 ? 3 : 200;
-  config.confidence_cap = 2 + dice.Whole(9);
-  config.moved_confidence = 1 + dice.Whole(2);
-  config.contradiction = dice.Whole(4) != 0;
-  config.relist_on_removal = dice.Whole(2) == 0;
-  if (method == Method::kTsdfpp || method == Method::kTsdfppAnchored) {
-    config.layers = dice.Whole(4);  // 0 is the default
-  }
-  return config;
-}
-
-Pose RandomToyPose(Dice& dice) {
-  // Mostly on the table, where a turn leaves every height exactly as it was.
-  const Eigen::Vector3d axis = dice.Whole(3) == 0
-                                   ? Eigen::Vector3d(dice.Uniform(-1, 1), dice.Uniform(-1, 1), 0.5)
-                                   : Eigen::Vector3d::UnitZ();
-  return MakePose(dice.Uniform(-1.5, 1.5), axis,
-                  {dice.Uniform(-0.13, 0.13), dice.Uniform(-0.13, 0.13),
-                   kTableTop_m + dice.Uniform(0.03, 0.06)});
-}
-
-TEST_P(RandomSequenceTest, EveryEventLeavesTheSameVoxels) {
-  const auto [method, seed] = GetParam();
-  Dice dice(static_cast<std::uint64_t>(seed) + 1);
-  const MapConfig config = RandomConfig(method, dice);
-  SideBySide maps(method, config, ToyBox(), ToyIds());
-  Scene scene = TableWithToys();
-  const auto fuse = [&] {
-    Frame frame = RenderToys(scene, dice.Uniform(0, 6.28));
-    cv::Mat labels = frame.mask.clone();
-    if (dice.Whole(3) == 0) {  // a segmentation that takes one toy for another in half the image
-      const auto from = static_cast<InstanceId>(1 + dice.Whole(3));
-      const auto to = static_cast<InstanceId>(1 + dice.Whole(3));
-      cv::Mat half = labels(cv::Rect(0, 0, labels.cols, labels.rows / 2 + dice.Whole(20)));
-      half.setTo(to, half == from);
-    }
-    if (dice.Whole(3) == 0) {
-      const cv::Rect patch(dice.Whole(60), dice.Whole(50), 20, 12);
-      labels(patch).setTo(kNoInstance);
-    }
-    if (dice.Whole(3) == 0) {
-      frame.depth(cv::Rect(dice.Whole(60), dice.Whole(50), 15, 15)).setTo(0);
-    }
-    if (dice.Whole(3) == 0) frame.T_WO.erase(static_cast<InstanceId>(1 + dice.Whole(3)));
-    maps.SetPosesAndFuse(frame, labels);
-  };
-  fuse();
-  for (int event = 0; event < 7 && !HasFailure(); ++event) {
-    const auto id = static_cast<InstanceId>(1 + dice.Whole(3));
-    switch (dice.Whole(6)) {
-      case 0:
-        scene.T_WO[id] = RandomToyPose(dice);
-        maps.SetObjectPose(id, scene.T_WO[id]);
-        break;
-      case 1:
-        maps.Remove(id);
-        break;
-      case 2:
-        maps.SetObjectPose(id, scene.T_WO[id]);  // perhaps the same numbers again
-        break;
-      default:
-        scene.T_WO[id] = RandomToyPose(dice);
-        fuse();
-    }
-  }
-  maps.CompareWholeBox();
 }
 
 }  // namespace

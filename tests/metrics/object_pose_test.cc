@@ -56,6 +56,14 @@ class Square : public ::testing::Test {
 
 constexpr double kFloat_m = 1e-7;
 
+// The axis of a symmetry turns with the object.
+TEST_F(Square, ASymmetryIsOfTheObject) {
+  const std::array half_turn = {
+      Pose(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()))};
+  const Pose upright = truth_ * Pose(Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitX()));
+  EXPECT_NEAR(*Mssd_m(points_, upright * half_turn[0], upright, half_turn).value, 0, kFloat_m);
+}
+
 TEST_F(Square, HalfATurn) {
   EXPECT_NEAR(*AddError_m(points_, turned_, truth_).value, std::sqrt(0.08), kFloat_m);
   EXPECT_NEAR(*AddSymmetricError_m(points_, turned_, truth_).value, 0, kFloat_m);

@@ -216,6 +216,25 @@ TEST_F(HiddenTable, RetentionIsolatesForgetting) {
             "no hidden sample was reconstructed when last seen");
 }
 
+// Half of a table that a plate hides from the first frame on was never seen: it is no loss.
+TEST(Preservation, WhatWasNeverSeenDoesNotCount) {
+  SeenTracker tracker(SampleMesh(Table(), 4, 1), kTable);
+  const Frame half = testing::CastFrame([](double x, double) {
+    return x > 0 ? testing::Hit{1, kPlate} : testing::Hit{2, kTable};
+  });
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(tracker.Observe(half, Pose::Identity()));
+  Selection kept = SelectAll(tracker.samples_O());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    kept[i] = tracker.samples_O().points[i].x() < 0 ? 1 : 0;
+  }
+  const PreservationScores scores =
+      ScorePreservation(tracker, SelectAll(tracker.samples_O()), kept, LastSeenStore(kept.size()));
+  // A pixel is 6.7 mm on the table, over its metre.
+  EXPECT_NEAR(scores.seen_area_cm2, 5000, 0.67 * 100);
+  EXPECT_GT(*scores.completion.value, 0.98);
+  EXPECT_LT(scores.hidden_area_cm2, 0.67 * 100);
+}
+
 TEST_F(HiddenTable, RegionsAreScoredAlone) {
   LastSeenStore store(tracker_.samples_O().size());
   const PreservationScores none =

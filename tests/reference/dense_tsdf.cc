@@ -122,13 +122,13 @@ class DenseTsdf : public DenseMap {
       const Neighbourhood place(q);
       std::array<DenseVoxel, 8> corners;
       for (int i = 0; i < 8; ++i) {
-        if (!IsSource(id, CubeCorner(place.base, i))) return;
-        corners[i] = field_.grid(CubeCorner(place.base, i));
+        const Eigen::Vector3i corner = CubeCorner(place.base, i);
+        if (IsSource(id, corner)) corners[i] = field_.grid(corner);
       }
-      const DenseVoxel value = InterpolateVoxel(place, corners);
-      if (value.distance > config_.voxel()) return;
-      const Eigen::Vector3d nearest = (q + Eigen::Vector3d::Constant(0.5)).array().floor();
-      writes.push_back({v, value, owners_(nearest.cast<int>()).confidence});
+      const auto value = InterpolateVoxel(place, corners, config_.resampling);
+      if (!value || value->distance > config_.voxel()) return;
+      const Eigen::Vector3i nearest = CubeCorner(place.base, NearestCorner(place));
+      writes.push_back({v, *value, owners_(nearest).confidence});
     });
     // Vacating first and writing then leaves the same as clearing the old voxels that were not
     // written; `tsdf/min` has to look at the vacated field.

@@ -150,12 +150,11 @@ DenseVolume Resample(const DenseVolume& old, const Pose& T_rel, const MapConfig&
   ForEachVoxel(old.grid.box(), [&](const Eigen::Vector3i& v) {
     const Neighbourhood place(SourcePoint(T_rel_inverse, v, config.voxel_m));
     std::array<DenseVoxel, 8> corners;
-    for (int i = 0; i < 8; ++i) {
-      corners[i] = old.grid(CubeCorner(place.base, i));
-      if (!corners[i].observed()) return;
-    }
+    for (int i = 0; i < 8; ++i) corners[i] = old.grid(CubeCorner(place.base, i));
+    const std::optional<DenseVoxel> value = InterpolateVoxel(place, corners, config.resampling);
+    if (!value) return;
     if (old.grid.box().AtRim(v)) BoxTooSmall(v);
-    moved.grid.At(v) = InterpolateVoxel(place, corners);
+    moved.grid.At(v) = *value;
     moved.blocks.AddBlockOf(v);
   });
   return moved;

@@ -95,24 +95,46 @@ float Neighbourhood::Interpolate(const std::array<float, 8>& c) const {
   return c0 * (1.0F - f[2]) + c1 * f[2];
 }
 
-DenseVoxel InterpolateVoxel(const Neighbourhood& place, const std::array<DenseVoxel, 8>& corners) {
-  std::array<float, 8> distances{};
-  std::array<float, 8> weights{};
-  std::array<float, 8> counts{};
+int NearestCorner(const Neighbourhood& place) {
+  int corner = 0;
+  for (int a = 0; a < 3; ++a) corner += place.f[a] >= 0.5F ? 1 << a : 0;
+  return corner;
+}
+
+std::optional<DenseVoxel> InterpolateVoxel(const Neighbourhood& place,
+                                           const std::array<DenseVoxel, 8>& corners,
+                                           Resampling resampling) {
+  const auto observed = std::count_if(corners.begin(), corners.end(),
+                                      [](const DenseVoxel& voxel) { return voxel.observed(); });
+  if (resampling == Resampling::kAll && observed < 8) return std::nullopt;
+  if (!corners[NearestCorner(place)].observed()) return std::nullopt;
+  const auto mean = [&](const auto& value_of) {
+    std::array<float, 8> values{};
+    for (int i = 0; i < 8; ++i) values[i] = value_of(corners[i]);
+    if (observed == 8) return place.Interpolate(values);
+    float sum = 0;
+    float total = 0;
+    for (int i = 0; i < 8; ++i) {
+      if (!corners[i].observed()) continue;
+      total += place.Coefficient(i);
+      sum += place.Coefficient(i) * values[i];
+    }
+    return sum / total;
+  };
+  DenseVoxel voxel;
+  voxel.distance = mean([](const DenseVoxel& corner) { return corner.distance; });
+  voxel.weight = mean([](const DenseVoxel& corner) { return corner.weight; });
+  const float count =
+      mean([](const DenseVoxel& corner) { return static_cast<float>(corner.colours); });
+  voxel.colours = static_cast<int>(std::floor(count + 0.5F));
+
   std::array<double, 3> colour{};
   double coloured = 0;
   for (int i = 0; i < 8; ++i) {
-    distances[i] = corners[i].distance;
-    weights[i] = corners[i].weight;
-    counts[i] = static_cast<float>(corners[i].colours);
-    if (corners[i].colours == 0) continue;
+    if (!corners[i].observed() || corners[i].colours == 0) continue;
     coloured += place.Coefficient(i);
     for (int c = 0; c < 3; ++c) colour[c] += place.Coefficient(i) * corners[i].colour[c];
   }
-  DenseVoxel voxel;
-  voxel.distance = place.Interpolate(distances);
-  voxel.weight = place.Interpolate(weights);
-  voxel.colours = static_cast<int>(std::floor(place.Interpolate(counts) + 0.5F));
   for (int c = 0; c < 3 && coloured > 0; ++c) {
     voxel.colour[c] = static_cast<float>(std::floor(colour[c] / coloured + 0.5));
   }

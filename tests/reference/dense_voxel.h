@@ -59,6 +59,12 @@ struct Neighbourhood {
   std::array<float, 3> f{};
 };
 
-DenseVoxel InterpolateVoxel(const Neighbourhood& place, const std::array<DenseVoxel, 8>& corners);
+// The corner nearest to the point: the upper one in each axis where the fraction is 0.5 or more.
+int NearestCorner(const Neighbourhood& place);
+
+// docs/map.md, "Resampling": nothing where the corners do not suffice.
+std::optional<DenseVoxel> InterpolateVoxel(const Neighbourhood& place,
+                                           const std::array<DenseVoxel, 8>& corners,
+                                           Resampling resampling);
 
 }  // namespace tsdfpp::reference

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/files.h"
+#include "tests/core/temp_folder.h"
 #include "tests/sim/scene_files.h"
 
 namespace tsdfpp {
@@ -156,7 +157,8 @@ TEST(CameraPath, ARecordingKeepsItsRelativeMotion) {
 }
 
 TEST(CameraPath, AnUnusableRecordingIsNamed) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "bad_trajectory.txt";
+  const test::TempFolder folder;
+  const auto file = folder / "bad_trajectory.txt";
   const std::vector<std::pair<std::string, std::string>> faults{
       {"", "has 0 poses, expected two at least"},
       {"1 0 0 0 0 0 0 1\n", "has 1 poses, expected two at least"},

@@ -8,6 +8,7 @@
 
 #include "core/files.h"
 #include "sim/room_model.h"
+#include "tests/core/temp_folder.h"
 #include "tests/sim/mesh_checks.h"
 #include "tests/sim/model_stage.h"
 
@@ -197,7 +198,8 @@ TEST(RenderingModels, RealMeshesAreRenderedAsRaysHitThem) {
 // Half a box, seen from inside and outside: a renderer leaves out faces seen from behind, rays hit
 // them, so there are faces either way. And a sheet without any thickness.
 TEST(RenderingModels, OpenMeshesAreRenderedAsRaysHitThem) {
-  const fs::path folder = fs::path(testing::TempDir()) / "tsdfpp_open_meshes";
+  const test::TempFolder temp;
+  const auto& folder = temp.path();
   const std::string half =
       "v 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nv 0 0 .1\nv .1 0 .1\nv .1 .1 .1\nv 0 .1 .1\n"
       "f 4 3 2 1\nf 2 3 7 6\nf 3 4 8 7\n";
@@ -212,13 +214,13 @@ TEST(RenderingModels, OpenMeshesAreRenderedAsRaysHitThem) {
     models.back().file = folder / name;
   }
   ExpectRenderedAsRaysHit(models, 0.2);
-  fs::remove_all(folder);
 }
 
 // A picture shows where its texture coordinates say: the sheet's red quarter is the nearest to -x,
 // +y.
 TEST(RenderingModels, ColoursOfAMeshAreRenderedWhereTheyBelong) {
-  const fs::path folder = fs::path(testing::TempDir()) / "tsdfpp_coloured_mesh";
+  const test::TempFolder temp;
+  const auto& folder = temp.path();
   // Four squares in the table's plane, each of its own material.
   std::string text = "mtllib c.mtl\n";
   for (int y = 0; y < 3; ++y) {
@@ -253,7 +255,6 @@ TEST(RenderingModels, ColoursOfAMeshAreRenderedWhereTheyBelong) {
   EXPECT_EQ(main_channels(0.1, -0.1), "g");
   EXPECT_EQ(main_channels(-0.1, 0.1), "b");
   EXPECT_EQ(main_channels(0.1, 0.1), "rg");
-  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "core/files.h"
+#include "tests/core/temp_folder.h"
 #include "tests/sim/footprint.h"
 #include "tests/sim/scene_files.h"
 
@@ -228,8 +229,8 @@ TEST(PhysicsBake, PosesFromAFolderGiveTheSameImages) {
   SceneConfig config = LoadScene("tumble");
   config.frames = 60;
   config.intrinsics = {160, 120, 131.25, 131.25, 79.5, 59.5};
-  const auto folder = std::filesystem::path(testing::TempDir()) / "baked_poses";
-  std::filesystem::remove_all(folder);
+  const test::TempFolder temp;
+  const auto& folder = temp.path();
   const auto first = OpenConfig(config, true);
   ASSERT_TRUE(WritePoseFolder(first->motion().Table(), first->info().objects, folder).has_value());
   SimOptions options;
@@ -258,8 +259,8 @@ TEST(PhysicsBake, PosesFromAFolderGiveTheSameImages) {
 
 TEST(PoseFolder, SaysWhatIsMissing) {
   const std::vector<ObjectInfo> objects{{0, "background", ""}, {3, "car", "car"}};
-  const auto folder = std::filesystem::path(testing::TempDir()) / "pose_folder";
-  std::filesystem::remove_all(folder);
+  const test::TempFolder temp;
+  const auto& folder = temp.path();
   const std::string line = " 0 0 0 0 0 0 1\n";
   const auto fault = [&] {
     const auto table = ReadPoseFolder(folder, objects, 2);
