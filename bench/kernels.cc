@@ -42,8 +42,9 @@ void BlocksAlongRays(benchmark::State& state) {
   const Frame frame = WallAndBox();
   const FrameView view(frame, frame.mask);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(
-        tsdfpp::BlocksAlongRays(view, PaperConfig(), [](InstanceId) { return Pose::Identity(); }));
+    benchmark::DoNotOptimize(tsdfpp::BlocksAlongRays(
+        view, PaperConfig(), [](InstanceId) { return Pose::Identity(); },
+        [](InstanceId, const Index3&) { return false; }));
   }
 }
 BENCHMARK(BlocksAlongRays)->Unit(benchmark::kMillisecond)->UseRealTime();

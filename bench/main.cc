@@ -37,15 +37,29 @@ void AddCount(CLI::App* command, const char* name, int& count, const char* what,
 
 void AddSideBySide(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<SideBySideOptions>();
-  CLI::App* command = app.add_subcommand(
-      "side-by-side", "Mapping beside Open3D's ScalableTSDFVolume, on the same frames");
-  AddScene(command, options->scene);
-  AddProfile(command, options->profile);
-  AddCount(command, "--frames", options->frames, "Frames from the first on", 32, 100000);
-  command->add_option("--threads", options->threads, "Numbers of threads")
+  CLI::App* run = app.add_subcommand(
+      "side-by-side", "Mapping beside Open3D's two volumes with colour, on the same frames");
+  CLI::App* peers = app.add_subcommand(
+      "peers", "What side-by-side runs in a process of its own: Open3D's times frame by frame");
+  for (CLI::App* command : {run, peers}) {
+    AddScene(command, options->scene);
+    command->add_option("--cases", options->cases, "Resolutions: 1cm, 5mm, 2mm")
+        ->delimiter(',')
+        ->capture_default_str();
+    AddCount(command, "--frames", options->frames, "Frames from the first on", 16, 100000);
+    command->add_option("--threads", options->threads, "Numbers of threads")
+        ->delimiter(',')
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+  }
+  run->add_option("--methods", options->methods, "Some of the methods")
       ->delimiter(',')
       ->capture_default_str();
-  command->callback([=, &chosen] { chosen = [=] { return RunSideBySide(*options); }; });
+  AddCount(run, "--runs", options->runs, "Of all; the one with the least worst frame counts", 1,
+           100);
+  run->add_option("--page", options->page, "Write the tables to this file as well");
+  run->callback([=, &chosen] { chosen = [=] { return RunSideBySide(*options); }; });
+  peers->callback([=, &chosen] { chosen = [=] { return RunPeers(*options); }; });
 }
 
 void AddRender(CLI::App& app, Chosen& chosen) {

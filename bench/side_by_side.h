@@ -1,5 +1,9 @@
-// Mapping beside Open3D on the same frames in the same run.
+// Mapping beside Open3D on the same frames.
 #pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include "core/error.h"
 
@@ -7,15 +11,30 @@ namespace tsdfpp {
 
 struct SideBySideOptions {
   std::string scene = "scenes/toycar3.toml";
-  std::string profile = "paper";
-  int frames = 256;  // from the first on
-  int warm_up = 16;  // frames mapped but not counted
-  std::vector<int> threads{2};
+  std::vector<std::string> cases{"1cm", "5mm", "2mm"};  // of CaseNames()
+  int frames = 120;                                     // from the first on
+  int warm_up = 10;                                     // frames mapped but not counted
+  int runs = 1;  // of everything; the one with the least worst frame counts
+  std::vector<int> threads{1, 2};
+  std::vector<std::string> methods{"tsdf",           "tsdf/min",        "tsdf++",
+                                   "tsdf++/literal", "tsdf++/anchored", "volumes"};
+  std::filesystem::path page;  // where given, the tables are written there as well
 };
 
-// Prints, for each number of threads, the median milliseconds a frame of pose update and fusion
-// (given poses) of each method and of Open3D's ScalableTSDFVolume with colour, and the ratios,
-// frame by frame in turn. Errors: those of the source.
+// "1cm" (truncation 10 voxels), "5mm" (6 voxels), "2mm" (6 voxels, the first object alone).
+std::vector<std::string> CaseNames();
+
+// For each case: milliseconds a frame (median, 99th percentile, worst) of pose update and fusion of
+// each method, with given poses, and of integration with colour of Open3D's two volumes, each for
+// the numbers of threads; their ratio to the faster of Open3D's; memory; and the milliseconds of
+// one object's pose update until the index can be read. Open3D runs in a process of its own, once
+// with OpenMP threads that sleep while they wait and once with threads that spin; the faster
+// counts. Errors: those of the source; kUsage for names that
+// there are not; kEnvironment where that process fails.
 Expected<void> RunSideBySide(const SideBySideOptions& options);
+
+// What that process does: for each number of threads, a line with a volume's name, its bytes and
+// its milliseconds frame by frame.
+Expected<void> RunPeers(const SideBySideOptions& options);
 
 }  // namespace tsdfpp

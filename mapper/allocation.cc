@@ -3,33 +3,41 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <cmath>
-#include <limits>
-#include <set>
+#include <algorithm>
+#include <array>
+#include <bit>
 
 #include "mapper/fusion_kernels.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr int kPixelStride = 4;  // a block is far larger than four pixels
-constexpr int kRowsPerTask = 32;
-constexpr int kNowhere = std::numeric_limits<int>::max();
+constexpr std::size_t kGrids = 4;      // of pixels: all, every 2nd, 4th and 8th
+constexpr double kSpacing_voxels = 3;  // the most between two pixels of a grid, at their depth
+constexpr int kTileRowsPerTask = 3;
+static_assert(kTile_px % (1 << (kGrids - 1)) == 0);
 
-// Remembers the keys met lately, so that most repetitions are dropped before sorting.
-class RecentKeys {
+struct Found {
+  InstanceId label = kNoInstance;
+  std::uint64_t key = ~0ULL;  // of PackIndex
+  auto operator<=>(const Found&) const = default;
+};
+
+// Remembers what was met lately, so that most repetitions are dropped before they are looked up.
+class RecentlyFound {
  public:
-  RecentKeys() : keys_(kSlots, ~0ULL) {}
-  bool Insert(std::uint64_t key) {
-    std::uint64_t& slot = keys_[(key * 0x9E3779B97F4A7C15ULL) >> 52U];
-    if (slot == key) return false;
-    slot = key;
+  RecentlyFound() : slots_(kSlots) {}
+  bool Insert(const Found& found) {
+    Found& slot = slots_[((found.key + found.label) * 0x9E3779B97F4A7C15ULL) >> kShift];
+    if (slot == found) return false;
+    slot = found;
     return true;
   }
 
  private:
-  static constexpr std::size_t kSlots = 4096;
-  std::vector<std::uint64_t> keys_;
+  static constexpr unsigned kShift = 53;
+  static constexpr std::size_t kSlots = 1U << (64U - kShift);
+  std::vector<Found> slots_;
 };
 
 struct Lattice {
@@ -37,110 +45,151 @@ struct Lattice {
   Eigen::Vector3d camera_L;
 };
 
-// Appends (label, packed block) of the rows [begin, end).
-void CollectRows(const FrameView& frame, const MapConfig& config,
-                 const std::map<InstanceId, Lattice>& lattices, int begin, int end,
-                 std::vector<std::pair<InstanceId, std::uint64_t>>& out) {
-  const double inverse_voxel = 1.0 / config.voxel_m;
-  const double front = config.trunc_front_voxels * config.voxel_m;
-  const double back = config.trunc_back_voxels * config.voxel_m;
-  const double step = 2 * config.voxel_m;
-  const Intrinsics& k = frame.intrinsics;
-  std::map<InstanceId, RecentKeys> recent;
-  BlocksOfPoints blocks(static_cast<std::size_t>((front + back) / step) + 3);
-  InstanceId last_label = kNoInstance;
-  const Lattice* lattice = nullptr;
-  RecentKeys* keys = nullptr;
-  for (int v = begin; v < end; v += kPixelStride) {
-    for (int u = 0; u < frame.width; u += kPixelStride) {
-      const auto pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width) +
-                         static_cast<std::size_t>(u);
-      const double depth = frame.depth[pixel];
-      if (depth <= 0) continue;
-      const InstanceId label = frame.label[pixel];
-      if (label != last_label) {
-        last_label = label;
-        lattice = &lattices.at(label);
-        keys = &recent[label];
-      }
-      Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0);
-      const double length = ray.norm();
-      const double range = depth * length;
-      ray /= length;
-      const Eigen::Vector3d direction = lattice->R_LC * ray * inverse_voxel;
-      const Eigen::Vector3d origin = lattice->camera_L * inverse_voxel;
-      Index3 last_block{kNowhere, kNowhere, kNowhere};
-      const auto visit = [&](const Index3& block) {
-        if (block == last_block) return;
-        last_block = block;
-        const std::uint64_t key = PackIndex(block);
-        if (keys->Insert(key)) out.emplace_back(label, key);
-      };
-      const double first = range - front;
-      const double last = range + back;
-      std::size_t points = 1;  // the last one included
-      while (first + step * static_cast<double>(points - 1) < last) ++points;
-      BlocksAtPoints({origin.x(), origin.y(), origin.z()},
-                     {direction.x(), direction.y(), direction.z()}, {first, step, last}, points,
-                     blocks);
-      for (std::size_t i = 0; i < points; ++i) {
-        if (first + step * static_cast<double>(i) >= 0) {
-          visit({blocks.x[i], blocks.y[i], blocks.z[i]});
-        }
+// Collects the blocks along the rays of one thread's part of the image.
+class Collector {
+ public:
+  Collector(const FrameView& frame, const MapConfig& config,
+            const std::function<Pose(InstanceId)>& T_WL_of,
+            const std::function<bool(InstanceId, const Index3&)>& is_known)
+      : frame_(frame),
+        T_WL_of_(T_WL_of),
+        is_known_(is_known),
+        inverse_voxel_(1.0 / config.voxel_m),
+        front_(config.trunc_front_voxels * config.voxel_m),
+        back_(config.trunc_back_voxels * config.voxel_m),
+        step_(2 * config.voxel_m),
+        least_points_(std::max<std::size_t>(1, static_cast<std::size_t>((front_ + back_) / step_))),
+        keys_(least_points_ + 3 + kKeysPerStep) {
+    const Intrinsics& k = frame.intrinsics;
+    for (std::size_t i = 0; i < reach_.size(); ++i) {
+      reach_[i] = kSpacing_voxels * config.voxel_m * std::min(k.fx, k.fy) / (1 << i);
+    }
+  }
+
+  // All the pixels of a tile that its grids need.
+  void VisitTile(int tile_column, int tile_row) {
+    const Tile& tile =
+        frame_.tiles[static_cast<std::size_t>(tile_row * frame_.tiles_per_row + tile_column)];
+    if (tile.farthest <= 0) return;
+    std::size_t finest = kGrids - 1;
+    while (finest > 0 && tile.farthest > reach_[finest]) --finest;
+    const int step = 1 << finest;
+    const int right = std::min(frame_.width, (tile_column + 1) * kTile_px);
+    const int bottom = std::min(frame_.height, (tile_row + 1) * kTile_px);
+    for (int v = tile_row * kTile_px; v < bottom; v += step) {
+      for (int u = tile_column * kTile_px; u < right; u += step) Visit(u, v);
+    }
+  }
+
+  // Each once, in order.
+  std::vector<Found> Take() {
+    std::sort(found_.begin(), found_.end());
+    found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
+    return std::move(found_);
+  }
+
+ private:
+  // The coarsest grid that a pixel belongs to, as a power of two.
+  static std::size_t GridOf(int u, int v) {
+    const auto either = static_cast<unsigned>(u | v) | 1U << (kGrids - 1);
+    return static_cast<std::size_t>(std::countr_zero(either));
+  }
+
+  void Visit(int u, int v) {
+    const auto pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(frame_.width) +
+                       static_cast<std::size_t>(u);
+    if (!frame_.IsUsable(pixel)) return;
+    const double depth = frame_.kernel.depth[pixel];
+    const std::size_t grid = GridOf(u, v);
+    if (grid + 1 < kGrids && depth <= reach_[grid + 1]) return;
+    const InstanceId label = frame_.kernel.label[pixel];
+    if (lattice_ == nullptr || label != last_label_) {
+      last_label_ = label;
+      lattice_ = &LatticeOf(label);
+    }
+    const Intrinsics& k = frame_.intrinsics;
+    Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0);
+    const double length = ray.norm();
+    const double range = depth * length;
+    ray /= length;
+    const Eigen::Vector3d direction = lattice_->R_LC * ray * inverse_voxel_;
+    const Eigen::Vector3d origin = lattice_->camera_L * inverse_voxel_;
+    const double first = range - front_;
+    const double last = range + back_;
+    std::size_t points = least_points_;  // the last one included
+    while (first + step_ * static_cast<double>(points - 1) < last) ++points;
+    BlocksAtPoints({origin.x(), origin.y(), origin.z()},
+                   {direction.x(), direction.y(), direction.z()}, {first, step_, last}, points,
+                   keys_.data());
+    std::size_t i = 0;
+    while (i < points && std::min(first + step_ * static_cast<double>(i), last) < 0) ++i;
+    for (std::uint64_t last_key = ~0ULL; i < points; ++i) {
+      if (keys_[i] == last_key) continue;
+      last_key = keys_[i];
+      const Found found{label, last_key};
+      if (recent_.Insert(found) && !is_known_(label, UnpackIndex(last_key))) {
+        found_.push_back(found);
       }
     }
   }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
-}
+
+  const Lattice& LatticeOf(InstanceId label) {
+    const auto [at, added] = lattices_.try_emplace(label);
+    if (added) {
+      const Pose T_LC = T_WL_of_(label).inverse() * frame_.T_WC;
+      at->second = {T_LC.linear(), T_LC.translation()};
+    }
+    return at->second;
+  }
+
+  const FrameView& frame_;
+  const std::function<Pose(InstanceId)>& T_WL_of_;
+  const std::function<bool(InstanceId, const Index3&)>& is_known_;
+  double inverse_voxel_;
+  double front_;
+  double back_;
+  double step_;
+  std::size_t least_points_;
+  std::array<double, kGrids> reach_{};  // metres: farther than this, the grid is too coarse
+  std::vector<std::uint64_t> keys_;     // of one ray
+  std::map<InstanceId, Lattice> lattices_;
+  InstanceId last_label_ = kNoInstance;
+  const Lattice* lattice_ = nullptr;
+  RecentlyFound recent_;
+  std::vector<Found> found_;
+};
 
 }  // namespace
 
 std::map<InstanceId, std::vector<Index3>> BlocksAlongRays(
-    const FrameView& frame, const MapConfig& config,
-    const std::function<Pose(InstanceId)>& T_WL_of) {
-  std::set<InstanceId> labels;
-  InstanceId last_label = kNoInstance;
-  for (int v = 0; v < frame.height; v += kPixelStride) {
-    const auto row = static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width);
-    for (int u = 0; u < frame.width; u += kPixelStride) {
-      const InstanceId label = frame.label[row + static_cast<std::size_t>(u)];
-      if (label != last_label) labels.insert(last_label = label);
-    }
-  }
-  std::map<InstanceId, Lattice> lattices;
-  for (const InstanceId label : labels) {
-    const Pose T_LC = T_WL_of(label).inverse() * frame.T_WC;
-    lattices[label] = {T_LC.linear(), T_LC.translation()};
-  }
-
-  const int tasks = (frame.height + kRowsPerTask - 1) / kRowsPerTask;
-  std::vector<std::vector<std::pair<InstanceId, std::uint64_t>>> found(
-      static_cast<std::size_t>(tasks));
+    const FrameView& frame, const MapConfig& config, const std::function<Pose(InstanceId)>& T_WL_of,
+    const std::function<bool(InstanceId, const Index3&)>& is_known) {
+  const int rows = static_cast<int>(frame.tiles.size()) / frame.tiles_per_row;
+  const int tasks = (rows + kTileRowsPerTask - 1) / kTileRowsPerTask;
+  std::vector<std::vector<Found>> found(static_cast<std::size_t>(tasks));
   tbb::parallel_for(
       tbb::blocked_range<int>(0, tasks, 1),
       [&](const tbb::blocked_range<int>& range) {
         for (int task = range.begin(); task != range.end(); ++task) {
-          CollectRows(frame, config, lattices, task * kRowsPerTask,
-                      std::min(frame.height, (task + 1) * kRowsPerTask),
-                      found[static_cast<std::size_t>(task)]);
+          Collector collector(frame, config, T_WL_of, is_known);
+          const int end = std::min(rows, (task + 1) * kTileRowsPerTask);
+          for (int row = task * kTileRowsPerTask; row < end; ++row) {
+            for (int column = 0; column < frame.tiles_per_row; ++column) {
+              collector.VisitTile(column, row);
+            }
+          }
+          found[static_cast<std::size_t>(task)] = collector.Take();
         }
       },
       tbb::simple_partitioner());
 
+  std::vector<Found> all;
+  for (const auto& task : found) all.insert(all.end(), task.begin(), task.end());
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  // The key's order is Index3's.
   std::map<InstanceId, std::vector<Index3>> blocks;
-  std::map<InstanceId, std::vector<std::uint64_t>> keys;
-  for (const auto& task : found) {
-    for (const auto& [label, key] : task) keys[label].push_back(key);
-  }
-  for (auto& [label, list] : keys) {
-    // The key's order is Index3's.
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-    std::vector<Index3>& indices = blocks[label];
-    indices.reserve(list.size());
-    for (const std::uint64_t key : list) indices.push_back(UnpackIndex(key));
-  }
+  for (const Found& of : all) blocks[of.label].push_back(UnpackIndex(of.key));
   return blocks;
 }
 

@@ -3,10 +3,12 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <bit>
+#include <limits>
+#include <list>
 #include <set>
 
 #include "mapper/freeing.h"
+#include "mapper/index_kernels.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
@@ -15,38 +17,21 @@ namespace {
 
 constexpr std::size_t kBlocksPerTask = 8;
 
-// Keeps the K smallest (distance, id) of a voxel, in order.
-struct Candidate {
-  float distance;
-  InstanceId id;
-  bool operator<(const Candidate& other) const {
-    return distance != other.distance ? distance < other.distance : id < other.id;
-  }
-};
-
-void Sift(Candidate* list, int layers, Candidate candidate) {
-  for (int i = 0; i < layers; ++i) {
-    if (list[i].id == kNoInstance || candidate < list[i]) std::swap(list[i], candidate);
-    if (candidate.id == kNoInstance) return;
-  }
-}
-
 }  // namespace
 
 // The objects, as the workers of one refresh read them.
 struct AnchoredMap::Participants {
-  struct InWorld {
-    InstanceId id;
-    const TsdfGrid* grid;
-  };
   struct Moved {
-    InstanceId id;
     std::array<double, 12> T_LW;  // rows
     VoxelReader reader;
     const std::vector<Index3>* reach;
   };
-  std::vector<InWorld> in_world;
-  std::vector<Moved> moved;
+  struct Object {
+    InstanceId id = kNoInstance;
+    const TsdfGrid* grid = nullptr;
+    std::optional<Moved> moved;  // unless its lattice is the world's
+  };
+  std::vector<Object> objects;  // by increasing id
 };
 
 AnchoredMap::AnchoredMap(const MapConfig& config, int layers)
@@ -86,29 +71,34 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   std::set<InstanceId> changed_ids;
   for (const FusedBlock& block : fused) changed_ids.insert(block.id);
   for (const InstanceId id : changed_ids) {
-    const ObjectVolume& volume = volumes_.at(id);
-    if (!volume.lattice_is_world) {
-      AddReach(id);
-      moved_.push_back(id);
-      continue;
-    }
-    const std::vector<Index3> changed = WithNeighbours(volume.grid, ChangedMasks(fused, id));
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, changed.size(), kBlocksPerTask),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            volume.grid.Find(changed[i])->cover = FindCover(volume.grid, changed[i]);
-          }
-        },
-        tbb::simple_partitioner());
-    dirty_.insert(dirty_.end(), changed.begin(), changed.end());
+    if (volumes_.at(id).lattice_is_world) continue;
+    AddReach(id);
+    moved_.push_back(id);
+  }
+  const std::vector<StaleCover> stale = StaleCovers(fused);
+  const std::vector<BlockMask> covers = NewCovers(stale);
+  for (std::size_t i = 0; i < stale.size(); ++i) {
+    if (covers[i] == stale[i].block->cover) continue;
+    stale[i].block->cover = covers[i];
+    dirty_.push_back(stale[i].index);
   }
   // Where one object alone is listed, its distances do not matter; where several are, they order
   // the list.
-  for (const FusedBlock& block : fused) {
-    if (volumes_.at(block.id).lattice_is_world && IsShared(block.index, block.id)) {
-      dirty_.push_back(block.index);
-    }
+  std::vector<std::uint8_t> shared(fused.size(), 0);
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, fused.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const FusedBlock& block = fused[i];
+          shared[i] = volumes_.at(block.id).lattice_is_world && Any(block.block->cover) &&
+                              IsShared(block.index, block.id)
+                          ? 1
+                          : 0;
+        }
+      },
+      tbb::simple_partitioner());
+  for (std::size_t i = 0; i < fused.size(); ++i) {
+    if (shared[i] != 0) dirty_.push_back(fused[i].index);
   }
   freeing.FreeEmpty(fused, volumes_);
   RefreshIndex();
@@ -120,7 +110,8 @@ bool AnchoredMap::IsShared(const Index3& index, InstanceId id) const {
   for (const auto& [other, volume] : volumes_) {
     if (other == id) continue;
     if (volume.lattice_is_world) {
-      if (volume.grid.Find(index) != nullptr) return true;
+      const TsdfBlock* block = volume.grid.Find(index);
+      if (block != nullptr && Any(block->cover)) return true;
     } else if (const auto reach = reach_.find(other); reach != reach_.end()) {
       if (std::binary_search(reach->second.begin(), reach->second.end(), index)) return true;
     }
@@ -159,30 +150,29 @@ void AnchoredMap::RefreshIndex() const {
   Participants participants;
   for (const auto& [id, volume] : volumes_) {
     if (volume.grid.empty()) continue;
-    if (volume.lattice_is_world) {
-      participants.in_world.push_back({id, &volume.grid});
-    } else {
-      participants.moved.push_back(
-          {id, RowsOf(volume.T_WL.inverse()), VoxelReader(volume.grid), &reach_[id]});
-    }
+    Participants::Object& object = participants.objects.emplace_back();
+    object.id = id;
+    object.grid = &volume.grid;
+    if (volume.lattice_is_world) continue;
+    object.moved.emplace(
+        Participants::Moved{RowsOf(volume.T_WL.inverse()), VoxelReader(volume.grid), &reach_[id]});
   }
   std::vector<IndexBlock> computed(dirty_.size());
+  std::vector<IndexBlock*> existing(dirty_.size());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, dirty_.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          computed[i] = ComputeBlock(dirty_[i], participants);
+          existing[i] = index_.Find(dirty_[i]);
+          ComputeBlock(dirty_[i], participants, existing[i] ? *existing[i] : computed[i]);
         }
       },
       tbb::simple_partitioner());
   std::vector<Index3> emptied;
   for (std::size_t i = 0; i < dirty_.size(); ++i) {
-    IndexBlock* block = index_.Find(dirty_[i]);
-    if (block != nullptr && computed[i].empty()) {
+    if (existing[i] != nullptr && existing[i]->empty()) {
       emptied.push_back(dirty_[i]);
-    } else if (block != nullptr) {
-      *block = std::move(computed[i]);
-    } else if (!computed[i].empty()) {
+    } else if (existing[i] == nullptr && !computed[i].empty()) {
       index_.FindOrAdd(dirty_[i]) = std::move(computed[i]);
     }
   }
@@ -190,45 +180,55 @@ void AnchoredMap::RefreshIndex() const {
   dirty_.clear();
 }
 
-AnchoredMap::IndexBlock AnchoredMap::ComputeBlock(const Index3& index,
-                                                  const Participants& participants) const {
-  const auto layers = static_cast<std::size_t>(layers_);
-  std::vector<Candidate> lists;
-  const auto list_of = [&](int place) {
-    if (lists.empty()) lists.assign(kBlockVoxels * layers, {0, kNoInstance});
-    return &lists[static_cast<std::size_t>(place) * layers];
+void AnchoredMap::ComputeBlock(const Index3& index, const Participants& participants,
+                               IndexBlock& ids) const {
+  struct Listed {
+    InstanceId id;
+    BlockMask cover;
+    const float* distance;
   };
-  for (const auto& [id, grid] : participants.in_world) {
-    const TsdfBlock* block = grid->Find(index);
-    if (block == nullptr) continue;
-    for (int z = 0; z < kBlockSide; ++z) {
-      for (std::uint64_t bits = block->cover[static_cast<std::size_t>(z)]; bits != 0;
-           bits &= bits - 1) {
-        const int place = 64 * z + std::countr_zero(bits);
-        Sift(list_of(place), layers_, {block->distance[static_cast<std::size_t>(place)], id});
-      }
-    }
-  }
-  for (const Participants::Moved& object : participants.moved) {
-    if (!std::binary_search(object.reach->begin(), object.reach->end(), index)) continue;
-    PulledCover cover;
-    if (!CoverOfBlock(object.reader, object.T_LW, config_.voxel_m, config_.back(), index, cover)) {
+  std::vector<Listed> listed;
+  std::list<PulledCover> pulled;
+  for (const Participants::Object& object : participants.objects) {
+    if (!object.moved) {
+      const TsdfBlock* block = object.grid->Find(index);
+      if (block == nullptr || !Any(block->cover)) continue;
+      listed.push_back({object.id, block->cover, block->distance.data()});
       continue;
     }
-    for (int place = 0; place < kBlockVoxels; ++place) {
-      const auto i = static_cast<std::size_t>(place);
-      if (cover.covered[i] != 0) Sift(list_of(place), layers_, {cover.distance[i], object.id});
+    const Participants::Moved& moved = *object.moved;
+    if (!std::binary_search(moved.reach->begin(), moved.reach->end(), index)) continue;
+    PulledCover& cover = pulled.emplace_back();
+    if (CoverOfBlock(moved.reader, moved.T_LW, config_.voxel_m, config_.back(), index, cover)) {
+      listed.push_back({object.id, cover.covered, cover.distance.data()});
     }
   }
-  IndexBlock ids(lists.size());
-  for (std::size_t i = 0; i < lists.size(); ++i) ids[i] = lists[i].id;
-  return ids;
+  if (listed.empty()) {
+    ids.clear();
+    return;
+  }
+  ids.assign(static_cast<std::size_t>(kBlockVoxels * layers_), kNoInstance);
+  if (listed.size() == 1) {
+    int first = 0;
+    for (const std::uint64_t slice : listed[0].cover) {
+      for (unsigned k = 0; k < 64; ++k) {
+        if ((slice >> k & 1U) != 0) ids[static_cast<std::size_t>(first) + k] = listed[0].id;
+      }
+      first += 64;
+    }
+    return;
+  }
+  std::array<float, kMaxLayers * kBlockVoxels> distance;
+  distance.fill(std::numeric_limits<float>::infinity());
+  for (const Listed& of : listed) {
+    InsertByDistance(of.cover, of.distance, of.id, {layers_, distance.data(), ids.data()});
+  }
 }
 
 LayeredMap::ActiveIds AnchoredMap::ActiveIn(const Index3& block) const {
   const IndexBlock* ids = index_.Find(block);
   if (ids == nullptr || ids->empty()) return {};
-  return {ids->data(), static_cast<std::size_t>(layers_)};
+  return {ids->data(), 1};
 }
 
 MeshWork AnchoredMap::UpdateMeshes() const {
@@ -251,9 +251,9 @@ std::vector<Listing> AnchoredMap::ListAt(const Eigen::Vector3i& voxel) const {
   std::vector<Listing> listings;
   const IndexBlock* ids = index_.Find(BlockOf(ToIndex3(voxel)));
   if (ids == nullptr || ids->empty()) return listings;
-  const int first = PlaceInBlock(ToIndex3(voxel)) * layers_;
+  const int place = PlaceInBlock(ToIndex3(voxel));
   for (int i = 0; i < layers_; ++i) {
-    const InstanceId id = (*ids)[static_cast<std::size_t>(first + i)];
+    const InstanceId id = (*ids)[static_cast<std::size_t>(kBlockVoxels * i + place)];
     if (id == kNoInstance) break;
     listings.push_back({id, 0});
   }
@@ -265,7 +265,7 @@ std::vector<Eigen::Vector3i> AnchoredMap::ListedVoxels() const {
   std::vector<Index3> voxels;
   for (const auto& entry : index_.entries()) {
     for (int place = 0; place < kBlockVoxels && !entry.block->empty(); ++place) {
-      if ((*entry.block)[static_cast<std::size_t>(place * layers_)] != kNoInstance) {
+      if ((*entry.block)[static_cast<std::size_t>(place)] != kNoInstance) {
         voxels.push_back(VoxelAt(entry.index, place));
       }
     }

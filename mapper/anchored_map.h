@@ -31,7 +31,8 @@ class AnchoredMap final : public LayeredMap {
   ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
-  // K ids for each voxel, active first, kNoInstance where unused.
+  // Entry k of the list of voxel i at [k * kBlockVoxels + i], active first, kNoInstance where
+  // unused.
   using IndexBlock = std::vector<InstanceId>;
   struct Participants;
 
@@ -40,7 +41,7 @@ class AnchoredMap final : public LayeredMap {
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
   bool IsShared(const Index3& index, InstanceId id) const;
-  IndexBlock ComputeBlock(const Index3& index, const Participants& participants) const;
+  void ComputeBlock(const Index3& index, const Participants& participants, IndexBlock& ids) const;
 
   int layers_;
   mutable BlockGrid<IndexBlock> index_;

@@ -6,6 +6,7 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -81,14 +82,20 @@ class BlockGrid {
   }
   ~BlockGrid() = default;
 
-  // The block, or nullptr.
-  Block* Find(const Index3& index) const {
+  // The block's place in entries(), or nothing.
+  std::optional<std::size_t> NumberOf(const Index3& index) const {
     for (std::size_t slot = SlotOf(index);; slot = (slot + 1) & (slots_.size() - 1)) {
       const std::int32_t at = slots_[slot];
-      if (at == kEmpty) return nullptr;
-      const Entry& entry = entries_[static_cast<std::size_t>(at)];
-      if (entry.index == index) return entry.block.get();
+      if (at == kEmpty) return std::nullopt;
+      if (entries_[static_cast<std::size_t>(at)].index == index)
+        return static_cast<std::size_t>(at);
     }
+  }
+
+  // The block, or nullptr.
+  Block* Find(const Index3& index) const {
+    const auto number = NumberOf(index);
+    return number ? entries_[*number].block.get() : nullptr;
   }
 
   Block& FindOrAdd(const Index3& index) {

@@ -4,7 +4,7 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
+#include <limits>
 
 #include "mapper/tsdf_block.h"
 
@@ -12,59 +12,80 @@ namespace tsdfpp {
 
 inline constexpr float kNearest_m = 0.05F;  // voxels closer to the camera's plane are not in view
 
-struct DepthAndLabel {
-  float depth;  // metres, 0 where invalid
-  std::int32_t label;
-};
-
 // A frame as the kernels read it: row-major images.
 struct KernelFrame {
-  const DepthAndLabel* pixels = nullptr;
-  const std::int32_t* colour = nullptr;  // channel c in bits 8 c ... 8 c + 7
+  const float* depth = nullptr;          // metres
+  const std::uint16_t* label = nullptr;  // kNoInstance where the pixel is not to be used
+  const std::uint8_t* colour = nullptr;  // three bytes a pixel
   float width = 0;                       // pixels
   float height = 0;
   std::array<float, 4> intrinsics{};  // fx, fy, cx, cy
 };
 
+// What the pixels of a square of the image hold.
+inline constexpr int kTile_px = 16;
+struct Tile {
+  float nearest = std::numeric_limits<float>::infinity();  // metres, of the valid depths
+  float farthest = 0;
+  std::uint16_t least_label = kNoInstance;  // of all pixels
+  std::uint16_t greatest_label = 0;
+};
+
+// The tiles of row `row` of tiles, from left to right.
+void SummariseTiles(const KernelFrame& frame, int row, Tile* tiles);
+
 // What a frame says of the voxels of a block.
 struct BlockObservation {
   std::array<float, kBlockVoxels> distance;  // s, metres; meaningless without a pixel
-  Lanes pixel;  // row-major pixel, or -1 where not in view or s < -back
-  Lanes label;  // of that pixel, meaningless without one
+  Lanes pixel;                               // row-major pixel, or -1 where there is no observation
+                                             // or s < -back
 };
 
-// Projects the voxels of the block whose lowest voxel is `first` and reads what the frame has
-// there. `T_CL` holds the rows of a 3x4 matrix. False where no voxel is observed.
-bool ObserveVoxels(const KernelFrame& frame, const float* T_CL, float voxel, const Index3& first,
-                   float back, BlockObservation& out);
+// Where a block lies, seen from the camera.
+struct BlockPlace {
+  const float* T_CL = nullptr;  // rows of a 3x4 matrix
+  float voxel = 0;              // metres
+  Index3 first;                 // the block's lowest voxel
+};
 
-// Which of the observed voxels are to take the observation.
+// Projects the voxels of a block and reads what the frame has there. False where no voxel is
+// observed.
+bool ObserveVoxels(const KernelFrame& frame, const BlockPlace& place, float back,
+                   BlockObservation& out);
+
+// Which of the observed voxels are to take the observation, and how.
 struct FusionRule {
-  std::int32_t id = 0;         // those that see this label, or
-  bool every_label = false;    // all of them
+  std::uint16_t id = 0;        // those that see this label; with votes, all of them
   bool contradiction = false;  // whether the others are to be looked at (docs/map.md)
+  bool one_label = false;      // it is known that the block's pixels have no label but `id`
   float front = 0;             // metres
-  float half_voxel = 0;
+  float back = 0;
+  float colour_band = 0;
   float weight_cap = 0;
 };
 
 struct FusionResult {
-  bool any_taken = false;
-  bool any_in_band = false;
-  bool any_contradicted = false;
+  bool changed = false;  // a voxel took an observation or was cleared
+  BlockMask in_band{};   // voxels that took an observation in band
+  // Voxels whose `observed` or `negative` changed, but for those that have neighbours of one sign
+  // only: these are corners of no cube that is, or was, crossed.
+  BlockMask changed_signs{};
+  bool changed_band = false;  // whether a voxel's `band` changed
 };
 
-// Fuses the observations into the block. `in_band` marks the voxels that took one in band;
-// `contradicted` those that see another label and hold a solid in front of its surface
-//.
-FusionResult FuseVoxels(const KernelFrame& frame, const FusionRule& rule,
-                        const BlockObservation& observation, TsdfBlock& block, Lanes& in_band,
-                        Lanes& contradicted);
+// Labels of the voxels of a block and the votes for them (docs/map.md, "`tsdf`: one field").
+struct LabelVotes {
+  std::uint16_t* id = nullptr;
+  std::uint16_t* confidence = nullptr;
+  std::int32_t cap = 0;
+  bool any_label_changed = false;
+};
 
-// Votes of the baseline's labels (docs/map.md, "`tsdf`: one field"): `in_band` marks the voxels
-// that vote for the label of their pixel. True where a label changed.
-bool VoteLabels(const BlockObservation& observation, const Lanes& in_band,
-                std::int32_t confidence_cap, std::uint16_t* id, std::uint16_t* confidence);
+// Observes the voxels of the block and fuses what it sees into it; its masks but for `cover` are
+// then up to date. `next`, or nullptr, is the block that will be fused after it, and fetched into
+// the cache meanwhile. `votes`, where given, lets the observations in band vote.
+FusionResult FuseVoxels(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
+                        TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes = nullptr);
 
 // Points at the ranges min(first + step * i, last), in the units of the ray's direction.
 struct RayRanges {
@@ -73,20 +94,11 @@ struct RayRanges {
   double last = 0;
 };
 
-// Room for the blocks of `points` points.
-struct BlocksOfPoints {
-  explicit BlocksOfPoints(std::size_t points) : x(points + 8), y(points + 8), z(points + 8) {}
-  std::vector<std::int32_t> x;
-  std::vector<std::int32_t> y;
-  std::vector<std::int32_t> z;
-};
-
-// The blocks of the voxels nearest to `count` points of a ray, origin + direction * range in voxels
-// of the lattice; `out` has room for them.
+// The blocks, as PackIndex() packs them, of the voxels nearest to `count` points of a ray,
+// origin + direction * range in voxels of the lattice. Whole vectors are written: `keys` has room
+// for `count` + kKeysPerStep.
+inline constexpr std::size_t kKeysPerStep = 8;
 void BlocksAtPoints(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-                    const RayRanges& ranges, std::size_t count, BlocksOfPoints& out);
-
-// Bit i of the mask for every lane that says yes.
-BlockMask MaskOf(const Lanes& lanes);
+                    const RayRanges& ranges, std::size_t count, std::uint64_t* keys);
 
 }  // namespace tsdfpp

@@ -1,10 +1,21 @@
 #include "mapper/layered_map.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
+#include <bit>
 
 #include "mapper/mesh_tools.h"
 
 namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kBlocksPerTask = 64;
+constexpr std::size_t kCoversPerTask = 16;
+
+}  // namespace
 
 std::vector<Eigen::Vector3i> SortedVoxels(std::vector<Index3> voxels) {
   std::sort(voxels.begin(), voxels.end());
@@ -149,32 +160,60 @@ std::vector<Eigen::Vector3i> LayeredMap::ObservedVoxels(InstanceId id) const {
   return ObservedVoxelsOf(volume->second.grid);
 }
 
-std::vector<Index3> LayeredMap::WithNeighbours(const TsdfGrid& grid, std::vector<Index3> blocks) {
-  std::vector<std::uint64_t> keys;
-  keys.reserve(blocks.size() * 27);
-  for (const Index3& block : blocks) {
-    for (int z = -1; z <= 1; ++z) {
-      for (int y = -1; y <= 1; ++y) {
-        for (int x = -1; x <= 1; ++x) {
-          const Index3 at = block + Index3{x, y, z};
-          if (grid.Find(at) != nullptr) keys.push_back(PackIndex(at));
+std::vector<LayeredMap::StaleCover> LayeredMap::StaleCovers(
+    const std::vector<FusedBlock>& fused) const {
+  struct Marks {
+    const TsdfGrid* grid;
+    std::vector<std::atomic<bool>> of_entry;
+  };
+  std::map<InstanceId, Marks> marks;
+  for (const auto& [id, volume] : volumes_) {
+    if (!volume.lattice_is_world) continue;
+    marks.try_emplace(id, Marks{&volume.grid, std::vector<std::atomic<bool>>(volume.grid.size())});
+  }
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, fused.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const FusedBlock& from = fused[i];
+          const auto of = marks.find(from.id);
+          if (from.touched == 0 || of == marks.end()) continue;
+          for (std::uint32_t bits = from.touched; bits != 0; bits &= bits - 1) {
+            const int k = std::countr_zero(bits);
+            const Index3 index = from.index + Index3{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+            const auto number = of->second.grid->NumberOf(index);
+            if (number) of->second.of_entry[*number].store(true, std::memory_order_relaxed);
+          }
         }
-      }
+      },
+      tbb::simple_partitioner());
+  std::vector<StaleCover> stale;
+  for (const auto& [id, of] : marks) {
+    for (std::size_t i = 0; i < of.of_entry.size(); ++i) {
+      if (!of.of_entry[i].load(std::memory_order_relaxed)) continue;
+      const auto& entry = of.grid->entries()[i];
+      stale.push_back({id, entry.index, entry.block.get(), of.grid});
     }
   }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  blocks.clear();
-  for (const std::uint64_t key : keys) blocks.push_back(UnpackIndex(key));
-  return blocks;
+  return stale;
 }
 
-std::vector<Index3> LayeredMap::ChangedMasks(const std::vector<FusedBlock>& fused, InstanceId id) {
-  std::vector<Index3> changed;
-  for (const FusedBlock& block : fused) {
-    if (block.id == id && block.masks_changed) changed.push_back(block.index);
-  }
-  return changed;
+std::vector<BlockMask> LayeredMap::NewCovers(const std::vector<StaleCover>& stale) {
+  std::vector<BlockMask> covers(stale.size());
+  // Covers read the neighbours' values, which no longer change.
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, stale.size(), kCoversPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        std::array<Surroundings, kCoversPerTask> around;
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          around[i - range.begin()] = FindSurroundings(*stale[i].grid, stale[i].index);
+        }
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          covers[i] = CoverOf(around[i - range.begin()]);
+        }
+      },
+      tbb::simple_partitioner());
+  return covers;
 }
 
 MapMemory LayeredMap::VolumeMemory() const {

@@ -52,12 +52,17 @@ class LayeredMap : public MapRepresentation {
     return place == nullptr ? kNoInstance : *place;
   }
 
-  // Blocks of the world-lattice volume that hold or touch a fused block: those whose cover may
-  // change. Sorted, unique.
-  static std::vector<Index3> WithNeighbours(const TsdfGrid& grid, std::vector<Index3> blocks);
-
-  // The fused blocks of one object whose masks changed.
-  static std::vector<Index3> ChangedMasks(const std::vector<FusedBlock>& fused, InstanceId id);
+  // A block whose cover may have changed with a frame.
+  struct StaleCover {
+    InstanceId id = kNoInstance;
+    Index3 index;
+    TsdfBlock* block = nullptr;
+    const TsdfGrid* grid = nullptr;
+  };
+  // Of the volumes in the world's lattice, by id, each block once.
+  std::vector<StaleCover> StaleCovers(const std::vector<FusedBlock>& fused) const;
+  // The covers as they are now, one for each of these; their blocks still hold the old ones.
+  static std::vector<BlockMask> NewCovers(const std::vector<StaleCover>& stale);
 
   // Where the lattice of a volume that stays in its object's frame is, from the poses at birth and
   // now.

@@ -3,6 +3,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <cmath>
+
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
 #include "mapper/layered_map.h"
@@ -28,19 +30,24 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const auto world = [](InstanceId) { return Pose::Identity(); };
+  const auto is_known = [&](InstanceId, const Index3& index) {
+    return lists_.Find(index) != nullptr;
+  };
   const std::size_t blocks_before = lists_.size();
-  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world)) {
+  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
     for (const Index3& index : indices) lists_.FindOrAdd(index);
   }
   const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
   std::vector<Task> tasks;
   tasks.reserve(lists_.size());
   const auto sorted = lists_.Sorted();
-  for (const std::uint32_t i :
-       BlocksInView(view, sorted.size(), config_.voxel(), [&](std::size_t k) -> BlockInView {
-         return {sorted[k]->index, &T_CW};
-       })) {
-    tasks.push_back({sorted[i]->index, sorted[i]->block.get(), {}});
+  const auto candidate_at = [&](std::size_t k) -> BlockCandidate {
+    return {sorted[k]->index, &T_CW, kNoInstance, true};
+  };
+  for (const PlannedBlock& planned :
+       PlanBlocks(view, sorted.size(), config_.voxel(), config_.back(), candidate_at)) {
+    const auto* entry = sorted[planned.number];
+    tasks.push_back({entry->index, entry->block.get(), {}});
   }
   const auto for_each_task = [&](const auto& function) {
     tbb::parallel_for(
@@ -62,11 +69,12 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
   BlockObservation observation;
-  if (!ObserveBlock(frame, T_CW, task.index, config_.voxel(), config_.back(), observation)) return;
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel());
+  if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const std::int32_t pixel = observation.pixel[i];
     if (pixel < 0 || observation.distance[i] > config_.front()) continue;
-    const InstanceId observed = frame.label[pixel];
+    const InstanceId observed = frame.kernel.label[pixel];
     Entry& active = task.lists->active[i];
     const InstanceId before = active.id;
     if (active.id == observed) {
@@ -85,7 +93,8 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
 void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW,
                             const Task& task) {
   BlockObservation observation;
-  if (!ObserveBlock(frame, T_CW, task.index, config_.voxel(), config_.back(), observation)) return;
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel());
+  if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   const auto weight_cap = static_cast<float>(config_.weight_cap);
   for (auto& [id, volume] : volumes_) {
     TsdfBlock* block = volume.grid.Find(task.index);
@@ -96,9 +105,10 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
       if (pixel < 0 || task.lists->active[i].id != id) continue;
       const float s = observation.distance[i];
       if (s <= config_.front()) {
-        FuseVoxel(*block, i, s, frame.kernel.colour + pixel, weight_cap);
+        const bool coloured = block->colour_count[i] == 0 || std::abs(s) <= config_.colour_band();
+        FuseVoxel(*block, i, s, coloured ? frame.kernel.colour + 3 * pixel : nullptr, weight_cap);
         changed = true;
-      } else if (frame.label[pixel] == id) {
+      } else if (frame.kernel.label[pixel] == id) {
         FuseVoxel(*block, i, config_.front(), nullptr, weight_cap);
         changed = true;
       }

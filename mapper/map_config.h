@@ -18,6 +18,10 @@ std::vector<Method> AllMethods();
 // Errors: kUsage, naming the methods there are. "anchored" and "literal" are understood as well.
 Expected<Method> MethodFromName(std::string_view name);
 
+// Observations farther from the surface colour only what has no colour yet: no mesh reads it there
+// (docs/map.md).
+inline constexpr double kColourBand_voxels = 2;
+
 // Which neighbours of its source point a moved voxel needs (docs/map.md, "Resampling").
 enum class Resampling {
   kAll,       // all eight observed
@@ -44,6 +48,8 @@ struct MapConfig {
   float voxel() const { return static_cast<float>(voxel_m); }
   float front() const { return static_cast<float>(trunc_front_voxels * voxel_m); }
   float back() const { return static_cast<float>(trunc_back_voxels * voxel_m); }
+
+  float colour_band() const { return static_cast<float>(kColourBand_voxels * voxel_m); }
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

@@ -178,9 +178,11 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
         return fmt::format("{}: voxel {} {}", name, Text(voxel), *fault);
       }
       const bool negative = observed && distance < 0;
-      const bool right = Bit(block->observed, place) == observed &&
-                         Bit(block->negative, place) == negative &&
-                         Bit(block->band, place) == (negative && distance >= -config.back());
+      const bool right =
+          Bit(block->observed, place) == observed && Bit(block->negative, place) == negative &&
+          Bit(block->band, place) == (negative && distance >= -config.back()) &&
+          Bit(block->coloured, place) == (block->colour_count[i] > 0) &&
+          (!Bit(block->full, place) || block->weight[i] == static_cast<float>(config.weight_cap));
       if (!right) return fmt::format("{}: the masks of voxel {} are wrong", name, Text(voxel));
       const Eigen::Vector3d q(voxel.x, voxel.y, voxel.z);
       if (with_cover && Bit(block->cover, place) != CoversPoint(grid, q, config.back())) {
@@ -258,10 +260,18 @@ Fault TsdfppMap::FindFault() const {
   if (Fault fault = FindCountFault(*this, blocks)) return fault;
   for (const auto& [index, lists] : index_.entries()) {
     if (IsEmpty(*lists)) return fmt::format("block {} of the index is empty", Text(index));
-    for (std::size_t i = 1; i < lists->size(); ++i) {
-      const bool first = i % At(layers_) == 0;
-      if (!first && (*lists)[i - 1].id == kNoInstance && (*lists)[i].id != kNoInstance) {
+    for (std::size_t i = kBlockVoxels; i < lists->entries.size(); ++i) {
+      const InstanceId before = lists->entries[i - kBlockVoxels].id;
+      if (before == kNoInstance && lists->entries[i].id != kNoInstance) {
         return fmt::format("a list in block {} of the index has a gap", Text(index));
+      }
+    }
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      const ListEntry& active = lists->entries[At(place)];
+      // A vote there would be passed over.
+      if (Bit(lists->settled, place) &&
+          (active.id != lists->settled_id || active.confidence < config_.confidence_cap)) {
+        return fmt::format("voxel {} is taken for settled and is not", Text(VoxelAt(index, place)));
       }
     }
   }

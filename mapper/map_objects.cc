@@ -86,9 +86,10 @@ Expected<void> TsdfppMap::Rename(InstanceId from, InstanceId to) {
   for (const auto& entry : volumes_.at(to).grid.entries()) {
     ListBlock* lists = Any(entry.block->cover) ? index_.Find(entry.index) : nullptr;
     if (lists == nullptr) continue;
-    for (ListEntry& listing : *lists) {
+    for (ListEntry& listing : lists->entries) {
       if (listing.id == from) listing.id = to;
     }
+    if (lists->settled_id == from) lists->settled_id = to;
   }
   CheckInDebugBuilds(*this);
   return {};

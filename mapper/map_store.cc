@@ -43,6 +43,19 @@ Expected<void> CheckListings(const ListsOfBlock& lists, int layers, const Holds&
   return {};
 }
 
+// A matrix row by row, from one column by column of `columns` columns; and the other way round with
+// the number of rows.
+std::vector<ListEntry> Transposed(const std::vector<ListEntry>& entries, std::size_t columns) {
+  const std::size_t rows = entries.size() / columns;
+  std::vector<ListEntry> transposed(entries.size());
+  for (std::size_t column = 0; column < columns; ++column) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      transposed[row * columns + column] = entries[column * rows + row];
+    }
+  }
+  return transposed;
+}
+
 }  // namespace
 
 void LayeredMap::Save(Sections& sections) const { SaveVolumes(volumes_, sections[kVolumes]); }
@@ -55,7 +68,10 @@ Expected<void> LayeredMap::Load(const Sections& sections) {
 void TsdfppMap::Save(Sections& sections) const {
   LayeredMap::Save(sections);
   std::vector<ListsOfBlock> lists;
-  for (const auto* entry : index_.Sorted()) lists.push_back({entry->index, *entry->block});
+  for (const auto* entry : index_.Sorted()) {
+    lists.push_back(
+        {entry->index, Transposed(entry->block->entries, static_cast<std::size_t>(layers_))});
+  }
   SaveLists(lists, layers_, sections[kLists]);
 }
 
@@ -66,16 +82,16 @@ Expected<void> TsdfppMap::Load(const Sections& sections) {
       entry.block->cover = FindCover(volume.grid, entry.index);
     }
   }
-  TSDFPP_ASSIGN(std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, layers_));
+  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, layers_));
   const auto covers = [this](InstanceId id, const Index3& index, int place) {
     const auto volume = volumes_.find(id);
     if (volume == volumes_.end()) return false;
     const TsdfBlock* block = volume->second.grid.Find(index);
     return block != nullptr && Bit(block->cover, place);
   };
-  for (ListsOfBlock& block : lists) {
+  for (const ListsOfBlock& block : lists) {
     TSDFPP_RETURN_IF_ERROR(CheckListings(block, layers_, covers));
-    index_.Add(block.index, std::make_unique<ListBlock>(std::move(block.entries)));
+    ListsOf(block.index).entries = Transposed(block.entries, kBlockVoxels);
   }
   return {};
 }

@@ -10,53 +10,136 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kTile_px = 32;  // about the size of a block in the image
-constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
-constexpr std::size_t kBlocksPerTask = 512;
-
-// The tile of the image that the middle of a block falls into (the nearest one, where the middle is
-// out of the image), or kOutOfView where a sphere around the block lies wholly outside one of the
-// planes of the view.
-std::uint32_t TileOf(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
-                     float voxel) {
-  const Eigen::Vector3f centre_L = Eigen::Vector3f(static_cast<float>(block.x * 8) + 3.5F,
-                                                   static_cast<float>(block.y * 8) + 3.5F,
-                                                   static_cast<float>(block.z * 8) + 3.5F) *
-                                   voxel;
-  Eigen::Vector3f c;
-  for (int r = 0; r < 3; ++r) {
-    const auto& m = T_CL.rows[static_cast<std::size_t>(r)];
-    c[r] = m[0] * centre_L.x() + m[1] * centre_L.y() + m[2] * centre_L.z() + m[3];
-  }
-  const float radius = 3.5F * 1.7321F * voxel * 1.01F;
-  // Written so that a camera pose that is not a number sees nothing.
-  if (!(c.z() + radius >= kNearest_m)) return kOutOfView;
-  const float slack = 1.0F;  // pixels, for rounding to the nearest one
-  const auto outside = [&](float normal_xy, float normal_z, float offset) {
-    // normal_xy * x + normal_z * z >= 0 inside, up to the normal's length
-    return !(normal_xy * offset + normal_z * c.z() >=
-             -radius * std::sqrt(normal_xy * normal_xy + normal_z * normal_z));
-  };
-  const float left = (-slack - frame.cx) / frame.fx;
-  const float right = (static_cast<float>(frame.width) + slack - frame.cx) / frame.fx;
-  const float top = (-slack - frame.cy) / frame.fy;
-  const float bottom = (static_cast<float>(frame.height) + slack - frame.cy) / frame.fy;
-  if (outside(1, -left, c.x()) || outside(-1, right, c.x()) || outside(1, -top, c.y()) ||
-      outside(-1, bottom, c.y())) {
-    return kOutOfView;
-  }
-  const float z = std::max(c.z(), kNearest_m);
-  const auto tile = [](float pixel, int size) {
-    const float last = static_cast<float>(size - 1);
-    return static_cast<std::uint32_t>(std::min(std::max(0.0F, pixel), last)) / kTile_px;
-  };
-  const auto per_row = static_cast<std::uint32_t>((frame.width + kTile_px - 1) / kTile_px);
-  return tile(frame.fy * c.y() / z + frame.cy, frame.height) * per_row +
-         tile(frame.fx * c.x() / z + frame.cx, frame.width);
-}
+constexpr int kBin_px = 32;  // about the size of a block in the image
+constexpr std::uint32_t kNotSeen = 0xFFFFFFFFU;
+constexpr std::size_t kBlocksPerTask = 256;
+constexpr int kTileRowsPerTask = 4;
+// A block that fills more of the image than this many tiles is looked at without asking them.
+constexpr int kMostTiles = 64;
+// Rounding in single precision is far less.
+constexpr float kSlack_px = 1;
+constexpr float kRelativeSlack = 1e-4F;
 
 void Require(bool condition) {
   if (!condition) std::abort();
+}
+
+cv::Mat Continuous(const cv::Mat& image) { return image.isContinuous() ? image : image.clone(); }
+
+struct Interval {
+  float low = std::numeric_limits<float>::infinity();
+  float high = -std::numeric_limits<float>::infinity();
+  void Extend(float x) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+};
+
+// A block's voxels, all of them inside.
+struct Extent {
+  Interval z;  // metres
+  Interval u;  // pixels, where it lies before the camera
+  Interval v;
+  float middle_u = 0;
+  float middle_v = 0;
+  bool before_camera = false;
+};
+
+Extent ExtentOf(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
+                float voxel) {
+  const auto [fx, fy, cx, cy] = frame.kernel.intrinsics;
+  const float half = 3.5F * voxel;
+  const float x = static_cast<float>(block.x * kBlockSide) * voxel + half;
+  const float y = static_cast<float>(block.y * kBlockSide) * voxel + half;
+  const float z = static_cast<float>(block.z * kBlockSide) * voxel + half;
+  std::array<float, 3> middle;
+  for (std::size_t r = 0; r < 3; ++r) {
+    const auto& m = T_CL.rows[r];
+    middle[r] = m[0] * x + m[1] * y + m[2] * z + m[3];
+  }
+  Extent extent;
+  const float safe_z = std::max(middle[2], kNearest_m);
+  extent.middle_u = fx * middle[0] / safe_z + cx;
+  extent.middle_v = fy * middle[1] / safe_z + cy;
+  std::array<std::array<float, 8>, 3> corner;
+  for (std::size_t r = 0; r < 3; ++r) {
+    const auto& m = T_CL.rows[r];
+    for (std::size_t i = 0; i < 8; ++i) {
+      corner[r][i] = middle[r] + ((i & 1U) != 0 ? half : -half) * m[0] +
+                     ((i & 2U) != 0 ? half : -half) * m[1] + ((i & 4U) != 0 ? half : -half) * m[2];
+    }
+  }
+  for (const float corner_z : corner[2]) extent.z.Extend(corner_z);
+  extent.before_camera = extent.z.low >= kNearest_m;
+  if (!extent.before_camera) return extent;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const float inverse = 1 / corner[2][i];
+    extent.u.Extend(fx * corner[0][i] * inverse + cx);
+    extent.v.Extend(fy * corner[1][i] * inverse + cy);
+  }
+  return extent;
+}
+
+// What a block's pixels hold, from the tiles that it touches.
+Tile TilesUnder(const FrameView& frame, const Extent& extent) {
+  const auto tile_at = [](float pixel, int size) {
+    const float last = static_cast<float>(size - 1);
+    return static_cast<int>(std::min(std::max(0.0F, pixel), last)) / kTile_px;
+  };
+  const int left = tile_at(extent.u.low - kSlack_px, frame.width);
+  const int right = tile_at(extent.u.high + kSlack_px, frame.width);
+  const int top = tile_at(extent.v.low - kSlack_px, frame.height);
+  const int bottom = tile_at(extent.v.high + kSlack_px, frame.height);
+  Tile all;
+  if ((right - left + 1) * (bottom - top + 1) > kMostTiles) {
+    all.nearest = 0;
+    all.farthest = kMaxValidDepth_m;
+    all.least_label = 0;
+    all.greatest_label = kNoInstance;
+    return all;
+  }
+  for (int row = top; row <= bottom; ++row) {
+    for (int column = left; column <= right; ++column) {
+      const Tile& tile = frame.tiles[static_cast<std::size_t>(row * frame.tiles_per_row + column)];
+      all.farthest = std::max(all.farthest, tile.farthest);
+      all.least_label = std::min(all.least_label, tile.least_label);
+      all.greatest_label = std::max(all.greatest_label, tile.greatest_label);
+    }
+  }
+  return all;
+}
+
+struct Verdict {
+  std::uint32_t bin = kNotSeen;
+  InstanceId label = kNoInstance;
+};
+
+Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, float back) {
+  const Extent extent = ExtentOf(frame, *block.T_CL, block.index, voxel);
+  const float slack_m = kRelativeSlack * (std::abs(extent.z.high) + back);
+  Verdict verdict;
+  // Written so that a camera pose that is not a number sees nothing.
+  if (!(extent.z.high + slack_m >= kNearest_m)) return verdict;
+  if (extent.before_camera) {
+    if (extent.u.high < -kSlack_px || extent.v.high < -kSlack_px ||
+        extent.u.low > static_cast<float>(frame.width) + kSlack_px ||
+        extent.v.low > static_cast<float>(frame.height) + kSlack_px) {
+      return verdict;
+    }
+    const Tile seen = TilesUnder(frame, extent);
+    // Along the ray what is behind is at least as far behind as along the axis.
+    if (seen.farthest <= 0 || seen.farthest + back + slack_m < extent.z.low) return verdict;
+    const bool has_label = seen.least_label <= block.id && block.id <= seen.greatest_label;
+    if (!block.of_any_label && !has_label) return verdict;
+    if (seen.least_label == seen.greatest_label) verdict.label = seen.least_label;
+  }
+  const auto bin = [](float pixel, int size) {
+    const float last = static_cast<float>(size - 1);
+    return static_cast<std::uint32_t>(std::min(std::max(0.0F, pixel), last)) / kBin_px;
+  };
+  const auto per_row = static_cast<std::uint32_t>((frame.width + kBin_px - 1) / kBin_px);
+  verdict.bin = bin(extent.middle_v, frame.height) * per_row + bin(extent.middle_u, frame.width);
+  return verdict;
 }
 
 }  // namespace
@@ -64,42 +147,35 @@ void Require(bool condition) {
 FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
     : width(frame.intrinsics.width),
       height(frame.intrinsics.height),
-      fx(static_cast<float>(frame.intrinsics.fx)),
-      fy(static_cast<float>(frame.intrinsics.fy)),
-      cx(static_cast<float>(frame.intrinsics.cx)),
-      cy(static_cast<float>(frame.intrinsics.cy)),
       intrinsics(frame.intrinsics),
       T_WC(frame.T_WC) {
   const cv::Size size(width, height);
   Require(width > 0 && height > 0);
   Require(frame.depth.type() == CV_32FC1 && frame.depth.size() == size);
-  Require(labels.type() == CV_16UC1 && labels.size() == size);
   Require(frame.colour.type() == CV_8UC3 && frame.colour.size() == size);
-  depth_.create(size, CV_32FC1);
-  label_ = labels.isContinuous() ? labels : labels.clone();
-  depth = depth_.ptr<float>();
-  label = label_.ptr<std::uint16_t>();
-  const auto stride = static_cast<std::size_t>(width);
-  pixels_.resize(stride * static_cast<std::size_t>(height));
-  packed_colour_.resize(pixels_.size());
-  tbb::parallel_for(0, height, [&](int v) {
-    const auto* from = frame.depth.ptr<float>(v);
-    const auto* ids = label_.ptr<std::uint16_t>(v);
-    const auto* colour = frame.colour.ptr<std::uint8_t>(v);
-    auto* cleaned = depth_.ptr<float>(v);
-    DepthAndLabel* pixel = &pixels_[stride * static_cast<std::size_t>(v)];
-    std::int32_t* packed = &packed_colour_[stride * static_cast<std::size_t>(v)];
-    for (int u = 0; u < width; ++u) {
-      cleaned[u] = IsValidDepth(from[u]) && ids[u] != kNoInstance ? from[u] : 0;
-      pixel[u] = {cleaned[u], ids[u]};
-      packed[u] = colour[3 * u] | (colour[3 * u + 1] << 8) | (colour[3 * u + 2] << 16);
-    }
-  });
-  kernel.pixels = pixels_.data();
-  kernel.colour = packed_colour_.data();
+  Require(labels.type() == CV_16UC1 && labels.size() == size);
+  depth_ = Continuous(frame.depth);
+  label_ = Continuous(labels);
+  colour_ = Continuous(frame.colour);
+  if (colour_.total() == 1) cv::repeat(colour_, 1, 2, colour_);  // the kernels read four bytes
+  kernel.depth = depth_.ptr<float>();
+  kernel.label = label_.ptr<std::uint16_t>();
+  kernel.colour = colour_.ptr<std::uint8_t>();
   kernel.width = static_cast<float>(width);
   kernel.height = static_cast<float>(height);
-  kernel.intrinsics = {fx, fy, cx, cy};
+  kernel.intrinsics = {static_cast<float>(intrinsics.fx), static_cast<float>(intrinsics.fy),
+                       static_cast<float>(intrinsics.cx), static_cast<float>(intrinsics.cy)};
+  tiles_per_row = (width + kTile_px - 1) / kTile_px;
+  const int rows = (height + kTile_px - 1) / kTile_px;
+  tiles.resize(static_cast<std::size_t>(tiles_per_row * rows));
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, rows, kTileRowsPerTask),
+      [&](const tbb::blocked_range<int>& range) {
+        for (int row = range.begin(); row != range.end(); ++row) {
+          SummariseTiles(kernel, row, &tiles[static_cast<std::size_t>(row * tiles_per_row)]);
+        }
+      },
+      tbb::simple_partitioner());
 }
 
 CameraFromLattice::CameraFromLattice(const Pose& T_WC, const Pose& T_WL, bool lattice_is_world) {
@@ -112,37 +188,39 @@ CameraFromLattice::CameraFromLattice(const Pose& T_WC, const Pose& T_WL, bool la
   }
 }
 
-std::vector<std::uint32_t> BlocksInView(const FrameView& frame, std::size_t count, float voxel,
-                                        const std::function<BlockInView(std::size_t)>& block_at) {
-  std::vector<std::uint32_t> tile_of(count);
+std::vector<PlannedBlock> PlanBlocks(
+    const FrameView& frame, std::size_t count, float voxel, float back,
+    const std::function<BlockCandidate(std::size_t)>& candidate_at) {
+  std::vector<Verdict> verdicts(count);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, count, kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const BlockInView at = block_at(i);
-          tile_of[i] = TileOf(frame, *at.T_CL, at.block, voxel);
+          verdicts[i] = Judge(frame, candidate_at(i), voxel, back);
         }
       },
       tbb::simple_partitioner());
   // Sorted by counting.
-  const int columns = (frame.width + kTile_px - 1) / kTile_px;
-  const int rows = (frame.height + kTile_px - 1) / kTile_px;
+  const int columns = (frame.width + kBin_px - 1) / kBin_px;
+  const int rows = (frame.height + kBin_px - 1) / kBin_px;
   std::vector<std::uint32_t> first(static_cast<std::size_t>(columns * rows) + 1, 0);
-  for (const std::uint32_t tile : tile_of) {
-    if (tile != kOutOfView) ++first[tile + 1];
+  for (const Verdict& verdict : verdicts) {
+    if (verdict.bin != kNotSeen) ++first[verdict.bin + 1];
   }
-  for (std::size_t tile = 1; tile < first.size(); ++tile) first[tile] += first[tile - 1];
-  std::vector<std::uint32_t> order(first.back());
+  for (std::size_t bin = 1; bin < first.size(); ++bin) first[bin] += first[bin - 1];
+  std::vector<PlannedBlock> planned(first.back());
   for (std::size_t i = 0; i < count; ++i) {
-    if (tile_of[i] != kOutOfView) order[first[tile_of[i]]++] = static_cast<std::uint32_t>(i);
+    const Verdict& verdict = verdicts[i];
+    if (verdict.bin == kNotSeen) continue;
+    planned[first[verdict.bin]++] = {static_cast<std::uint32_t>(i), verdict.label};
   }
-  return order;
+  return planned;
 }
 
-bool ObserveBlock(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
-                  float voxel, float back, BlockObservation& out) {
-  const Index3 first{block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide};
-  return ObserveVoxels(frame.kernel, T_CL.rows[0].data(), voxel, first, back, out);
+BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel) {
+  return {T_CL.rows[0].data(),
+          voxel,
+          {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide}};
 }
 
 }  // namespace tsdfpp

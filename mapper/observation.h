@@ -20,21 +20,21 @@ class FrameView {
 
   int width = 0;
   int height = 0;
-  float fx = 0;
-  float fy = 0;
-  float cx = 0;
-  float cy = 0;
-  const float* depth = nullptr;  // 0 where invalid or labelled kNoInstance
-  const std::uint16_t* label = nullptr;
   KernelFrame kernel;
   Intrinsics intrinsics;
   Pose T_WC = Pose::Identity();
+  int tiles_per_row = 0;
+  std::vector<Tile> tiles;  // row-major
+
+  // Whether the pixel has a valid depth and a label.
+  bool IsUsable(std::size_t pixel) const {
+    return IsValidDepth(kernel.depth[pixel]) && kernel.label[pixel] != kNoInstance;
+  }
 
  private:
-  std::vector<DepthAndLabel> pixels_;
-  std::vector<std::int32_t> packed_colour_;
-  cv::Mat depth_;  // cleaned copy
-  cv::Mat label_;  // continuous
+  cv::Mat depth_;  // continuous
+  cv::Mat label_;
+  cv::Mat colour_;
 };
 
 // T_CL as float rows, exactly T_WC^-1 where the lattice is the world's.
@@ -43,20 +43,30 @@ struct CameraFromLattice {
   std::array<std::array<float, 4>, 3> rows{};
 };
 
-// A block to be observed, in a lattice seen from the camera.
-struct BlockInView {
-  Index3 block;
+// A block that may have to be looked at, in a lattice seen from the camera.
+struct BlockCandidate {
+  Index3 index;
   const CameraFromLattice* T_CL = nullptr;
+  InstanceId id = kNoInstance;  // of the object whose block it is
+  bool of_any_label = false;    // whether other labels' pixels matter as well
 };
 
-// Numbers i of [0, count) whose block `block_at(i)` is not certainly out of view, ordered by the
-// part of the image that the block's middle falls into (then by i), so that one after the other
-// read neighbouring pixels. `voxel` in metres.
-std::vector<std::uint32_t> BlocksInView(const FrameView& frame, std::size_t count, float voxel,
-                                        const std::function<BlockInView(std::size_t)>& block_at);
+struct PlannedBlock {
+  std::uint32_t number;  // of the candidate
+  // The one label of all pixels that the block's voxels can fall on, kNoInstance where there may be
+  // several.
+  InstanceId label = kNoInstance;
+};
 
-// False where no voxel of the block is observed. `voxel`, `back` in metres.
-bool ObserveBlock(const FrameView& frame, const CameraFromLattice& T_CL, const Index3& block,
-                  float voxel, float back, BlockObservation& out);
+// The candidates i of [0, count), given by `candidate_at(i)`, of which the frame may observe a
+// voxel: neither out of view, nor wholly behind what is seen, nor without a pixel of a label that
+// matters. Ordered by the part of the image that a block's middle falls into (then by i), so that
+// one after the other read neighbouring pixels. `voxel` and `back` in metres.
+std::vector<PlannedBlock> PlanBlocks(
+    const FrameView& frame, std::size_t count, float voxel, float back,
+    const std::function<BlockCandidate(std::size_t)>& candidate_at);
+
+// The block as the kernels take it; `T_CL` must outlive the result.
+BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel);
 
 }  // namespace tsdfpp

@@ -191,12 +191,13 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
   blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.distance[i]; }, values);
   InterpolateCounted(values, points, candidate.data(), out.distance.data());
   any = false;
+  out.covered = {};
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const float distance = candidate[i] != 0 ? out.distance[i] : kUnobserved;
     const bool defined = distance == distance;
     const bool covers =
         defined && ((distance < 0 && distance >= -back) || InCrossedCube(cubes.crossed, points, i));
-    out.covered[i] = covers ? -1 : 0;
+    if (covers) SetBit(out.covered, static_cast<int>(i));
     any = any || covers;
   }
   return any;

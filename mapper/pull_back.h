@@ -12,7 +12,7 @@ namespace tsdfpp {
 std::array<double, 12> RowsOf(const Pose& T);
 
 struct PulledCover {
-  Lanes covered;                             // -1 where the object covers the voxel
+  BlockMask covered;                         // where the object covers the voxel
   std::array<float, kBlockVoxels> distance;  // metres, where it does
 };
 

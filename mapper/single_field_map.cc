@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "mapper/allocation.h"
@@ -34,8 +35,11 @@ std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
 void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const auto world = [](InstanceId) { return Pose::Identity(); };
+  const auto is_known = [&](InstanceId, const Index3& index) {
+    return field_.Find(index) != nullptr;
+  };
   const std::size_t blocks_before = field_.size();
-  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world)) {
+  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
     for (const Index3& index : indices) {
       field_.FindOrAdd(index);
       labels_.FindOrAdd(index);
@@ -43,23 +47,19 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   }
   const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
   const auto& blocks = field_.entries();
-  const std::vector<std::uint32_t> order =
-      BlocksInView(view, blocks.size(), config_.voxel(), [&](std::size_t i) -> BlockInView {
-        return {blocks[i].index, &T_CW};
+  const std::vector<PlannedBlock> planned = PlanBlocks(
+      view, blocks.size(), config_.voxel(), config_.back(), [&](std::size_t i) -> BlockCandidate {
+        return {blocks[i].index, &T_CW, kNoInstance, true};
       });
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, order.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, planned.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        BlockObservation observation;
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
-          const std::size_t i = order[k];
-          const Index3& index = blocks[i].index;
-          if (!ObserveBlock(view, T_CW, index, config_.voxel(), config_.back(), observation)) {
-            continue;
-          }
-          if (FuseBlock(view, observation, *blocks[i].block, *labels_.Find(index))) {
-            blocks[i].block->UpdateMasks(config_.back());
-          }
+          const auto& [index, block] = blocks[planned[k].number];
+          const TsdfBlock* next =
+              k + 1 == range.end() ? nullptr : blocks[planned[k + 1].number].block.get();
+          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel()), planned[k].label, next, *block,
+                    *labels_.Find(index));
         }
       },
       tbb::simple_partitioner());
@@ -68,23 +68,23 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   CheckInDebugBuilds(*this);
 }
 
-bool SingleFieldMap::FuseBlock(const FrameView& frame, const BlockObservation& observation,
-                               TsdfBlock& block, LabelBlock& labels) const {
-  Lanes in_band;
-  Lanes contradicted;
+void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
+                               const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const {
   FusionRule rule;
-  rule.every_label = true;
+  rule.id = label;
+  rule.one_label = label != kNoInstance;
   rule.front = config_.front();
+  rule.back = config_.back();
+  // Colours go wherever labels do: a triangle's label and colour are of the same observations.
+  rule.colour_band = std::numeric_limits<float>::infinity();
   rule.weight_cap = static_cast<float>(config_.weight_cap);
-  const FusionResult result =
-      FuseVoxels(frame.kernel, rule, observation, block, in_band, contradicted);
-  if (result.any_in_band && VoteLabels(observation, in_band, config_.confidence_cap,
-                                       labels.id.data(), labels.confidence.data())) {
-    for (const InstanceId id : labels.id) {
-      if (id != kNoInstance) labels.ever |= EverBit(id);
-    }
+  LabelVotes votes{labels.id.data(), labels.confidence.data(), config_.confidence_cap};
+  const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next, &votes);
+  if (result.changed) block.revision = NewRevision();
+  if (!votes.any_label_changed) return;
+  for (const InstanceId id : labels.id) {
+    if (id != kNoInstance) labels.ever |= EverBit(id);
   }
-  return result.any_taken;
 }
 
 void SingleFieldMap::FreeEmpty(const std::vector<Index3>& blocks) {

@@ -59,9 +59,10 @@ class SingleFieldMap final : public MapRepresentation {
                       InstanceId id) const {
     return labels.id[i] == id && block.weight[i] > 0 && block.distance[i] <= config_.voxel();
   }
-  // True where a voxel changed.
-  bool FuseBlock(const FrameView& frame, const BlockObservation& observation, TsdfBlock& block,
-                 LabelBlock& labels) const;
+  // `label` is the one that all the block's pixels have, kNoInstance where there may be several.
+  // `next` as FuseVoxels() takes it.
+  void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
+                 const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
   // The label of the voxel nearest to a point (metres), the background's where it has none.
   InstanceId LabelNear(const Eigen::Vector3f& point) const;
   // Makes the object's voxels unobserved and unlabelled; returns their blocks.

@@ -1,6 +1,11 @@
 #include "mapper/tsdf_block.h"
 
+#include <hwy/cache_control.h>
+
+#include <algorithm>
 #include <atomic>
+
+#include "mapper/cover_kernels.h"
 
 #ifdef __SSE2__
 #include <emmintrin.h>
@@ -9,70 +14,7 @@
 namespace tsdfpp {
 namespace {
 
-// Rows of 10 bits, x = -1 ... 8, for y, z = -1 ... 8.
-using Rows = std::array<std::array<std::uint16_t, 10>, 10>;
-
-std::uint16_t RowOf(const BlockMask* mask, int y, int z) {
-  if (mask == nullptr) return 0;
-  return static_cast<std::uint16_t>(
-      ((*mask)[static_cast<std::size_t>(z)] >> static_cast<unsigned>(8 * y)) & 0xFFU);
-}
-
-using Neighbours = std::array<const TsdfBlock*, 27>;
-
-Neighbours FindNeighbours(const TsdfGrid& grid, const Index3& block) {
-  Neighbours neighbours{};
-  std::size_t i = 0;
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) neighbours[i++] = grid.Find(block + Index3{x, y, z});
-    }
-  }
-  return neighbours;
-}
-
-Rows GatherRows(const Neighbours& neighbours, BlockMask TsdfBlock::*mask) {
-  Rows rows{};
-  for (int z = -1; z <= 8; ++z) {
-    const int bz = z < 0 ? 0 : (z > 7 ? 2 : 1);
-    for (int y = -1; y <= 8; ++y) {
-      const int by = y < 0 ? 0 : (y > 7 ? 2 : 1);
-      const auto* of = &neighbours[static_cast<std::size_t>(9 * bz + 3 * by)];
-      const auto row = [&](int bx) {
-        return RowOf(of[bx] == nullptr ? nullptr : &(of[bx]->*mask), y & 7, z & 7);
-      };
-      rows[static_cast<std::size_t>(z + 1)][static_cast<std::size_t>(y + 1)] =
-          static_cast<std::uint16_t>((row(0) >> 7U) | (row(1) << 1U) | ((row(2) & 1U) << 9U));
-    }
-  }
-  return rows;
-}
-
-// Row z, y, bit x: whether the cube named by voxel (x - 1, y - 1, z - 1) of the block is crossed.
-using CrossedCubes = std::array<std::array<std::uint16_t, 9>, 9>;
-
-CrossedCubes CrossedOf(const Rows& observed, const Rows& negative) {
-  CrossedCubes crossed{};
-  for (std::size_t z = 0; z < 9; ++z) {
-    for (std::size_t y = 0; y < 9; ++y) {
-      std::uint32_t all = 0x3FF;
-      std::uint32_t any_negative = 0;
-      std::uint32_t any_positive = 0;
-      for (std::size_t corner = 0; corner < 4; ++corner) {
-        const std::size_t cz = z + (corner >> 1U);
-        const std::size_t cy = y + (corner & 1U);
-        all &= observed[cz][cy];
-        any_negative |= negative[cz][cy];
-        any_positive |= static_cast<std::uint32_t>(observed[cz][cy] & ~negative[cz][cy]);
-      }
-      all &= all >> 1U;
-      any_negative |= any_negative >> 1U;
-      any_positive |= any_positive >> 1U;
-      crossed[z][y] = static_cast<std::uint16_t>(all & any_negative & any_positive & 0x1FFU);
-    }
-  }
-  return crossed;
-}
+constexpr BlockMask kNoVoxels{};
 
 struct SliceMasks {
   std::uint64_t observed = 0;
@@ -120,29 +62,49 @@ bool TsdfBlock::UpdateMasks(float back) {
   const BlockMask old_observed = observed;
   const BlockMask old_negative = negative;
   const BlockMask old_band = band;
+  full = {};
   for (std::size_t z = 0; z < kBlockSide; ++z) {
     const auto [o, n, b] = MasksOf(&distance[64 * z], &weight[64 * z], back);
     observed[z] = o;
     negative[z] = n & o;
     band[z] = b & n & o;
+    std::uint64_t with_colour = 0;
+    for (std::size_t i = 0; i < 64; ++i) {
+      with_colour |= static_cast<std::uint64_t>(colour_count[64 * z + i] > 0) << i;
+    }
+    coloured[z] = with_colour;
   }
   return observed != old_observed || negative != old_negative || band != old_band;
 }
 
-BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
-  const Neighbours neighbours = FindNeighbours(grid, block);
-  const CrossedCubes crossed = CrossedOf(GatherRows(neighbours, &TsdfBlock::observed),
-                                         GatherRows(neighbours, &TsdfBlock::negative));
-  BlockMask cover = neighbours[13] == nullptr ? BlockMask{} : neighbours[13]->band;
-  for (std::size_t z = 0; z < kBlockSide; ++z) {
-    for (std::size_t y = 0; y < kBlockSide; ++y) {
-      // A voxel is a corner of the cubes named one lower, and its own, along each axis.
-      std::uint32_t row = crossed[z][y] | crossed[z][y + 1] | crossed[z + 1][y] |
-                          static_cast<std::uint32_t>(crossed[z + 1][y + 1]);
-      row = (row | (row >> 1U)) & 0xFFU;
-      cover[z] |= static_cast<std::uint64_t>(row) << (8 * y);
+Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block) {
+  Surroundings around;
+  around.band = &kNoVoxels;
+  std::size_t i = 0;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x, ++i) {
+        const TsdfBlock* at = grid.Find(block + Index3{x, y, z});
+        around.observed[i] = at == nullptr ? &kNoVoxels : &at->observed;
+        around.negative[i] = at == nullptr ? &kNoVoxels : &at->negative;
+        if (i == 13 && at != nullptr) around.band = &at->band;
+        hwy::Prefetch(around.observed[i]);
+        hwy::Prefetch(around.negative[i]);
+      }
     }
   }
+  return around;
+}
+
+BlockMask CoverOf(const Surroundings& around) {
+  BlockMask cover = *around.band;
+  const auto any = [](const MasksAround& masks) {
+    return std::any_of(masks.begin(), masks.end(),
+                       [](const BlockMask* mask) { return Any(*mask); });
+  };
+  if (!any(around.negative)) return cover;
+  const BlockMask corners = CornersOfCrossedCubes(around.observed, around.negative);
+  for (std::size_t slice = 0; slice < cover.size(); ++slice) cover[slice] |= corners[slice];
   return cover;
 }
 

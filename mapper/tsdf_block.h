@@ -34,7 +34,8 @@ using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
 // anything: it depends on threads.
 std::uint64_t NewRevision();
 
-struct TsdfBlock {
+// Aligned to cache lines, which whole vectors then do not straddle.
+struct alignas(64) TsdfBlock {
   std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
   std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
   std::array<std::array<std::uint16_t, kBlockVoxels>, 3> colour{};  // by channel, 8.8 fixed point
@@ -44,14 +45,16 @@ struct TsdfBlock {
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
+  BlockMask coloured{};  // colour_count > 0
+  BlockMask full{};      // of these it is known that the weight is at its cap
 
   // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
   // changes values gives the block a new one (UpdateMasks does), which is how the cached meshes see
   // it.
   std::uint64_t revision = 0;
 
-  // Brings observed, negative and band in line with the values, and gives the block a new revision;
-  // true where one of the masks changed. `back` in metres.
+  // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
+  // true where one of observed, negative and band changed. `back` in metres.
   bool UpdateMasks(float back);
   bool AnyNegative() const { return Any(negative); }
   bool AnyObserved() const { return Any(observed); }
@@ -79,7 +82,23 @@ struct TsdfBlock {
 
 using TsdfGrid = BlockGrid<TsdfBlock>;
 
-// The cover mask at the lattice points of this block: band, or corner of a crossed cube.
-BlockMask FindCover(const TsdfGrid& grid, const Index3& block);
+// The masks of a block (number 13) and of the 26 around it, x fastest, then y, then z; never
+// nullptr.
+using MasksAround = std::array<const BlockMask*, 27>;
+
+// What the cover of a block depends on. To find it is to wait for memory: find several, then
+// compute their covers.
+struct Surroundings {
+  MasksAround observed;
+  MasksAround negative;
+  const BlockMask* band = nullptr;
+};
+Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block);
+
+// The cover mask at the lattice points of the block: band, or corner of a crossed cube.
+BlockMask CoverOf(const Surroundings& around);
+inline BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
+  return CoverOf(FindSurroundings(grid, block));
+}
 
 }  // namespace tsdfpp

@@ -3,9 +3,12 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <bit>
+#include <cstddef>
 
 #include "mapper/freeing.h"
+#include "mapper/index_kernels.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
@@ -14,27 +17,118 @@ namespace {
 
 constexpr std::size_t kBlocksPerTask = 16;
 
+constexpr std::size_t kLookUpsPerTask = 512;
+
 template <typename Function>
-void ForEachBit(std::uint64_t bits, int slice, const Function& function) {
-  for (; bits != 0; bits &= bits - 1) function(64 * slice + std::countr_zero(bits));
+void ForEachVoxel(const BlockMask& mask, const Function& function) {
+  int first = 0;
+  for (std::uint64_t slice : mask) {
+    for (; slice != 0; slice &= slice - 1) function(first + std::countr_zero(slice));
+    first += 64;
+  }
 }
 
 }  // namespace
 
-// A block of one object whose cover may have changed in a frame.
+// A block of one object whose cover changed in a frame.
 struct TsdfppMap::CoverChange {
-  Index3 index;
   InstanceId id = kNoInstance;
-  TsdfBlock* block = nullptr;
-  BlockMask old_cover{};
+  Index3 index;
+  BlockMask lost{};
+  BlockMask gained{};
 };
 
-// All that a frame did at one block of the index, by increasing id.
-struct TsdfppMap::Group {
-  ListBlock* lists = nullptr;
-  std::vector<std::size_t> changes;  // into the cover changes
-  std::vector<std::size_t> votes;    // into the fused blocks
-  bool emptied = false;
+// What a frame did at each block of the index, by increasing id. A block that nothing covers, or
+// did, has no lists.
+class TsdfppMap::Groups {
+ public:
+  struct Group {
+    Index3 index;
+    ListBlock* lists = nullptr;
+    std::int32_t first_change = kNone;
+    std::int32_t first_vote = kNone;
+    bool emptied = false;
+  };
+  static constexpr std::int32_t kNone = -1;
+
+  Groups(TsdfppMap& map, const std::vector<FusedBlock>& fused,
+         const std::vector<CoverChange>& changes)
+      : next_change_(changes.size(), kNone), next_vote_(fused.size(), kNone) {
+    const auto numbers = [&map](const auto& of, const auto& has_lists) {
+      std::vector<std::int32_t> found(of.size(), kNone);
+      tbb::parallel_for(
+          tbb::blocked_range<std::size_t>(0, of.size(), kLookUpsPerTask),
+          [&](const tbb::blocked_range<std::size_t>& range) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) {
+              if (!has_lists(of[i])) continue;
+              const auto number = map.index_.NumberOf(of[i].index);
+              found[i] = number ? static_cast<std::int32_t>(*number) : kNone;
+            }
+          },
+          tbb::simple_partitioner());
+      for (std::size_t i = 0; i < of.size(); ++i) {
+        if (found[i] != kNone || !has_lists(of[i])) continue;
+        map.ListsOf(of[i].index);
+        found[i] = static_cast<std::int32_t>(*map.index_.NumberOf(of[i].index));
+      }
+      return found;
+    };
+    const std::vector<std::int32_t> change_at =
+        numbers(changes, [](const CoverChange&) { return true; });
+    const std::vector<std::int32_t> vote_at =
+        numbers(fused, [](const FusedBlock& from) { return Any(from.block->cover); });
+    std::vector<std::int32_t> group_of(map.index_.size(), kNone);
+    const auto group_at = [&](std::int32_t number) -> Group& {
+      std::int32_t& group = group_of[static_cast<std::size_t>(number)];
+      if (group == kNone) {
+        group = static_cast<std::int32_t>(groups_.size());
+        const auto& entry = map.index_.entries()[static_cast<std::size_t>(number)];
+        groups_.push_back({entry.index, entry.block.get()});
+      }
+      return groups_[static_cast<std::size_t>(group)];
+    };
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+      Chain(changes, i, group_at(change_at[i]).first_change, next_change_);
+    }
+    for (std::size_t i = 0; i < fused.size(); ++i) {
+      if (vote_at[i] == kNone) continue;
+      Chain(fused, i, group_at(vote_at[i]).first_vote, next_vote_);
+    }
+  }
+
+  std::vector<Group>& all() { return groups_; }
+  template <typename Function>
+  void ForEachChange(const Group& group, const Function& function) const {
+    ForEach(group.first_change, next_change_, function);
+  }
+  template <typename Function>
+  void ForEachVote(const Group& group, const Function& function) const {
+    ForEach(group.first_vote, next_vote_, function);
+  }
+
+ private:
+  using Links = std::vector<std::int32_t>;
+
+  // Into a chain by increasing id.
+  template <typename Item>
+  static void Chain(const std::vector<Item>& items, std::size_t i, std::int32_t& first,
+                    Links& next) {
+    std::int32_t* link = &first;
+    while (*link != kNone && items[static_cast<std::size_t>(*link)].id < items[i].id) {
+      link = &next[static_cast<std::size_t>(*link)];
+    }
+    next[i] = std::exchange(*link, static_cast<std::int32_t>(i));
+  }
+  template <typename Function>
+  static void ForEach(std::int32_t first, const Links& next, const Function& function) {
+    for (std::int32_t i = first; i != kNone; i = next[static_cast<std::size_t>(i)]) {
+      function(static_cast<std::size_t>(i));
+    }
+  }
+
+  std::vector<Group> groups_;
+  Links next_change_;
+  Links next_vote_;
 };
 
 TsdfppMap::TsdfppMap(const MapConfig& config, int layers) : LayeredMap(config), layers_(layers) {}
@@ -45,12 +139,29 @@ std::unique_ptr<MapRepresentation> TsdfppMap::Clone() const {
 
 TsdfppMap::ListBlock& TsdfppMap::ListsOf(const Index3& block) {
   ListBlock& lists = index_.FindOrAdd(block);
-  if (lists.empty()) lists.resize(static_cast<std::size_t>(kBlockVoxels * layers_));
+  if (lists.entries.empty()) lists.entries.resize(static_cast<std::size_t>(kBlockVoxels * layers_));
   return lists;
 }
 
 VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) const {
-  return {&lists[static_cast<std::size_t>(place * layers_)], layers_};
+  lists.settled[static_cast<std::size_t>(place >> 6)] &=
+      ~(1ULL << static_cast<unsigned>(place & 63));
+  return {&lists.entries[static_cast<std::size_t>(place)], layers_, kBlockVoxels};
+}
+
+void TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
+  if (lists.settled_id != id) {
+    lists.settled_id = id;
+    lists.settled = {};
+  }
+  for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= ~lists.settled[z];
+  if (!Any(votes)) return;
+  // Nearly every vote is for the active object.
+  const VotesCounted counted =
+      VoteForActive(votes, id, config_.confidence_cap, lists.entries.data());
+  for (std::size_t z = 0; z < votes.size(); ++z) lists.settled[z] |= counted.saturated[z];
+  ForEachVoxel(counted.others,
+               [&](int place) { ListOf(lists, place).Vote(id, config_.confidence_cap); });
 }
 
 void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -70,21 +181,17 @@ std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
   for (const auto& entry : volumes_.at(id).grid.entries()) {
     ListBlock* lists = index_.Find(entry.index);
     if (lists == nullptr) continue;
-    for (int z = 0; z < kBlockSide; ++z) {
-      // Overflow may have dropped the object from some of these; Remove() knows.
-      ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z,
-                 [&](int place) { ListOf(*lists, place).Remove(id); });
-    }
+    // Overflow may have dropped the object from some of these; Remove() knows.
+    ForEachVoxel(entry.block->cover, [&](int place) { ListOf(*lists, place).Remove(id); });
     if (Any(entry.block->cover)) blocks.push_back(entry.index);
   }
   return blocks;
 }
 
-bool TsdfppMap::IsEmpty(const ListBlock& lists) const {
-  for (std::size_t i = 0; i < lists.size(); i += static_cast<std::size_t>(layers_)) {
-    if (lists[i].id != kNoInstance) return false;
-  }
-  return true;
+bool TsdfppMap::IsEmpty(const ListBlock& lists) {
+  const auto first = lists.entries.begin();
+  return std::all_of(first, first + kBlockVoxels,
+                     [](const ListEntry& active) { return active.id == kNoInstance; });
 }
 
 void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
@@ -102,10 +209,8 @@ void TsdfppMap::Activate(InstanceId id) {
     entry.block->cover = FindCover(grid, entry.index);
     if (!Any(entry.block->cover)) continue;
     ListBlock& lists = ListsOf(entry.index);
-    for (int z = 0; z < kBlockSide; ++z) {
-      ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z,
+    ForEachVoxel(entry.block->cover,
                  [&](int place) { ListOf(lists, place).PushFront(id, config_.moved_confidence); });
-    }
   }
 }
 
@@ -118,92 +223,62 @@ void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   CheckInDebugBuilds(*this);
 }
 
-void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
+std::vector<TsdfppMap::CoverChange> TsdfppMap::UpdateCovers(const std::vector<FusedBlock>& fused) {
+  const std::vector<StaleCover> stale = StaleCovers(fused);
+  const std::vector<BlockMask> covers = NewCovers(stale);
   std::vector<CoverChange> changes;
-  for (auto& [id, volume] : volumes_) {
-    for (const Index3& index : WithNeighbours(volume.grid, ChangedMasks(fused, id))) {
-      TsdfBlock* block = volume.grid.Find(index);
-      changes.push_back({index, id, block, block->cover});
+  for (std::size_t i = 0; i < stale.size(); ++i) {
+    BlockMask& old = stale[i].block->cover;
+    const BlockMask& now = covers[i];
+    if (now == old) continue;
+    CoverChange& change = changes.emplace_back();
+    change.id = stale[i].id;
+    change.index = stale[i].index;
+    for (std::size_t z = 0; z < now.size(); ++z) {
+      change.lost[z] = old[z] & ~now[z];
+      change.gained[z] = now[z] & ~old[z];
     }
+    old = now;
   }
-  // Covers read the neighbours' values, which no longer change.
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, changes.size(), kBlocksPerTask),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          changes[i].block->cover = FindCover(volumes_.at(changes[i].id).grid, changes[i].index);
-        }
-      },
-      tbb::simple_partitioner());
+  return changes;
+}
 
-  BlockGrid<std::size_t> group_of;
-  std::vector<Group> groups;
-  const auto group_at = [&](const Index3& index) -> Group& {
-    std::size_t& number = group_of.FindOrAdd(index);
-    if (number == 0) {
-      groups.push_back({&ListsOf(index), {}, {}});
-      number = groups.size();
-    }
-    return groups[number - 1];
-  };
-  // A block that nothing covers, or did, has no lists.
-  for (std::size_t i = 0; i < changes.size(); ++i) {
-    if (!Any(changes[i].block->cover) && !Any(changes[i].old_cover)) continue;
-    group_at(changes[i].index).changes.push_back(i);
-  }
-  for (std::size_t i = 0; i < fused.size(); ++i) {
-    if (Any(fused[i].block->cover)) group_at(fused[i].index).votes.push_back(i);
-  }
+void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
+  const std::vector<CoverChange> changes = UpdateCovers(fused);
+  Groups groups(*this, fused, changes);
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, groups.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, groups.all().size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          ApplyGroup(groups[i], fused, changes);
+          Groups::Group& group = groups.all()[i];
+          ListBlock& lists = *group.lists;
+          bool lost_any = false;
+          groups.ForEachChange(group, [&](std::size_t k) {
+            ForEachVoxel(changes[k].lost,
+                         [&](int place) { ListOf(lists, place).Remove(changes[k].id); });
+            lost_any = lost_any || Any(changes[k].lost);
+          });
+          groups.ForEachVote(group, [&](std::size_t k) {
+            const FusedBlock& from = fused[k];
+            BlockMask votes = from.votes;
+            for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= from.block->cover[z];
+            Vote(lists, from.id, votes);
+          });
+          groups.ForEachChange(group, [&](std::size_t k) {
+            ForEachVoxel(changes[k].gained, [&](int place) {
+              VoxelList list = ListOf(lists, place);
+              if (!list.Lists(changes[k].id)) list.Append(changes[k].id, 1);
+            });
+          });
+          group.emptied = lost_any && IsEmpty(lists);
         }
       },
       tbb::simple_partitioner());
   std::vector<Index3> empty;
-  for (const auto& entry : group_of.entries()) {
-    if (groups[*entry.block - 1].emptied) empty.push_back(entry.index);
+  for (const Groups::Group& group : groups.all()) {
+    if (group.emptied) empty.push_back(group.index);
   }
   index_.Erase(empty);
-}
-
-void TsdfppMap::ApplyGroup(Group& group, const std::vector<FusedBlock>& fused,
-                           const std::vector<CoverChange>& changes) {
-  ListBlock& lists = *group.lists;
-  std::uint64_t lost_any = 0;
-  for (int z = 0; z < kBlockSide; ++z) {
-    const auto slice = static_cast<std::size_t>(z);
-    for (const std::size_t i : group.changes) {
-      const CoverChange& change = changes[i];
-      const std::uint64_t lost = change.old_cover[slice] & ~change.block->cover[slice];
-      ForEachBit(lost, z, [&](int place) { ListOf(lists, place).Remove(change.id); });
-      lost_any |= lost;
-    }
-    for (const std::size_t i : group.votes) {
-      const FusedBlock& vote = fused[i];
-      const std::uint64_t votes = vote.votes[slice] & vote.block->cover[slice];
-      ForEachBit(votes, z, [&](int place) {
-        // Nearly every vote is for the active object.
-        ListEntry& active = lists[static_cast<std::size_t>(place * layers_)];
-        if (active.id != vote.id) {
-          ListOf(lists, place).Vote(vote.id, config_.confidence_cap);
-        } else if (active.confidence < config_.confidence_cap) {
-          ++active.confidence;
-        }
-      });
-    }
-    for (const std::size_t i : group.changes) {
-      const CoverChange& change = changes[i];
-      const std::uint64_t gained = change.block->cover[slice] & ~change.old_cover[slice];
-      ForEachBit(gained, z, [&](int place) {
-        VoxelList list = ListOf(lists, place);
-        if (!list.Lists(change.id)) list.Append(change.id, 1);
-      });
-    }
-  }
-  group.emptied = lost_any != 0 && IsEmpty(lists);
 }
 
 void TsdfppMap::Remove(InstanceId id) {
@@ -217,14 +292,12 @@ void TsdfppMap::Remove(InstanceId id) {
   for (const auto& entry : removed->second.grid.entries()) {
     ListBlock* lists = index_.Find(entry.index);
     if (lists == nullptr) continue;
-    for (int z = 0; z < kBlockSide; ++z) {
-      ForEachBit(entry.block->cover[static_cast<std::size_t>(z)], z, [&](int place) {
-        VoxelList list = ListOf(*lists, place);
-        if (!list.Lists(id)) return;
-        list.Remove(id);
-        vacated.push_back({entry.index, place});
-      });
-    }
+    ForEachVoxel(entry.block->cover, [&](int place) {
+      VoxelList list = ListOf(*lists, place);
+      if (!list.Lists(id)) return;
+      list.Remove(id);
+      vacated.push_back({entry.index, place});
+    });
   }
   volumes_.erase(removed);
   std::vector<Index3> blocks;
@@ -244,9 +317,9 @@ void TsdfppMap::Remove(InstanceId id) {
 
 LayeredMap::ActiveIds TsdfppMap::ActiveIn(const Index3& block) const {
   const ListBlock* lists = index_.Find(block);
-  if (lists == nullptr || lists->empty()) return {};
+  if (lists == nullptr || lists->entries.empty()) return {};
   static_assert(sizeof(ListEntry) == 2 * sizeof(InstanceId) && offsetof(ListEntry, id) == 0);
-  return {&lists->data()->id, 2 * static_cast<std::size_t>(layers_)};
+  return {&lists->entries.data()->id, 2};
 }
 
 std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
@@ -261,10 +334,10 @@ std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose
 std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
   std::vector<Listing> listings;
   const ListBlock* lists = index_.Find(BlockOf(ToIndex3(voxel)));
-  if (lists == nullptr || lists->empty()) return listings;
-  const int first = PlaceInBlock(ToIndex3(voxel)) * layers_;
+  if (lists == nullptr || lists->entries.empty()) return listings;
+  const int place = PlaceInBlock(ToIndex3(voxel));
   for (int i = 0; i < layers_; ++i) {
-    const ListEntry& entry = (*lists)[static_cast<std::size_t>(first + i)];
+    const ListEntry& entry = lists->entries[static_cast<std::size_t>(kBlockVoxels * i + place)];
     if (entry.id == kNoInstance) break;
     listings.push_back({entry.id, entry.confidence});
   }
@@ -274,8 +347,8 @@ std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
 std::vector<Eigen::Vector3i> TsdfppMap::ListedVoxels() const {
   std::vector<Index3> voxels;
   for (const auto& entry : index_.entries()) {
-    for (int place = 0; place < kBlockVoxels && !entry.block->empty(); ++place) {
-      const ListEntry& active = (*entry.block)[static_cast<std::size_t>(place * layers_)];
+    for (int place = 0; place < kBlockVoxels && !entry.block->entries.empty(); ++place) {
+      const ListEntry& active = entry.block->entries[static_cast<std::size_t>(place)];
       if (active.id != kNoInstance) voxels.push_back(VoxelAt(entry.index, place));
     }
   }

@@ -31,23 +31,28 @@ class TsdfppMap final : public LayeredMap {
   ActiveIds ActiveIn(const Index3& block) const override;
 
  private:
-  // kBlockVoxels lists of K entries.
-  using ListBlock = std::vector<ListEntry>;
+  struct ListBlock {
+    std::vector<ListEntry> entries;  // entry k of the list of voxel i at [k * kBlockVoxels + i]
+    // Voxels where `settled_id` is active with full confidence, so that its votes change nothing.
+    BlockMask settled{};
+    InstanceId settled_id = kNoInstance;
+  };
   struct CoverChange;
-  struct Group;
+  class Groups;
 
   ListBlock& ListsOf(const Index3& block);
+  // To be changed: the voxel is no longer taken for settled.
   VoxelList ListOf(ListBlock& lists, int place) const;
+  void Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
   // The blocks of the index that lost a listing.
   std::vector<Index3> Deactivate(InstanceId id);
   // Puts the object first where it covers a voxel now.
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
+  std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused);
   // Frees those of these blocks whose lists are all empty.
   void FreeEmptyLists(const std::vector<Index3>& blocks);
-  bool IsEmpty(const ListBlock& lists) const;
-  void ApplyGroup(Group& group, const std::vector<FusedBlock>& fused,
-                  const std::vector<CoverChange>& changes);
+  static bool IsEmpty(const ListBlock& lists);
 
   int layers_;
   BlockGrid<ListBlock> index_;

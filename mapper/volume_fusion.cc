@@ -15,45 +15,40 @@ void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolum
     const auto volume = volumes.find(id);
     return volume == volumes.end() ? Pose::Identity() : volume->second.T_WL;
   };
-  for (const auto& [id, indices] : BlocksAlongRays(frame, config, T_WL_of)) {
+  const auto is_known = [&](InstanceId id, const Index3& index) {
+    const auto volume = volumes.find(id);
+    return volume != volumes.end() && volume->second.grid.Find(index) != nullptr;
+  };
+  for (const auto& [id, indices] : BlocksAlongRays(frame, config, T_WL_of, is_known)) {
     TsdfGrid& grid = volumes[id].grid;
     for (const Index3& index : indices) grid.FindOrAdd(index);
   }
 }
 
-struct Task : FusedBlock {
+constexpr std::uint32_t kItself = 1U << 13U;  // of the 27 blocks around
+
+// Which of the 27 blocks around hold a neighbour of the voxels.
+std::uint32_t AroundVoxels(const BlockMask& voxels) {
+  std::uint64_t any = 0;
+  for (const std::uint64_t slice : voxels) any |= slice;
+  if (any == 0) return 0;
+  constexpr std::uint64_t kFirstColumn = 0x0101010101010101ULL;
+  // Bit 0: the one below, 1: the same, 2: the one above.
+  const auto along = [](bool first, bool last) {
+    return (first ? 1U : 0U) | 2U | (last ? 4U : 0U);
+  };
+  const unsigned x = along((any & kFirstColumn) != 0, (any & (kFirstColumn << 7U)) != 0);
+  const unsigned y = along((any & 0xFFU) != 0, (any >> 56U) != 0);
+  const unsigned z = along(voxels.front() != 0, voxels.back() != 0);
+  const std::uint32_t row = x * ((y & 1U) | (y & 2U) << 2U | (y & 4U) << 4U);
+  return row * ((z & 1U) | (z & 2U) << 8U | (z & 4U) << 16U);
+}
+
+struct Candidate {
+  InstanceId id = kNoInstance;
+  const TsdfGrid::Entry* entry = nullptr;
   const CameraFromLattice* T_CL = nullptr;
 };
-
-// True where a voxel of the block changed.
-bool FuseBlock(const FrameView& frame, const MapConfig& config, const BlockObservation& observation,
-               FusedBlock& fused) {
-  TsdfBlock& block = *fused.block;
-  Lanes in_band;
-  Lanes contradicted;
-  FusionRule rule;
-  rule.id = fused.id;
-  rule.contradiction = config.contradiction;
-  rule.front = config.front();
-  rule.half_voxel = 0.5F * config.voxel();
-  rule.weight_cap = static_cast<float>(config.weight_cap);
-  const FusionResult result =
-      FuseVoxels(frame.kernel, rule, observation, block, in_band, contradicted);
-  if (result.any_in_band) fused.votes = MaskOf(in_band);
-  if (result.any_contradicted) {
-    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-      if (contradicted[i] == 0) continue;
-      block.Clear(static_cast<int>(i));
-      if (observation.distance[i] > config.voxel()) {
-        block.distance[i] = std::min(observation.distance[i], rule.front);
-        block.weight[i] = 1;
-      }
-    }
-  }
-  if (!result.any_taken && !result.any_contradicted) return false;
-  fused.masks_changed = block.UpdateMasks(config.back());
-  return true;
-}
 
 }  // namespace
 
@@ -61,37 +56,49 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
                                         ObjectVolumes& volumes) {
   AllocateBlocks(frame, config, volumes);
 
-  std::vector<Task> tasks;
+  std::vector<Candidate> candidates;
   std::map<InstanceId, CameraFromLattice> cameras;
   for (auto& [id, volume] : volumes) {
     const auto camera =
         cameras.emplace(id, CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world));
     for (const TsdfGrid::Entry& entry : volume.grid.entries()) {
-      tasks.push_back({{id, entry.index, entry.block.get(), {}, false}, &camera.first->second});
+      candidates.push_back({id, &entry, &camera.first->second});
     }
   }
-  const std::vector<std::uint32_t> order =
-      BlocksInView(frame, tasks.size(), config.voxel(), [&](std::size_t i) -> BlockInView {
-        return {tasks[i].index, tasks[i].T_CL};
-      });
-  std::vector<std::uint8_t> changed(tasks.size(), 0);
+  const std::vector<PlannedBlock> planned =
+      PlanBlocks(frame, candidates.size(), config.voxel(), config.back(),
+                 [&](std::size_t i) -> BlockCandidate {
+                   const Candidate& of = candidates[i];
+                   return {of.entry->index, of.T_CL, of.id,
+                           config.contradiction && of.entry->block->AnyNegative()};
+                 });
+  std::vector<FusedBlock> fused(planned.size());
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, order.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, planned.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        BlockObservation observation;
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
-          Task& task = tasks[order[k]];
-          if (ObserveBlock(frame, *task.T_CL, task.index, config.voxel(), config.back(),
-                           observation)) {
-            changed[order[k]] = FuseBlock(frame, config, observation, task) ? 1 : 0;
-          }
+          const Candidate& of = candidates[planned[k].number];
+          FusionRule rule;
+          rule.id = of.id;
+          rule.contradiction = config.contradiction;
+          rule.one_label = planned[k].label == of.id;
+          rule.front = config.front();
+          rule.back = config.back();
+          rule.colour_band = config.colour_band();
+          rule.weight_cap = static_cast<float>(config.weight_cap);
+          TsdfBlock& block = *of.entry->block;
+          const TsdfBlock* next =
+              k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].entry->block.get();
+          const BlockPlace place = PlaceOf(*of.T_CL, of.entry->index, config.voxel());
+          const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
+          if (!result.changed) continue;
+          block.revision = NewRevision();
+          fused[k] = {of.id, of.entry->index, &block, result.in_band,
+                      AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U)};
         }
       },
       tbb::simple_partitioner());
-  std::vector<FusedBlock> fused;
-  for (std::size_t i = 0; i < tasks.size(); ++i) {
-    if (changed[i] != 0) fused.push_back(tasks[i]);
-  }
+  std::erase_if(fused, [](const FusedBlock& block) { return block.block == nullptr; });
   return fused;
 }
 

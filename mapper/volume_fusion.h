@@ -13,19 +13,19 @@ namespace tsdfpp {
 // Ordered, so that every walk over the objects is in increasing id.
 using ObjectVolumes = std::map<InstanceId, ObjectVolume>;
 
-// docs/map.md, "Fusion of an observation into a voxel"; distances in metres. `colour` is nullptr
-// where the observation is clamped.
-inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std::int32_t* colour,
+// docs/map.md, "Fusion of an observation into a voxel"; distances in metres. `colour` points at
+// three bytes, or is nullptr where the observation has none to give.
+inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std::uint8_t* colour,
                       float weight_cap) {
   const float weight = block.weight[i];
-  block.distance[i] = (weight * block.distance[i] + distance) / (weight + 1);
+  block.distance[i] += (distance - block.distance[i]) / (weight + 1);
   block.weight[i] = std::min(weight + 1, weight_cap);
   if (colour == nullptr) return;
   const auto count = static_cast<float>(block.colour_count[i]);
+  const float share = 1 / (count + 1);
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const auto old = static_cast<float>(block.colour[channel][i]);
-    const auto seen = static_cast<float>((*colour >> (8 * channel)) & 255);
-    const float mean = old + (256.0F * seen - old) / (count + 1);
+    const float mean = old + (256.0F * static_cast<float>(colour[channel]) - old) * share;
     block.colour[channel][i] = static_cast<std::uint16_t>(mean + 0.5F);
   }
   block.colour_count[i] = static_cast<std::uint16_t>(std::min(count + 1, weight_cap));
@@ -36,13 +36,14 @@ struct FusedBlock {
   InstanceId id = kNoInstance;
   Index3 index;
   TsdfBlock* block = nullptr;
-  BlockMask votes{};           // voxels with an observation of this object in band
-  bool masks_changed = false;  // of observed, negative, band: only then can a cover change
+  BlockMask votes{};  // voxels with an observation of this object in band
+  // The 27 blocks around (bit 9 z + 3 y + x, this one in the middle) whose cover may have changed.
+  std::uint32_t touched = 0;
 };
 
 // Allocates the blocks of the labels in the frame (making volumes for new labels), fuses, applies
 // the contradiction rule if the config asks for it, and returns the blocks in which a voxel
-// changed, by id, then index. Their masks are up to date but for `cover`.
+// changed. Their masks are up to date but for `cover`.
 std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig& config,
                                         ObjectVolumes& volumes);
 

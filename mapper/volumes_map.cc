@@ -73,7 +73,7 @@ std::vector<Eigen::Vector3i> VolumesMap::ListedVoxels() const {
       PulledCover cover;
       if (!CoverOfBlock(reader, T_LW, config_.voxel_m, config_.back(), block, cover)) continue;
       for (int place = 0; place < kBlockVoxels; ++place) {
-        if (cover.covered[static_cast<std::size_t>(place)] != 0) keep(block, place);
+        if (Bit(cover.covered, place)) keep(block, place);
       }
     }
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/types.h"
@@ -16,28 +17,28 @@ struct ListEntry {
   std::int16_t confidence = 0;
 };
 
-// A view of K stored entries; the used ones come first.
+// A view of K stored entries, `stride` apart; the used ones come first.
 class VoxelList {
  public:
-  VoxelList(ListEntry* entries, int layers) : entries_(entries), layers_(layers) {
-    while (size_ < layers_ && entries_[size_].id != kNoInstance) ++size_;
+  VoxelList(ListEntry* entries, int layers, int stride)
+      : entries_(entries), layers_(layers), stride_(stride) {
+    while (size_ < layers_ && At(size_).id != kNoInstance) ++size_;
   }
 
   int size() const { return size_; }
-  ListEntry& operator[](int i) { return entries_[i]; }
 
   bool Lists(InstanceId id) const {
     for (int i = 0; i < size_; ++i) {
-      if (entries_[i].id == id) return true;
+      if (At(i).id == id) return true;
     }
     return false;
   }
 
   void Remove(InstanceId id) {
     for (int i = 0; i < size_; ++i) {
-      if (entries_[i].id != id) continue;
-      for (int k = i; k + 1 < size_; ++k) entries_[k] = entries_[k + 1];
-      entries_[--size_] = {};
+      if (At(i).id != id) continue;
+      for (int k = i; k + 1 < size_; ++k) At(k) = At(k + 1);
+      At(--size_) = {};
       return;
     }
   }
@@ -52,7 +53,7 @@ class VoxelList {
       PushFront(id, 1);
       return;
     }
-    ListEntry& active = entries_[0];
+    ListEntry& active = At(0);
     if (active.id == id) {
       if (active.confidence < confidence_cap) ++active.confidence;
       return;
@@ -68,13 +69,15 @@ class VoxelList {
   }
 
  private:
+  ListEntry& At(int i) const { return entries_[static_cast<std::ptrdiff_t>(i) * stride_]; }
+
   void Insert(int at, InstanceId id, int confidence) {
     std::array<ListEntry, kMaxLayers + 1> longer{};
     int count = 0;
     for (int i = 0; i <= size_; ++i) {
       if (i == at)
         longer[static_cast<std::size_t>(count++)] = {id, static_cast<std::int16_t>(confidence)};
-      if (i < size_) longer[static_cast<std::size_t>(count++)] = entries_[i];
+      if (i < size_) longer[static_cast<std::size_t>(count++)] = At(i);
     }
     if (count > layers_) {
       const int victim = Victim(longer, count);
@@ -83,7 +86,7 @@ class VoxelList {
       }
       --count;
     }
-    for (int i = 0; i < count; ++i) entries_[i] = longer[static_cast<std::size_t>(i)];
+    for (int i = 0; i < count; ++i) At(i) = longer[static_cast<std::size_t>(i)];
     size_ = count;
   }
 
@@ -103,6 +106,7 @@ class VoxelList {
 
   ListEntry* entries_;
   int layers_;
+  int stride_;
   int size_ = 0;
 };
 

@@ -51,7 +51,8 @@ Expected<DrivePath> ReadDrive(const toml::table& table, const std::string& where
   for (std::size_t i = 0; i < drive.x.size(); ++i) {
     const Eigen::Vector2d next(drive.x[i], drive.y[i]);
     if ((next - last).norm() < kMinWaypointStep_m) {
-      reader.Fault("x", "and 'y' name the same waypoint twice in a row");
+      reader.Fault("x", i == 0 ? "and 'y' begin at the object's own place, from which it drives off"
+                               : "and 'y' name the same waypoint twice in a row");
     }
     last = next;
   }

@@ -26,7 +26,8 @@ struct Surfaces {
   const cv::Mat& inverse;
   const cv::Mat& mask;
 
-  // Is the pixel on a line, or on a parabola, with its neighbours of the same instance?
+  // Is the pixel between two neighbours of the same instance, or behind two or three, on a line or
+  // a parabola with them?
   bool Continues(int u, int v, const Step& step) const;
 };
 
@@ -38,9 +39,11 @@ bool Surfaces::Continues(int u, int v, const Step& step) const {
            mask.at<InstanceId>(y, x) == mask.at<InstanceId>(v, u);
   };
   const auto at = [&](int n) { return inverse.at<float>(v + n * step.v, u + n * step.u); };
-  if (!on_object(1) || !on_object(2)) return false;
+  if (!on_object(1)) return false;
   const float here = at(0);
   const float allowed = kOffLine_m * here * here;
+  if (on_object(-1) && std::abs((at(1) + at(-1)) / 2 - here) <= allowed) return true;
+  if (!on_object(2)) return false;
   if (std::abs(2 * at(1) - at(2) - here) <= allowed) return true;
   return on_object(3) && std::abs(3 * (at(1) - at(2)) + at(3) - here) <= allowed;
 }

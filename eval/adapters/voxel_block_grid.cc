@@ -5,7 +5,6 @@
 #include <open3d/t/geometry/VoxelBlockGrid.h>
 
 #include <chrono>
-#include <cstring>
 
 namespace tsdfpp {
 namespace {
@@ -15,7 +14,9 @@ namespace o3d = open3d::core;
 // float distance, 16-bit weight, three 16-bit colours
 constexpr std::size_t kVoxelBytes = 4 + 2 + 3 * 2;
 constexpr std::int64_t kReservedBlocks = 40000;
-constexpr float kAnyWeight = 0.5F;  // observed at all
+constexpr float kAnyWeight = 0.5F;   // observed at all
+constexpr float kDepthScale = 5000;  // TUM's: 0.2 mm
+constexpr float kFar_m = 65535 / kDepthScale;
 
 o3d::Tensor MatrixOf(const Eigen::MatrixXd& matrix) {
   return o3d::eigen_converter::EigenMatrixToTensor(matrix);
@@ -48,24 +49,25 @@ VoxelBlockGridPeer::VoxelBlockGridPeer(double voxel_m, double truncation_m, int 
 
 VoxelBlockGridPeer::~VoxelBlockGridPeer() = default;
 
-void VoxelBlockGridPeer::Integrate(const Frame& frame) {
+double VoxelBlockGridPeer::Integrate(const Frame& frame) {
   const Intrinsics& k = frame.intrinsics;
-  o3d::Tensor depth({k.height, k.width, 1}, o3d::Float32);
-  std::memcpy(depth.GetDataPtr(), frame.depth.data,
-              static_cast<std::size_t>(depth.NumElements()) * 4);
-  cv::Mat floats;
-  frame.colour.convertTo(floats, CV_32FC3);
-  o3d::Tensor colour({k.height, k.width, 3}, o3d::Float32);
-  std::memcpy(colour.GetDataPtr(), floats.data, static_cast<std::size_t>(colour.NumElements()) * 4);
+  cv::Mat raw;
+  frame.depth.convertTo(raw, CV_16U, kDepthScale);
+  const open3d::t::geometry::Image depth(
+      o3d::Tensor(raw.ptr<std::uint16_t>(), {k.height, k.width, 1}, o3d::UInt16));
+  const cv::Mat packed = frame.colour.isContinuous() ? frame.colour : frame.colour.clone();
+  const open3d::t::geometry::Image colour(
+      o3d::Tensor(packed.ptr<std::uint8_t>(), {k.height, k.width, 3}, o3d::UInt8));
   Eigen::Matrix3d intrinsic;
   intrinsic << k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1;
   const o3d::Tensor K = MatrixOf(intrinsic);
   const o3d::Tensor T_CW = MatrixOf(frame.T_WC.inverse().matrix());
-  constexpr float kMetres = 1.0F;
-  const auto blocks = impl_->grid.GetUniqueBlockCoordinates(
-      depth, K, T_CW, kMetres, kMaxValidDepth_m, impl_->truncation_voxels);
-  impl_->grid.Integrate(blocks, depth, colour, K, T_CW, kMetres, kMaxValidDepth_m,
+  const auto start = std::chrono::steady_clock::now();
+  const auto blocks = impl_->grid.GetUniqueBlockCoordinates(depth, K, T_CW, kDepthScale, kFar_m,
+                                                            impl_->truncation_voxels);
+  impl_->grid.Integrate(blocks, depth, colour, K, T_CW, kDepthScale, kFar_m,
                         impl_->truncation_voxels);
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 VoxelBlockGridPeer::Mesh VoxelBlockGridPeer::ExtractMesh() const {

@@ -60,8 +60,8 @@ TEST_P(Invariants, ValuesOutOfRangeAreNoticed) {
 }
 
 TEST_P(Invariants, MasksThatAreNotOfTheValuesAreNoticed) {
-  for (BlockMask TsdfBlock::*mask :
-       {&TsdfBlock::observed, &TsdfBlock::negative, &TsdfBlock::band}) {
+  for (BlockMask TsdfBlock::*mask : {&TsdfBlock::observed, &TsdfBlock::negative, &TsdfBlock::band,
+                                     &TsdfBlock::coloured, &TsdfBlock::full}) {
     ExpectFault("the masks of voxel",
                 [mask](Place& p) { (p.block->*mask)[p.observed / 64] ^= 1ULL << p.observed % 64; });
   }

@@ -31,7 +31,7 @@ class DenseTsdf : public DenseMap {
     field_.blocks.ForEachVoxelOfBlocks([&](const Eigen::Vector3i& v) {
       const std::optional<Seen> seen = view.Look(v);
       if (!seen) return;
-      FuseSeen(*seen, config_, field_.grid.At(v));
+      FuseSeen(*seen, config_, field_.grid.At(v), true);
       if (InBand(seen->s, config_)) Vote(seen->label, owners_.At(v));
     });
     field_.FreeEmptyBlocks();

@@ -38,11 +38,22 @@ void Allocate(const Frame& frame, const cv::Mat& labels, const Pose& T_WL, const
   const double back = config.trunc_back_voxels * h;
   const Intrinsics& camera = frame.intrinsics;
   const Pose T_LC = T_WL.inverse() * frame.T_WC;
-  for (int v = 0; v < camera.height; v += 4) {
-    for (int u = 0; u < camera.width; u += 4) {
+  const double f = std::min(camera.fx, camera.fy);
+  for (int v = 0; v < camera.height; ++v) {
+    for (int u = 0; u < camera.width; ++u) {
       const InstanceId label = labels.at<std::uint16_t>(v, u);
       const float z = frame.depth.at<float>(v, u);
       if (label == kNoInstance || !IsValidDepth(z) || !wanted(label)) continue;
+      // Whether the next coarser grid of pixels is too coarse at this depth.
+      bool needed = true;
+      for (const int grid : {4, 2, 1}) {
+        if (u % grid == 0 && v % grid == 0) {
+          const bool on_coarser = u % (2 * grid) == 0 && v % (2 * grid) == 0;
+          if (!on_coarser) needed = z > 3 * h * f / (2 * grid);
+          break;
+        }
+      }
+      if (!needed) continue;
       const Eigen::Vector3d ray_C((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
       const double r = z * ray_C.norm();
       const Eigen::Vector3d e = T_LC.linear() * ray_C.normalized();

@@ -55,17 +55,19 @@ std::optional<Seen> View::Look(const Eigen::Vector3i& voxel) const {
 
 bool InBand(float s, const MapConfig& config) { return -config.back() <= s && s <= config.front(); }
 
-void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel) {
+void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel, bool colour_all) {
   if (seen.s < -config.back()) return;
   const auto cap = static_cast<float>(config.weight_cap);
   const float s = std::min(seen.s, config.front());
-  voxel.distance = (voxel.weight * voxel.distance + s) / (voxel.weight + 1.0F);
+  voxel.distance = voxel.distance + (s - voxel.distance) / (voxel.weight + 1.0F);
   voxel.weight = std::min(voxel.weight + 1.0F, cap);
+  const float colour_band = static_cast<float>(2 * config.voxel_m);
   if (!InBand(seen.s, config)) return;
+  if (!colour_all && voxel.colours > 0 && !(std::abs(seen.s) <= colour_band)) return;
+  const float share = 1.0F / (static_cast<float>(voxel.colours) + 1.0F);
   for (int c = 0; c < 3; ++c) {
     const float old = voxel.colour[c];
-    voxel.colour[c] = std::floor(
-        old + (256.0F * seen.colour[c] - old) / (static_cast<float>(voxel.colours) + 1.0F) + 0.5F);
+    voxel.colour[c] = std::floor(old + (256.0F * seen.colour[c] - old) * share + 0.5F);
   }
   voxel.colours = std::min(voxel.colours + 1, config.weight_cap);
 }

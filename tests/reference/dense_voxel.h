@@ -44,8 +44,9 @@ class View {
 
 bool InBand(float s, const MapConfig& config);
 
-// In band or clamped; nothing behind the band.
-void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel);
+// In band or clamped; nothing behind the band. `colour_all`: whatever the distance.
+void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel,
+              bool colour_all = false);
 
 // The eight corners around a point given in voxels.
 struct Neighbourhood {

@@ -130,6 +130,10 @@ TEST(SceneConfig, SaysWhatIsWrongAndWhere) {
        "s.toml:26: 'object[0].drive.ramp_s' is 3, expected 0 to 0.11"},
       {"x = [0.2]", "x = [0.2, 0.3]", "s.toml:28: 'object[0].drive.y' has 1 numbers, x has 2"},
       {"x = [0.2]\ny = [0.3]", "x = [0.1]\ny = [0.1]",
+       "s.toml:27: 'object[0].drive.x' and 'y' begin at the object's own place, from which it "
+       "drives "
+       "off"},
+      {"x = [0.2]\ny = [0.3]", "x = [0.2, 0.2]\ny = [0.3, 0.3]",
        "s.toml:27: 'object[0].drive.x' and 'y' name the same waypoint twice in a row"},
       {"x = [0.2]", "x = [0.2]\nspeed = 3",
        "s.toml:28: 'object[0].drive.speed' is not a known key here"},

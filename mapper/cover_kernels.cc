@@ -1,0 +1,117 @@
+#include "mapper/cover_kernels.h"
+
+// One pass of this file an instruction set (see fusion_kernels.cc).
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "mapper/cover_kernels.cc"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace tsdfpp::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Rows of bits x = -1 ... 8 for y = -1 ... 8 and z = -1 ... 8, 16 rows a slice; beyond the last
+// slice there is room for whole vectors.
+constexpr std::size_t kStride = 16;
+constexpr std::size_t kRows = 10 * kStride;
+constexpr std::size_t kRoom = kRows + 2 * kStride + 64;
+using Rows = std::array<std::uint16_t, kRoom>;
+using Lanes16 = hn::CappedTag<std::uint16_t, 32>;
+
+void GatherRows(const MasksAround& around, Rows& rows) {
+  const hn::CappedTag<std::uint16_t, 8> d16;
+  const hn::Rebind<std::uint8_t, decltype(d16)> d8;
+  for (std::size_t z = 0; z < 10; ++z) {
+    const std::size_t first = z == 0 ? 0 : (z == 9 ? 18 : 9);
+    const std::size_t slice = (z + 7) & 7U;
+    std::uint16_t* to = &rows[kStride * z];
+    const auto word = [&](std::size_t block) { return (*around[first + block])[slice]; };
+    const auto row = [](std::uint64_t left, std::uint64_t own, std::uint64_t right) {
+      return static_cast<std::uint16_t>((left & 0xFFU) >> 7U | (own & 0xFFU) << 1U |
+                                        (right & 1U) << 9U);
+    };
+    to[0] = row(word(0) >> 56U, word(1) >> 56U, word(2) >> 56U);
+    to[9] = row(word(6), word(7), word(8));
+    const std::array<std::uint64_t, 3> words{word(3), word(4), word(5)};
+    for (std::size_t y = 0; y < kBlockSide; y += hn::Lanes(d16)) {
+      const auto bytes = [&](std::size_t k) {
+        return hn::PromoteTo(d16,
+                             hn::LoadU(d8, reinterpret_cast<const std::uint8_t*>(&words[k]) + y));
+      };
+      const auto left = hn::ShiftRight<7>(bytes(0));
+      const auto own = hn::ShiftLeft<1>(bytes(1));
+      const auto right = hn::ShiftLeft<9>(hn::And(bytes(2), hn::Set(d16, 1)));
+      hn::StoreU(hn::Or(left, hn::Or(own, right)), d16, to + 1 + y);
+    }
+  }
+}
+
+// Over a row, the next one, and both of the next slice.
+template <class Combine>
+auto FourRows(const Rows& rows, std::size_t i, const Combine& combine) {
+  const Lanes16 d;
+  const auto at = [&](std::size_t k) { return hn::LoadU(d, &rows[i + k]); };
+  return combine(combine(at(0), at(1)), combine(at(kStride), at(kStride + 1)));
+}
+
+BlockMask Corners(const MasksAround& observed_around, const MasksAround& negative_around) {
+  Rows observed{};
+  Rows negative{};
+  GatherRows(observed_around, observed);
+  GatherRows(negative_around, negative);
+  const Lanes16 d;
+  Rows positive{};
+  for (std::size_t i = 0; i < kRows; i += hn::Lanes(d)) {
+    hn::StoreU(hn::AndNot(hn::LoadU(d, &negative[i]), hn::LoadU(d, &observed[i])), d, &positive[i]);
+  }
+  const auto both = [](auto a, auto b) { return hn::And(a, b); };
+  const auto either = [](auto a, auto b) { return hn::Or(a, b); };
+  // Bit x of row 16 z + y: whether the cube named by voxel (x - 1, y - 1, z - 1) is crossed.
+  Rows crossed{};
+  auto any = hn::Zero(d);
+  const auto nine = hn::Set(d, 0x1FF);
+  for (std::size_t i = 0; i < kRows; i += hn::Lanes(d)) {
+    const auto all = FourRows(observed, i, both);
+    const auto inside = FourRows(negative, i, either);
+    const auto outside = FourRows(positive, i, either);
+    const auto cubes = hn::And(hn::And(hn::And(all, hn::ShiftRight<1>(all)), nine),
+                               hn::And(hn::Or(inside, hn::ShiftRight<1>(inside)),
+                                       hn::Or(outside, hn::ShiftRight<1>(outside))));
+    hn::StoreU(cubes, d, &crossed[i]);
+    any = hn::Or(any, cubes);
+  }
+  BlockMask corners{};
+  if (hn::AllTrue(d, hn::Eq(any, hn::Zero(d)))) return corners;
+  // A voxel is a corner of the cubes named one lower, and its own, along each axis.
+  const hn::CappedTag<std::uint16_t, 8> d16;
+  const hn::Rebind<std::uint8_t, decltype(d16)> d8;
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    for (std::size_t y = 0; y < kBlockSide; y += hn::Lanes(d16)) {
+      const auto at = [&](std::size_t k) { return hn::LoadU(d16, &crossed[kStride * z + y + k]); };
+      const auto row = hn::Or(hn::Or(at(0), at(1)), hn::Or(at(kStride), at(kStride + 1)));
+      const auto bits = hn::And(hn::Or(row, hn::ShiftRight<1>(row)), hn::Set(d16, 0xFF));
+      const hn::RebindToSigned<decltype(d16)> ds;
+      hn::StoreU(hn::DemoteTo(d8, hn::BitCast(ds, bits)), d8,
+                 reinterpret_cast<std::uint8_t*>(&corners[z]) + y);
+    }
+  }
+  return corners;
+}
+
+}  // namespace
+}  // namespace tsdfpp::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tsdfpp {
+
+HWY_EXPORT(Corners);
+
+BlockMask CornersOfCrossedCubes(const MasksAround& observed, const MasksAround& negative) {
+  return HWY_DYNAMIC_DISPATCH(Corners)(observed, negative);
+}
+
+}  // namespace tsdfpp
+#endif
