@@ -34,6 +34,12 @@ function(tsdfpp_room name)
   tsdfpp_compile_options(tsdfpp_${name})
 endfunction()
 
+# tsdfpp_order_tbb(<target>): what ThreadSanitizer has to be told of a libtbb that is not instrumented.
+function(tsdfpp_order_tbb target)
+  target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/sanitizers/tbb_happens_before.cc)
+  target_link_libraries(${target} PRIVATE TBB::tbb ${CMAKE_DL_LIBS})
+endfunction()
+
 # tsdfpp_test(<name> SOURCES ... LINK ...): one GoogleTest binary, its tests discovered by CTest.
 function(tsdfpp_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
@@ -44,6 +50,9 @@ function(tsdfpp_test name)
     ${name} PRIVATE TSDFPP_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                     TSDFPP_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared"
                     TSDFPP_COMMAND="${PROJECT_BINARY_DIR}/tsdfpp")
+  if(TSDFPP_SANITIZE MATCHES "thread")
+    tsdfpp_order_tbb(${name})
+  endif()
   tsdfpp_compile_options(${name})
   include(GoogleTest)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 600)
