@@ -55,9 +55,9 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
   TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
   const std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
-      "--until {}",
+      "--until {}{}",
       TextOf(options.source), options.out, options.methods, options.profiles, options.poses,
-      config.map.voxel_m, config.every, config.until);
+      config.map.voxel_m, config.every, config.until, config.record ? " --record" : "");
   ProgressBar bar("compare");
   const auto show = [&](int done, int total) { bar.Show(done, total); };
   TSDFPP_ASSIGN(const CompareResult result,
@@ -89,6 +89,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->config.until,
                  "Where to stop: reveal, end, or a frame's number")
       ->capture_default_str();
+  app.add_flag("--record", options->config.record,
+               "Keep what the 3-D view of `tsdfpp report` shows, below OUT/record/");
   return [options] { return RunCompareCommand(*options); };
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/report.h"
 
 namespace {
 
@@ -34,6 +35,7 @@ int RunCommand(int argc, char** argv) {
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+  add("report", "Make a page of what compare wrote, in one HTML file", tsdfpp::AddReport);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
 

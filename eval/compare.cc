@@ -10,6 +10,7 @@
 #include "core/files.h"
 #include "eval/compare_report.h"
 #include "eval/pictures.h"
+#include "eval/report_record.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -77,6 +78,11 @@ std::string CompareRun::FolderName() const {
   return name;
 }
 
+bool IsEvaluated(const CompareResult& result, int frame) {
+  return (frame - result.info.first_index + 1) % result.config.every == 0 ||
+         frame == result.last_frame || frame == result.reveal_frame;
+}
+
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
                                    const std::filesystem::path& out, const std::string& command,
                                    const CompareProgress& progress) {
@@ -110,6 +116,8 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   const int first = result.info.first_index;
   const int total = result.last_frame - first + 1;
   PictureMaker pictures(result, out);
+  std::optional<ReportRecorder> recorder;
+  if (config.record) recorder.emplace(result, out);
   for (int index = first; index <= result.last_frame; ++index) {
     const auto read_start = std::chrono::steady_clock::now();
     TSDFPP_ASSIGN(const Frame frame, source.Read(index));
@@ -121,18 +129,20 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     if (frame.mask.empty()) return DataError("{}: frame {} has no mask", result.info.name, index);
     TSDFPP_RETURN_IF_ERROR(result.truth->Observe(true_frame ? *true_frame : frame));
     const bool reveal = index == result.reveal_frame;
-    const bool evaluate =
-        (index - first + 1) % config.every == 0 || index == result.last_frame || reveal;
+    const bool evaluate = IsEvaluated(result, index);
+    if (recorder) recorder->SeeFrame(true_frame ? *true_frame : frame);
     for (const auto& run : result.runs) {
       const std::int64_t before = ResidentBytes();
       run->times.Add(run->pipeline.Process(frame));
       run->process_growth_bytes += ResidentBytes() - before;
+      if (recorder) recorder->SeeMap(*run);
       if (!evaluate) continue;
       run->evaluations.push_back(Evaluate(run->pipeline.map(), *result.truth, names, result.movers,
                                           run->config.map.voxel_m, run->last_seen));
       Evaluation& evaluation = run->evaluations.back();
       run->times.mesh_s.push_back(evaluation.mesh_s);
       TSDFPP_RETURN_IF_ERROR(pictures.Take(*run, evaluation, frame));
+      if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(*run, evaluation, frame));
       const bool examined = reveal || (!result.reveal_frame && index == result.last_frame);
       if (examined) {
         const std::filesystem::path folder = out / run->FolderName();
@@ -147,6 +157,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     if (progress) progress(index - first + 1, total);
   }
   TSDFPP_RETURN_IF_ERROR(pictures.Finish());
+  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Write());
   result.total_s = since(start);
   TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
   TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));

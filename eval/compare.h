@@ -22,6 +22,7 @@ struct CompareConfig {
   // "reveal" stops at the reveal frame (the last one where the sequence has none), "end" goes on to
   // the last frame without removal, a number stops there.
   std::string until = "reveal";
+  bool record = false;  // what `tsdfpp report` shows in 3-D, below record/ (docs/report.md)
 };
 
 // One map of the comparison.
@@ -53,6 +54,9 @@ struct CompareResult {
   double read_s = 0;  // rendering or reading
   double total_s = 0;
 };
+
+// Whether the maps are evaluated at a frame: every `every`-th, the reveal, the last.
+bool IsEvaluated(const CompareResult& result, int frame);
 
 // Called after each frame.
 using CompareProgress = std::function<void(int done, int total)>;

@@ -44,6 +44,10 @@ class PictureMaker {
   std::map<int, cv::Mat> camera_;  // colour images of the columns
 };
 
+// Okabe and Ito's colours, which colour-blind readers can tell apart, in turn by id; the background
+// is grey.
+Colour ObjectColour(InstanceId id);
+
 // A mesh with face ids as the frame's camera sees it, `scale` times smaller: one colour an object,
 // shaded; white where there is nothing. CV_8UC3, red-green-blue.
 cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, const Pose& T_WC,
