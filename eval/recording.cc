@@ -95,7 +95,7 @@ std::vector<int> Recording::KeyFrames() const {
   return frames;
 }
 
-int Recording::DropKeyFrame(std::optional<int> keep) {
+int Recording::LeastKeyFrame(std::optional<int> keep) const {
   const std::vector<int> frames = KeyFrames();
   std::size_t least = 0;
   int least_gap = std::numeric_limits<int>::max();
@@ -106,10 +106,13 @@ int Recording::DropKeyFrame(std::optional<int> keep) {
     least_gap = gap;
   }
   if (frames[least] == keep) least = frames.size() - 1;
-  const int dropped = frames[least];
+  return frames[least];
+}
+
+void Recording::DropKeyFrame(int frame) {
   const auto drop = [&](nlohmann::json& list) {
     list.erase(std::remove_if(list.begin(), list.end(),
-                              [&](const nlohmann::json& key) { return key["frame"] == dropped; }),
+                              [&](const nlohmann::json& key) { return key["frame"] == frame; }),
                list.end());
   };
   drop(json["key_frames"]);
@@ -122,7 +125,6 @@ int Recording::DropKeyFrame(std::optional<int> keep) {
     return true;
   });
   bytes = std::move(kept);
-  return dropped;
 }
 
 Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& folder) {

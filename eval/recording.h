@@ -17,10 +17,12 @@ struct Recording {
 
   std::vector<int> KeyFrames() const;
 
-  // Takes out the key frame that is missed least, the one whose neighbours are nearest to each
-  // other, but neither the first, the last nor `keep`, as long as there are others; and its bytes.
-  // Returns its number. There must be two key frames at least.
-  int DropKeyFrame(std::optional<int> keep);
+  // The key frame that would be missed least: the one whose neighbours are nearest to each other,
+  // but neither the last nor `keep` as long as there are others. There must be two at least.
+  int LeastKeyFrame(std::optional<int> keep) const;
+
+  // Takes a key frame out, with its bytes; nothing happens where there is none of this number.
+  void DropKeyFrame(int frame);
 };
 
 // Nothing where `folder` has no recording. Errors: kData where the recording is incomplete, names

@@ -192,12 +192,16 @@ Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& fo
       return DataError("the report would have {} bytes, expected at most {}",
                        page.size() + data.size(), largest_bytes);
     }
-    const int dropped = longest->recording->DropKeyFrame(
-        longest->summary.value("reveal_frame", json()).is_number()
-            ? std::optional<int>(longest->summary["reveal_frame"].get<int>())
-            : std::nullopt);
-    made.remarks.push_back(fmt::format("key frame {} of '{}' is left out to stay below {} MB",
-                                       dropped, longest->folder.string(),
+    const nlohmann::json& examined = longest->summary["reveal_frame"];
+    const int frame = longest->recording->LeastKeyFrame(
+        examined.is_number_integer() ? std::optional(examined.get<int>()) : std::nullopt);
+    // The maps stand side by side at one frame, so it goes everywhere.
+    for (Comparison& comparison : comparisons) {
+      if (comparison.recording && comparison.recording->KeyFrames().size() > 1) {
+        comparison.recording->DropKeyFrame(frame);
+      }
+    }
+    made.remarks.push_back(fmt::format("key frame {} is left out to stay below {} MB", frame,
                                        largest_bytes / 1'000'000));
   }
   return made;

@@ -303,7 +303,10 @@ void ReportRecorder::AddChunks(const TriangleMesh& mesh, const char* layer, std:
     const auto [near, far] = SplitByBox(faces, table);
     const auto for_far = static_cast<std::size_t>(kFarShare * static_cast<double>(triangles));
     add(far, *id, for_far);
-    add(near, *id, triangles - for_far);
+    // Its locked borders can have kept more.
+    const std::size_t of_far =
+        far.triangles.empty() ? 0 : chunks.back()["triangles"].get<std::size_t>();
+    add(near, *id, triangles - std::min(triangles, of_far));
   }
 }
 

@@ -84,6 +84,16 @@ function nameOf(run, several, letter) {
   return several ? `${letter}: ${run.title}` : run.title;
 }
 
+// The run's rows of frames.csv. Its six digits can round twice where the page rounds again, so the hole
+// of the examined frame is the summary's.
+function rowsOf(report, run) {
+  const rows = report.csv.rows.filter((row) => row.method === run.method && row.profile === run.profile &&
+                                               row.poses === run.poses);
+  const exact = measured(run.examined?.objects?.[0]?.hole_area_cm2);
+  return rows.map((row) => (row.frame === run.examined?.frame && exact !== null
+    ? { ...row, table_hole_area_cm2: exact } : row));
+}
+
 // { command, version, reports: [{ name, summary, csv, pictures, recording }], runs: [...] }, where
 // `runs` lists every map of every report.
 export function loadData() {
@@ -100,8 +110,7 @@ export function loadData() {
     report: r,
     key: `${r}/${run.folder}`,
     label: nameOf(run, several, report.letter),
-    rows: report.csv.rows.filter((row) => row.method === run.method && row.profile === run.profile &&
-                                          row.poses === run.poses),
+    rows: rowsOf(report, run),
     recorded: report.recording?.runs.find((recorded) => recorded.folder === run.folder) ?? null,
     recording: report.recording,
   })));
