@@ -121,7 +121,8 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
       "--until {}{}",
       TextOf(options.source), options.out, options.methods, options.profiles, options.poses,
-      config.map.voxel_m, config.every, config.until, config.keep_meshes ? " --keep-meshes" : "");
+      config.map.voxel_m, config.every, config.until, config.keep_meshes ? " --keep-meshes" : "",
+      config.record ? " --record" : "");
   if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
   if (!options.removed.empty()) command += " --removed " + options.removed;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
@@ -167,6 +168,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
       ->check(NotEmpty("a .toml file"));
   app.add_flag("--keep-meshes", options->config.keep_meshes,
                "Write every evaluated frame's meshes, as `tsdfpp evaluate` reads them");
+  app.add_flag("--record", options->config.record,
+               "Keep what the 3-D view of `tsdfpp report` shows, below OUT/record/");
   return [options] { return RunCompareCommand(*options); };
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/report.h"
 
 namespace {
 
@@ -36,6 +37,7 @@ int RunCommand(int argc, char** argv) {
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
   add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
       tsdfpp::AddEvaluate);
+  add("report", "Make a page of what compare wrote, in one HTML file", tsdfpp::AddReport);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
 

@@ -11,6 +11,7 @@
 #include "eval/compare_report.h"
 #include "eval/mesh_folder.h"
 #include "eval/pictures.h"
+#include "eval/report_record.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -122,6 +123,11 @@ std::string CompareRun::FolderName() const {
   return name;
 }
 
+bool IsEvaluated(const CompareResult& result, int frame) {
+  return (frame - result.info.first_index + 1) % result.config.every == 0 ||
+         frame == result.last_frame || frame == result.reveal_frame;
+}
+
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
                                    const std::filesystem::path& out, const std::string& command,
                                    const CompareProgress& progress) {
@@ -154,13 +160,9 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
 
   const int first = result.info.first_index;
   const int total = result.last_frame - first + 1;
-  const auto is_evaluated = [&](int index) {
-    return (index - first + 1) % config.every == 0 || index == result.last_frame ||
-           index == result.reveal_frame;
-  };
   AdapterTask task{{}, first, result.last_frame, {}, result.movers, config.map.voxel_m, 0};
   for (int index = first; index <= result.last_frame; ++index) {
-    if (is_evaluated(index)) task.frames.push_back(index);
+    if (IsEvaluated(result, index)) task.frames.push_back(index);
   }
   MapConfig settings = config.map;
   if (!config.profiles.empty()) {
@@ -170,6 +172,8 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, out, result));
   Trajectory camera;
   PictureMaker pictures(result, out);
+  std::optional<ReportRecorder> recorder;
+  if (config.record) recorder.emplace(result, out);
   for (int index = first; index <= result.last_frame; ++index) {
     const auto read_start = std::chrono::steady_clock::now();
     TSDFPP_ASSIGN(const Frame frame, source.Read(index));
@@ -182,11 +186,13 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     TSDFPP_RETURN_IF_ERROR(result.truth->Observe(true_frame ? *true_frame : frame));
     camera[index] = true_frame ? true_frame->T_WC : frame.T_WC;
     const bool reveal = index == result.reveal_frame;
-    const bool evaluate = is_evaluated(index);
+    const bool evaluate = IsEvaluated(result, index);
+    if (recorder) recorder->SeeFrame(true_frame ? *true_frame : frame);
     for (const auto& run : result.runs) {
       const std::int64_t before = ResidentBytes();
       run->times.Add(run->pipeline.Process(frame));
       run->process_growth_bytes += ResidentBytes() - before;
+      if (recorder) recorder->SeeMap(*run);
       if (!evaluate) continue;
       SceneMeshes meshes = MeshesOf(run->pipeline.map(), result.movers);
       if (config.keep_meshes) {
@@ -198,6 +204,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
       Evaluation& evaluation = run->evaluations.back();
       run->times.mesh_s.push_back(evaluation.mesh_s);
       TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
+      if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(*run, evaluation, frame));
       const bool examined = reveal || (!result.reveal_frame && index == result.last_frame);
       if (examined) {
         const std::filesystem::path folder = out / run->FolderName();
@@ -223,6 +230,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   }
   for (const auto& run : result.adapters) ScoreTrajectories(*run, names, *result.truth, camera);
   TSDFPP_RETURN_IF_ERROR(pictures.Finish());
+  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Write());
   result.total_s = since(start);
   TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
   TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));

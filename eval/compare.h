@@ -32,6 +32,7 @@ struct CompareConfig {
   TruthOptions truth;
   // Said wherever scores are shown, e.g. what stands in for true surfaces; may be empty.
   std::string truth_note;
+  bool record = false;  // what `tsdfpp report` shows in 3-D, below record/ (docs/report.md)
 };
 
 // One map of the comparison.
@@ -64,6 +65,9 @@ struct CompareResult {
   double read_s = 0;                                  // rendering or reading
   double total_s = 0;
 };
+
+// Whether the maps are evaluated at a frame: every `every`-th, the reveal, the last.
+bool IsEvaluated(const CompareResult& result, int frame);
 
 // Called after each frame.
 using CompareProgress = std::function<void(int done, int total)>;

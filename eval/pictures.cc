@@ -15,19 +15,6 @@ constexpr double kCellWidth = 384;  // pixels; images are scaled to it
 constexpr double kTablePixel_m = 0.0025;
 constexpr std::size_t kMaxColumns = 4;
 
-// Okabe and Ito's colours, which colour-blind readers can tell apart; the background is grey.
-Colour ColourOf(InstanceId id) {
-  constexpr std::array<Colour, 7> kPalette{{{0, 114, 178},
-                                            {230, 159, 0},
-                                            {0, 158, 115},
-                                            {204, 121, 167},
-                                            {86, 180, 233},
-                                            {213, 94, 0},
-                                            {240, 228, 66}}};
-  if (id == kBackground) return {205, 203, 198};
-  return kPalette[(id - 1U) % kPalette.size()];
-}
-
 void Write(cv::Mat& image, const std::string& text, cv::Point at, double size = 0.5,
            int thickness = 1) {
   cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, size, cv::Scalar(30, 30, 30), thickness,
@@ -76,6 +63,18 @@ cv::Mat Grid(const std::vector<std::string>& columns, const std::vector<std::str
 
 }  // namespace
 
+Colour ObjectColour(InstanceId id) {
+  constexpr std::array<Colour, 7> kPalette{{{0, 114, 178},
+                                            {230, 159, 0},
+                                            {0, 158, 115},
+                                            {204, 121, 167},
+                                            {86, 180, 233},
+                                            {213, 94, 0},
+                                            {240, 228, 66}}};
+  if (id == kBackground) return {205, 203, 198};
+  return kPalette[(id - 1U) % kPalette.size()];
+}
+
 cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, const Pose& T_WC,
                   double scale) {
   const Raster raster = Rasterise(scene_W, intrinsics, T_WC);
@@ -94,8 +93,8 @@ cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, con
       const float light =
           facing > 0 ? 0.35F + 0.45F * facing + 0.2F * std::max(0.0F, normal.z()) : 0.2F;
       const Colour base = scene_W.face_ids.empty()
-                              ? ColourOf(kBackground)
-                              : ColourOf(scene_W.face_ids[static_cast<std::size_t>(face)]);
+                              ? ObjectColour(kBackground)
+                              : ObjectColour(scene_W.face_ids[static_cast<std::size_t>(face)]);
       auto& pixel = image.at<cv::Vec3b>(v, u);
       for (int c = 0; c < 3; ++c) {
         pixel[c] = static_cast<std::uint8_t>(static_cast<float>(base[static_cast<std::size_t>(c)]) *

@@ -45,6 +45,10 @@ class PictureMaker {
   std::map<int, cv::Mat> camera_;  // colour images of the columns
 };
 
+// Okabe and Ito's colours, which colour-blind readers can tell apart, in turn by id; the background
+// is grey.
+Colour ObjectColour(InstanceId id);
+
 // A mesh as the frame's camera sees it, `scale` times smaller: one colour an object (the
 // background's where there are no face ids), shaded; white where there is nothing. CV_8UC3,
 // red-green-blue.
