@@ -36,8 +36,8 @@ TEST(PaperPlan, RevealsWhatIsUnderTheCarsAtFrame256) {
   EXPECT_EQ(PaperPlan(info).frame, 100);
 }
 
-// A pixel of the 64x48 images is 25 mm wide on the wall: a surface is known to half of it, times its
-// slope, and goes on by half of it (18 mm across) at its edges.
+// A pixel of the 64x48 images is 25 mm wide on the wall: a surface is known to half of it, times
+// its slope, and goes on by half of it (18 mm across) at its edges.
 constexpr double kStandInVoxel_m = 0.01;
 
 TEST(StandInTruth, LiesOnTheTrueSurfaces) {
