@@ -14,9 +14,9 @@
 #include <map>
 #include <sstream>
 
-#include "bench/open3d_peer.h"
-#include "bench/voxel_block_grid.h"
 #include "core/files.h"
+#include "eval/adapters/open3d_peer.h"
+#include "eval/adapters/voxel_block_grid.h"
 #include "eval/open_source.h"
 #include "mapper/pipeline.h"
 

@@ -33,6 +33,7 @@ Run AddVerify(CLI::App& app, const CommonOptions& common);
 Run AddExport(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
+Run AddEvaluate(CLI::App& app, const CommonOptions& common);
 Run AddMetric(CLI::App& app, const CommonOptions& common);
 
 // A progress bar on stderr, with frames a second and the time left, where that is a terminal;

@@ -34,6 +34,8 @@ int RunCommand(int argc, char** argv) {
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+  add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
+      tsdfpp::AddEvaluate);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
 
