@@ -38,8 +38,7 @@ int RunCommand(int argc, char** argv) {
       tsdfpp::AddEvaluate);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
-  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired",
-      tsdfpp::AddSweep);
+  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired", tsdfpp::AddSweep);
   add("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
   add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
       tsdfpp::AddBenchSet);
