@@ -139,8 +139,8 @@ std::string NotAhead(const ExperimentConfig& config, const std::vector<Condition
               ? (p.interval.value ? p.interval.value->low : *p.mean_difference.value)
               : -(p.interval.value ? p.interval.value->high : *p.mean_difference.value);
       ++asked[method];
-      std::string text = ConditionText(condition, varied);
-      if (text.empty()) text = fmt::format("grid {}", condition.grid);
+      std::string text = ConditionText(condition, varied, config.grids.size() > 1);
+      if (text.empty()) text = "in its one condition";
       if (worst <= 0) where[method].push_back(text);
     }
   }
@@ -245,7 +245,7 @@ std::string SweepText(const SweepResult& result, const std::vector<Condition>& c
                              100 * config.statistics.confidence)
                : std::string("single runs"));
   for (const Condition& condition : conditions) {
-    const std::string where = ConditionText(condition, varied);
+    const std::string where = ConditionText(condition, varied, config.grids.size() > 1);
     for (const std::string& name : config.metrics) {
       text += fmt::format("{}{}", where.empty() ? "" : where + ": ",
                           MetricText(config, *FindMetric(name), condition));

@@ -99,9 +99,12 @@ std::vector<std::string> VariedAxes(const std::vector<Condition>& conditions) {
   return varied;
 }
 
-std::string ConditionText(const Condition& condition, const std::vector<std::string>& varied) {
-  std::string text;
+std::string ConditionText(const Condition& condition, const std::vector<std::string>& varied,
+                          bool several_grids) {
+  std::string text = several_grids ? condition.grid : std::string();
   for (const std::string& axis : varied) {
+    // A file's name, where the grid's says it already.
+    if (axis == "scene" && several_grids) continue;
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", axis,
                         AxisText(condition.settings.at(axis)));
   }

@@ -36,7 +36,9 @@ std::vector<Condition> ConditionsOf(const SweepResult& result);
 // The axes, method and replicates left out, that have several values in the experiment.
 std::vector<std::string> VariedAxes(const std::vector<Condition>& conditions);
 
-// "voxel_m 0.01, speed 2": the varied axes of a condition.
-std::string ConditionText(const Condition& condition, const std::vector<std::string>& varied);
+// "voxel_m 0.01, speed 2": the varied axes of a condition; with its grid's name before them where
+// the experiment has several.
+std::string ConditionText(const Condition& condition, const std::vector<std::string>& varied,
+                          bool several_grids);
 
 }  // namespace tsdfpp
