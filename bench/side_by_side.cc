@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "bench/median.h"
-#include "bench/open3d_peer.h"
+#include "eval/adapters/open3d_peer.h"
 #include "eval/open_source.h"
 #include "mapper/pipeline.h"
 

@@ -33,7 +33,11 @@ Run AddVerify(CLI::App& app, const CommonOptions& common);
 Run AddExport(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
+Run AddEvaluate(CLI::App& app, const CommonOptions& common);
 Run AddMetric(CLI::App& app, const CommonOptions& common);
+Run AddBenchSet(CLI::App& app, const CommonOptions& common);
+Run AddReplay(CLI::App& app, const CommonOptions& common);
+Run AddSweep(CLI::App& app, const CommonOptions& common);
 
 // A progress bar on stderr, with frames a second and the time left, where that is a terminal;
 // silent elsewhere.

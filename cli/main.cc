@@ -34,8 +34,15 @@ int RunCommand(int argc, char** argv) {
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+  add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
+      tsdfpp::AddEvaluate);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
+  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired",
+      tsdfpp::AddSweep);
+  add("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
+  add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
+      tsdfpp::AddBenchSet);
 
   try {
     app.parse(argc, argv);

@@ -7,11 +7,11 @@
 #include <map>
 #include <string>
 
+#include "eval/open3d_volume.h"
 #include "mapper/map_representation.h"
 #include "metrics/preservation.h"
 #include "metrics/truth_surface.h"
 #include "metrics/visibility.h"
-#include "tests/eval/open3d_volume.h"
 #include "tests/eval/seen_surface.h"
 #include "tests/mapper/map_snapshot.h"
 

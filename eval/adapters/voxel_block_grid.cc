@@ -1,4 +1,4 @@
-#include "bench/voxel_block_grid.h"
+#include "eval/adapters/voxel_block_grid.h"
 
 #include <open3d/core/EigenConverter.h>
 #include <open3d/t/geometry/TriangleMesh.h>
@@ -15,6 +15,7 @@ namespace o3d = open3d::core;
 // float distance, 16-bit weight, three 16-bit colours
 constexpr std::size_t kVoxelBytes = 4 + 2 + 3 * 2;
 constexpr std::int64_t kReservedBlocks = 40000;
+constexpr float kAnyWeight = 0.5F;  // observed at all
 
 o3d::Tensor MatrixOf(const Eigen::MatrixXd& matrix) {
   return o3d::eigen_converter::EigenMatrixToTensor(matrix);
@@ -68,11 +69,28 @@ void VoxelBlockGridPeer::Integrate(const Frame& frame) {
 }
 
 VoxelBlockGridPeer::Mesh VoxelBlockGridPeer::ExtractMesh() const {
-  constexpr float kAnyWeight = 0.5F;  // observed at all
   const auto start = std::chrono::steady_clock::now();
   const auto mesh = impl_->grid.ExtractTriangleMesh(kAnyWeight);
   return {std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
           static_cast<std::size_t>(mesh.GetTriangleIndices().GetLength())};
+}
+
+TriangleMesh VoxelBlockGridPeer::Triangles() const {
+  const auto extracted = impl_->grid.ExtractTriangleMesh(kAnyWeight);
+  const o3d::Tensor positions = extracted.GetVertexPositions().To(o3d::Float32).Contiguous();
+  const o3d::Tensor indices = extracted.GetTriangleIndices().To(o3d::Int32).Contiguous();
+  const auto* position = static_cast<const float*>(positions.GetDataPtr());
+  const auto* index = static_cast<const std::int32_t*>(indices.GetDataPtr());
+  TriangleMesh mesh;
+  for (std::int64_t i = 0; i < positions.GetLength(); ++i) {
+    mesh.vertices.emplace_back(position[3 * i], position[3 * i + 1], position[3 * i + 2]);
+  }
+  for (std::int64_t i = 0; i < indices.GetLength(); ++i) {
+    mesh.triangles.push_back({static_cast<std::uint32_t>(index[3 * i]),
+                              static_cast<std::uint32_t>(index[3 * i + 1]),
+                              static_cast<std::uint32_t>(index[3 * i + 2])});
+  }
+  return mesh;
 }
 
 std::size_t VoxelBlockGridPeer::OccupiedBytes() const {

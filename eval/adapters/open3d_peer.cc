@@ -1,4 +1,4 @@
-#include "bench/open3d_peer.h"
+#include "eval/adapters/open3d_peer.h"
 
 #include <omp.h>
 #include <open3d/geometry/RGBDImage.h>
@@ -43,6 +43,25 @@ Open3dVolume::Mesh Open3dVolume::ExtractMesh() const {
   const auto mesh = impl_->volume.ExtractTriangleMesh();
   return {std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
           mesh->triangles_.size()};
+}
+
+TriangleMesh Open3dVolume::Triangles() const {
+  const auto extracted = impl_->volume.ExtractTriangleMesh();
+  TriangleMesh mesh;
+  for (const Eigen::Vector3d& vertex : extracted->vertices_) {
+    mesh.vertices.push_back(vertex.cast<float>());
+  }
+  for (const Eigen::Vector3d& colour : extracted->vertex_colors_) {
+    constexpr double kFull = 255;
+    mesh.colours.push_back({static_cast<std::uint8_t>(kFull * colour.x() + 0.5),
+                            static_cast<std::uint8_t>(kFull * colour.y() + 0.5),
+                            static_cast<std::uint8_t>(kFull * colour.z() + 0.5)});
+  }
+  for (const Eigen::Vector3i& t : extracted->triangles_) {
+    mesh.triangles.push_back({static_cast<std::uint32_t>(t[0]), static_cast<std::uint32_t>(t[1]),
+                              static_cast<std::uint32_t>(t[2])});
+  }
+  return mesh;
 }
 
 std::size_t Open3dVolume::OccupiedBytes() const {

@@ -1,4 +1,4 @@
-#include "tests/eval/open3d_volume.h"
+#include "eval/open3d_volume.h"
 
 #include <omp.h>
 #include <open3d/geometry/RGBDImage.h>

@@ -22,6 +22,8 @@ class Open3dVolume {
   };
   // Times the extraction of all triangles.
   Mesh ExtractMesh() const;
+  // The same triangles, in the world, without ids.
+  TriangleMesh Triangles() const;
   // The voxels of all blocks.
   std::size_t OccupiedBytes() const;
 

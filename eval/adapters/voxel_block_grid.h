@@ -20,6 +20,8 @@ class VoxelBlockGridPeer {
   };
   // Times the extraction alone. Open3D 0.16 may abort in it or hang.
   Mesh ExtractMesh() const;
+  // The same triangles, in the world, without colours and ids.
+  TriangleMesh Triangles() const;
   // Values of the blocks that were ever observed, without the grid's reserve.
   std::size_t OccupiedBytes() const;
 
