@@ -38,11 +38,11 @@ int RunCommand(int argc, char** argv) {
       tsdfpp::AddEvaluate);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
-  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired",
-      tsdfpp::AddSweep);
+  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired", tsdfpp::AddSweep);
   add("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
   add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
       tsdfpp::AddBenchSet);
+  add("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
 
   try {
     app.parse(argc, argv);
@@ -73,7 +73,7 @@ int RunCommand(int argc, char** argv) {
   }
   const std::string text = common.json ? result->json.dump(2) + "\n" : result->text;
   std::fputs(text.c_str(), stdout);
-  return std::fflush(stdout) == 0 ? 0 : static_cast<int>(ErrorKind::kEnvironment);
+  return std::fflush(stdout) == 0 ? result->exit_code : static_cast<int>(ErrorKind::kEnvironment);
 }
 
 }  // namespace
