@@ -23,6 +23,7 @@ struct CommonOptions {
 struct CommandResult {
   nlohmann::json json;
   std::string text;
+  int exit_code = 0;  // of a command that ran but whose verdict is not good
 };
 
 // Registers the subcommand's options on `app`; returns what to run once they are parsed.
@@ -31,6 +32,7 @@ Run AddDoctor(CLI::App& app, const CommonOptions& common);
 Run AddGenerate(CLI::App& app, const CommonOptions& common);
 Run AddVerify(CLI::App& app, const CommonOptions& common);
 Run AddExport(CLI::App& app, const CommonOptions& common);
+Run AddGate(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
 Run AddEvaluate(CLI::App& app, const CommonOptions& common);

@@ -44,6 +44,7 @@ int RunCommand(int argc, char** argv) {
   add("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
   add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
       tsdfpp::AddBenchSet);
+  add("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
 
   try {
     app.parse(argc, argv);
@@ -74,7 +75,7 @@ int RunCommand(int argc, char** argv) {
   }
   const std::string text = common.json ? result->json.dump(2) + "\n" : result->text;
   std::fputs(text.c_str(), stdout);
-  return std::fflush(stdout) == 0 ? 0 : static_cast<int>(ErrorKind::kEnvironment);
+  return std::fflush(stdout) == 0 ? result->exit_code : static_cast<int>(ErrorKind::kEnvironment);
 }
 
 }  // namespace

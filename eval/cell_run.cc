@@ -48,19 +48,24 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
                                            const std::function<void()>& progress) {
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
-  TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source.source()));
+  TSDFPP_ASSIGN(SceneTruth truth,
+                SabotagedTruth(variant.sabotage, source.source(), variant.voxel_m));
   std::vector<ObjectInfo> names;
   for (std::size_t i = 0; i < truth.trackers().size(); ++i) {
     names.push_back(truth.surface(i).model().info);
   }
   struct Run {
+    Sabotage sabotage;
     CellMapper mapper;
     LastSeenStores last_seen;
     CellResult result;
   };
   std::vector<Run> runs;
   for (const Cell* cell : cells) {
-    runs.push_back({{cell->settings, source.info().objects}, MakeLastSeenStores(truth), {}});
+    runs.push_back({cell->settings.sabotage,
+                    {cell->settings, source.info().objects},
+                    MakeLastSeenStores(truth),
+                    {}});
   }
   std::map<int, std::string> digests;
   for (const int index : variant.frames) {
@@ -74,9 +79,15 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
       run.mapper.Process(both.frame);
       if (!evaluated) continue;
       SceneMeshes meshes = run.mapper.Meshes(movers);
+      SabotageMeshes(run.sabotage, meshes);
+      std::optional<SceneTruth> visible;
+      if (run.sabotage == Sabotage::kVisibleOnly) {
+        TSDFPP_ASSIGN(visible, TruthOfRecentFrames(source.source(), truth.recent()));
+      }
       CellFrame frame{index, index == variant.examined, {}, MeshDigest(meshes.scene)};
-      const Evaluation evaluation = EvaluateMeshes(std::move(meshes), truth, names, movers,
-                                                   run.mapper.voxel_m(), run.last_seen);
+      const Evaluation evaluation =
+          EvaluateMeshes(std::move(meshes), visible ? *visible : truth, names, movers,
+                         run.mapper.voxel_m(), run.last_seen);
       std::vector<Measured> values = MeasureAll(evaluation, movers, run.mapper.costs());
       if (frame.examined) {
         run.result.examined = values;

@@ -136,6 +136,9 @@ std::string SequenceVariant::Key() const {
   for (const int frame : frames) key += fmt::format(" {}", frame);
   key += fmt::format("\nexamined {} of", examined);
   for (const int frame : evaluated) key += fmt::format(" {}", frame);
+  if (sabotage != Sabotage::kNone) {
+    key += fmt::format("\nsabotage {} {}", SabotageName(sabotage), voxel_m);
+  }
   return key + "\n" + scene_text;
 }
 
@@ -150,6 +153,8 @@ Expected<SequenceVariant> VariantMaker::Make(const CellSettings& settings) {
   variant.scene = known->second;
   variant.fuse_until = settings.fuse_until;
   variant.object_error = settings.object_error;
+  if (IsOfSequence(settings.sabotage)) variant.sabotage = settings.sabotage;
+  if (settings.sabotage == Sabotage::kTruthShifted) variant.voxel_m = settings.voxel_m;
   const auto fit = [&]() -> Expected<void> {
     TSDFPP_RETURN_IF_ERROR(KeepObjects(settings.objects, variant.scene));
     TSDFPP_RETURN_IF_ERROR(SetSensor(settings, variant.scene.sensor));
@@ -176,11 +181,13 @@ Expected<VariantSource> VariantSource::Open(const SequenceVariant& variant) {
 
 Expected<VariantFrame> VariantSource::Read(int index) {
   VariantFrame both;
+  TSDFPP_RETURN_IF_ERROR(sabotage_.Prepare(*source_, index));
   TSDFPP_ASSIGN(both.frame, source_->Read(index));
   both.truth = both.frame;
   if (source_->IsSensed()) {
     TSDFPP_ASSIGN(both.truth, source_->ReadTrue(index));
   }
+  sabotage_.Apply(info(), both.frame);
   if (variant_->object_error > 0) {
     for (auto& [id, T_WO] : both.frame.T_WO) {
       if (id == kBackground) continue;

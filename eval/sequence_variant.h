@@ -20,6 +20,8 @@ struct SequenceVariant {
   std::map<std::string, std::filesystem::path> inputs;  // sim/scene_inputs.h
   int fuse_until = 0;                                   // CellSettings::fuse_until
   double object_error = 0;                              // CellSettings::object_error
+  Sabotage sabotage = Sabotage::kNone;                  // where IsOfSequence
+  double voxel_m = 0;                                   // by which kTruthShifted shifts
   std::vector<int> frames;                              // those used, in order
   std::vector<int> evaluated;                           // of those
   int examined = 0;  // the reveal, where it is among the frames, else the last
@@ -66,10 +68,13 @@ class VariantSource {
 
  private:
   VariantSource(const SequenceVariant& variant, std::unique_ptr<SimulatedSource> source)
-      : variant_(&variant), source_(std::move(source)) {}
+      : variant_(&variant),
+        source_(std::move(source)),
+        sabotage_(variant.sabotage, variant.frames) {}
 
   const SequenceVariant* variant_;
   std::unique_ptr<SimulatedSource> source_;
+  FrameSabotage sabotage_;
 };
 
 // One of the streams of random numbers (sim/sensor_streams.h has the sensor's).

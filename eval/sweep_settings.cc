@@ -104,6 +104,14 @@ Expected<void> SetResampling(Settings& settings, const AxisValue& value) {
   return known ? Expected<void>{} : Because(value, known.error());
 }
 
+Expected<void> SetSabotage(Settings& settings, const AxisValue& value) {
+  TSDFPP_ASSIGN(const std::string name, Text(value, "none or the name of a sabotage"));
+  const auto known = SabotageFromName(name);
+  if (!known) return Because(value, known.error());
+  settings.sabotage = *known;
+  return {};
+}
+
 constexpr int kMost = std::numeric_limits<int>::max();
 
 std::vector<Axis> MakeAxes() {
@@ -144,6 +152,8 @@ std::vector<Axis> MakeAxes() {
        [](const Settings& s) -> AxisValue { return static_cast<double>(s.layers); }},
       {"poses", SetPoses, [](const Settings& s) -> AxisValue { return s.poses; }},
       {"resampling", SetResampling, [](const Settings& s) -> AxisValue { return s.resampling; }},
+      {"sabotage", SetSabotage,
+       [](const Settings& s) -> AxisValue { return std::string(SabotageName(s.sabotage)); }},
   };
 }
 
@@ -185,6 +195,7 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   config.map.layers = layers;
   TSDFPP_ASSIGN(config.map.resampling, ResamplingFromName(resampling));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(poses));
+  SabotageMap(sabotage, config);
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
   return config;
 }
@@ -219,17 +230,21 @@ Expected<CellSettings> SettingsFromJson(const nlohmann::json& json) {
 
 std::string MapKey(const CellSettings& settings) {
   const PipelineConfig config = *settings.Pipeline();
+  const bool sabotaged = settings.sabotage != Sabotage::kNone && !IsOfSequence(settings.sabotage);
+  const std::string sabotage =
+      sabotaged ? fmt::format(" sabotage {}", SabotageName(settings.sabotage)) : "";
   if (settings.is_open3d()) {
-    return fmt::format("{} voxel_m {} truncation_voxels {}", kOpen3dMethod, config.map.voxel_m,
-                       config.map.trunc_front_voxels);
+    return fmt::format("{} voxel_m {} truncation_voxels {}{}", kOpen3dMethod, config.map.voxel_m,
+                       config.map.trunc_front_voxels, sabotage);
   }
   const bool moves_values =
       config.method != Method::kTsdfppAnchored && config.method != Method::kVolumes;
   return fmt::format(
-      "{} voxel_m {} front {} back {} layers {} poses {}{}", MethodName(config.method),
+      "{} voxel_m {} front {} back {} layers {} poses {}{}{}", MethodName(config.method),
       config.map.voxel_m, config.map.trunc_front_voxels, config.map.trunc_back_voxels,
       LayersOf(config.method, config.map), PoseSourceName(config.poses),
-      moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "");
+      moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "",
+      sabotage);
 }
 
 }  // namespace tsdfpp

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "eval/sabotage.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {
@@ -38,6 +39,9 @@ struct CellSettings {
   int layers = 0;  // K; 0: the method's own
   std::string poses = "gt";
   std::string resampling = "all";
+
+  // What is broken on purpose, of either or of the scoring (eval/sabotage.h).
+  Sabotage sabotage = Sabotage::kNone;
 
   // The map's configuration; not of Open3D, which has voxel size and truncation in it alone.
   // Errors: kUsage.

@@ -151,6 +151,13 @@ std::int32_t NearestCorner(const PulledPoints& points, std::size_t i) {
   return points.corner[i] + 256 * upper(2) + 16 * upper(1) + upper(0);
 }
 
+// Takes each point to its nearest corner.
+void RoundFractions(PulledPoints& points) {
+  for (auto& fractions : points.fraction) {
+    for (float& fraction : fractions) fraction = fraction >= 0.5F ? 1.0F : 0.0F;
+  }
+}
+
 PulledPoints PointsOf(const std::array<double, 12>& T, double voxel_m, const Index3& block) {
   PulledPoints points;
   PullBackPoints(T, voxel_m, {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide},
@@ -205,12 +212,17 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
 
 bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_inverse,
                    double voxel_m, const Index3& index, TsdfBlock& out, Resampling resampling) {
-  const PulledPoints points = PointsOf(T_inverse, voxel_m, index);
+  PulledPoints points = PointsOf(T_inverse, voxel_m, index);
   const PatchBlocks blocks(reader, points);
   if (!blocks.any()) return false;
   const PatchBits observed = blocks.Bits(&TsdfBlock::observed);
   const bool all_count = resampling == Resampling::kAll;
-  const auto interpolate = all_count ? InterpolateAll : InterpolateObserved;
+  const bool nearest = resampling == Resampling::kNearest;
+  // At the nearest corner itself, the only one that then counts.
+  if (nearest) RoundFractions(points);
+  const auto interpolate = all_count ? InterpolateAll
+                           : nearest ? InterpolateCounted
+                                     : InterpolateObserved;
   Lanes wanted;
   bool any = false;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
