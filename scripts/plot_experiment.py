@@ -64,7 +64,7 @@ class Panels:
         self.results = results
         columns = min(count, 4)
         rows = (count + columns - 1) // columns
-        self.figure, axes = plt.subplots(rows, columns, figsize=(2.75 * columns + 0.4, 2.6 * rows),
+        self.figure, axes = plt.subplots(rows, columns, figsize=(2.95 * columns + 0.4, 2.6 * rows),
                                          constrained_layout=True, squeeze=False)
         self.axes = [a for row in axes for a in row]
         for spare in self.axes[count:]:
