@@ -177,6 +177,7 @@ void AnchoredMap::RefreshIndex() const {
     }
   }
   index_.Erase(emptied);
+  for (const Index3& block : dirty_) NoteIndexChange(block);
   dirty_.clear();
 }
 

@@ -73,66 +73,130 @@ TriangleMesh LayeredMap::ObjectMesh(InstanceId id) const {
   return Join({{&meshes_.at(id).mesh}});
 }
 
+void LayeredMap::NoteIndexChange(const Index3& block) const {
+  // So many that it is cheaper not to tell them apart; nor may they pile up while nobody asks.
+  constexpr std::size_t kMost = 4096;
+  if (anything_may_be_hidden_) return;
+  index_changes_.push_back(block);
+  anything_may_be_hidden_ = index_changes_.size() > kMost;
+}
+
 MeshWork LayeredMap::UpdateMeshes() const {
-  std::erase_if(meshes_, [&](const auto& mesh) { return !volumes_.contains(mesh.first); });
+  const std::size_t gone =
+      std::erase_if(meshes_, [&](const auto& mesh) { return !volumes_.contains(mesh.first); });
+  anything_may_be_hidden_ = anything_may_be_hidden_ || gone > 0 || meshes_.size() < volumes_.size();
   MeshWork work;
-  for (const auto& [id, volume] : volumes_) work += UpdateObjectMesh(id);
-  // Who is active where changes only with a volume, a pose or the objects that there are.
-  bool is_same = hidden_among_.size() == meshes_.size();
-  for (const auto& [id, object] : meshes_) {
-    const auto then = hidden_among_.find(id);
-    is_same = is_same && then != hidden_among_.end() && then->second == object.version;
+  bool is_same = !anything_may_be_hidden_ && index_changes_.empty();
+  for (const auto& [id, volume] : volumes_) {
+    work += UpdateObjectMesh(id);
+    is_same = is_same && meshes_.at(id).changed.empty() && !meshes_.at(id).has_moved;
   }
   if (is_same) return work;
-  std::map<InstanceId, BlockBox> reach;
-  hidden_among_.clear();
-  for (const auto& [id, object] : meshes_) {
-    hidden_among_.emplace(id, object.version);
-    reach.emplace(id, ReachOf(object, config_.voxel_m));
+  const std::optional<BlocksAround> where = WhereVisibilityChanged();
+  for (auto& [id, object] : meshes_) {
+    if (!where) object.FindNegative();
   }
-  FindHiddenTriangles(reach);
+  FindHiddenTriangles(where);
+  for (auto& [id, object] : meshes_) {
+    object.changed.clear();
+    object.has_moved = false;
+  }
+  index_changes_.clear();
+  anything_may_be_hidden_ = false;
   return work;
 }
 
+// Who is active where changes with the index alone; how deep, with volumes and poses.
+std::optional<BlocksAround> LayeredMap::WhereVisibilityChanged() const {
+  std::size_t blocks = 0;
+  std::size_t changed = 0;
+  for (const auto& [id, object] : meshes_) {
+    blocks += object.mesh.parts().size();
+    changed += object.has_moved ? object.mesh.parts().size() : object.changed.size();
+  }
+  if (anything_may_be_hidden_ || 4 * changed > blocks) return std::nullopt;
+  std::vector<BlockBox> where;
+  const auto add = [&](const PlacedMesh& object, const Index3& block) {
+    // An interpolated distance reads a voxel further along each axis.
+    where.push_back(
+        PlacedBox({block, block, false}, object, config_.voxel_m, object.lattice_is_world ? 0 : 1));
+  };
+  for (const auto& [id, object] : meshes_) {
+    if (object.has_moved) {
+      for (const MeshPart* part : object.mesh.parts()) add(object, part->index);
+    } else {
+      for (const Index3& block : object.changed) add(object, block);
+    }
+  }
+  for (const Index3& block : index_changes_) where.push_back({block, block, false});
+  return BlocksAround::Of(where);
+}
+
 // A triangle is dropped where another object is active at its look-up voxel, deep enough.
-void LayeredMap::FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const {
-  struct Reader {
+void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) const {
+  struct Object {
+    const PlacedMesh* mesh;
+    BlockBox reach;
     VoxelReader reader;
     Pose T_LW;
-    bool lattice_is_world;
   };
-  std::map<InstanceId, Reader> readers;
+  std::map<InstanceId, Object> objects;
   for (const auto& [id, volume] : volumes_) {
-    readers.emplace(
-        id, Reader{VoxelReader(volume.grid), volume.T_WL.inverse(), volume.lattice_is_world});
+    const PlacedMesh& mesh = meshes_.at(id);
+    objects.emplace(id, Object{&mesh, ReachOf(mesh, config_.voxel_m), VoxelReader(volume.grid),
+                               volume.T_WL.inverse()});
   }
   const auto distance_at = [&](InstanceId id, const Index3& v) {
-    const Reader& of = readers.at(id);
+    const Object& of = objects.at(id);
     const Eigen::Vector3d voxel(v.x, v.y, v.z);
     const Eigen::Vector3d q =
-        of.lattice_is_world
+        of.mesh->lattice_is_world
             ? voxel
             : Eigen::Vector3d(of.T_LW * (voxel * config_.voxel_m) / config_.voxel_m);
     return DistanceAt(FindCorners(of.reader, q));
   };
   const float voxel = config_.voxel();
-  for (const auto& [id, object] : meshes_) {
-    const auto in_doubt = [&, self = id, is_world = object.lattice_is_world](const MeshPart& part) {
-      return std::any_of(reach.begin(), reach.end(), [&](const auto& other) {
-        return other.first != self && (!is_world || other.second.Holds(part.index));
+  for (auto& [self, object] : meshes_) {
+    std::vector<MeshPart*> parts = object.mesh.TakeUnsettled();
+    const auto blocks_of = [&, &placed = object](const MeshPart& part) {
+      return PlacedBox({part.index, part.index, false}, placed, config_.voxel_m, 0);
+    };
+    if (!where || object.has_moved) {
+      parts = object.mesh.parts();
+    } else {
+      for (MeshPart* part : object.mesh.parts()) {
+        if (!part->is_settled || part->triangles.empty()) continue;
+        const bool meets =
+            object.lattice_is_world ? where->Holds(part->index) : where->Meets(blocks_of(*part));
+        if (meets) parts.push_back(part);
+      }
+    }
+    const auto in_doubt = [&, id = self, is_world = object.lattice_is_world](const MeshPart& part) {
+      return std::any_of(objects.begin(), objects.end(), [&](const auto& other) {
+        return other.first != id && (!is_world || other.second.reach.Holds(part.index));
       });
     };
-    const auto is_hidden = [&, self = id](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
-                                          const Eigen::Vector3f& c) {
-      const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
-      const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
-      const Index3 v = NearestVoxel(outwards, voxel);
-      const InstanceId active = ActiveAt(v);
-      if (active == kNoInstance || active == self) return false;
-      const auto distance = distance_at(active, v);
-      return distance && *distance < -voxel;
+    const auto new_test = [&, id = self]() -> IsHidden {
+      // Triangles beside each other are looked up in the same block.
+      struct Last {
+        Index3 block;
+        ActiveIds ids;
+        bool is_known = false;
+      };
+      return [&, id, last = Last{}](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
+                                    const Eigen::Vector3f& c) mutable {
+        const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
+        const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
+        const Index3 v = NearestVoxel(outwards, voxel);
+        const Index3 block = BlockOf(v);
+        if (!last.is_known || block != last.block) last = {block, ActiveIn(block), true};
+        const InstanceId* place = last.ids.Place(PlaceInBlock(v));
+        if (place == nullptr || *place == kNoInstance || *place == id) return false;
+        const auto distance = distance_at(*place, v);
+        return distance && *distance < -voxel;
+      };
     };
-    HideTriangles(object.mesh, in_doubt, is_hidden);
+    HideTriangles(parts, in_doubt, new_test);
   }
 }
 

@@ -52,6 +52,9 @@ class LayeredMap : public MapRepresentation {
     return place == nullptr ? kNoInstance : *place;
   }
 
+  // Tells the visible scene that other objects may be active in this block of the index than were.
+  void NoteIndexChange(const Index3& block) const;
+
   // A block whose cover may have changed with a frame.
   struct StaleCover {
     InstanceId id = kNoInstance;
@@ -78,11 +81,14 @@ class LayeredMap : public MapRepresentation {
 
  private:
   MeshWork UpdateObjectMesh(InstanceId id) const;
-  void FindHiddenTriangles(const std::map<InstanceId, BlockBox>& reach) const;
+  // Where triangles may have become hidden or visible since the last update; nothing where that
+  // may be anywhere.
+  std::optional<BlocksAround> WhereVisibilityChanged() const;
+  void FindHiddenTriangles(const std::optional<BlocksAround>& where) const;
 
   mutable std::map<InstanceId, PlacedMesh> meshes_;
-  // Versions of the meshes when their hidden triangles were last looked up.
-  mutable std::map<InstanceId, std::uint64_t> hidden_among_;
+  mutable std::vector<Index3> index_changes_;  // since the last update
+  mutable bool anything_may_be_hidden_ = true;
 };
 
 // The observed voxels of a grid, sorted by (z, y, x).

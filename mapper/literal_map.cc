@@ -4,9 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <utility>
 
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
+#include "mapper/last_block.h"
 #include "mapper/layered_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
@@ -28,6 +30,7 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 }
 
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  active_.is_current = false;
   const FrameView view(frame, labels);
   const auto world = [](InstanceId) { return Pose::Identity(); };
   const auto is_known = [&](InstanceId, const Index3& index) {
@@ -151,6 +154,7 @@ void LiteralMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
 }
 
 void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
+  active_.is_current = false;
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
@@ -176,6 +180,7 @@ void LiteralMap::Activate(InstanceId id) {
 }
 
 void LiteralMap::Remove(InstanceId id) {
+  active_.is_current = false;
   FreeEmptyLists(Unlist(id));
   volumes_.erase(id);
   CheckInDebugBuilds(*this);
@@ -201,6 +206,7 @@ TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
 
 // Brings the field of the active objects' values in line with lists and volumes.
 void LiteralMap::UpdateActiveField() const {
+  if (std::exchange(active_.is_current, true)) return;
   TsdfGrid& field = active_.field;
   std::vector<Index3> gone;
   for (const auto& entry : field.entries()) {
@@ -249,16 +255,18 @@ void LiteralMap::UpdateActiveField() const {
 MeshWork LiteralMap::UpdateMeshes() const {
   UpdateActiveField();
   const MeshWork work = active_.mesh.Update(active_.field, config_.voxel());
-  LabelTriangles(active_.mesh,
-                 [&](const Eigen::Vector3f& centroid) { return ActiveNear(centroid); });
+  LabelTriangles(active_.mesh, [&] { return ActiveAtPoints(); });
   return work;
 }
 
-InstanceId LiteralMap::ActiveNear(const Eigen::Vector3f& point) const {
-  const Index3 v = NearestVoxel(point, config_.voxel());
-  const ListBlock* lists = lists_.Find(BlockOf(v));
-  const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
-  return id == kNoInstance ? kBackground : id;
+PointLabel LiteralMap::ActiveAtPoints() const {
+  // One point after another is in the same block.
+  return [this, last = LastBlock(lists_)](const Eigen::Vector3f& point) mutable {
+    const Index3 v = NearestVoxel(point, config_.voxel());
+    const ListBlock* lists = last.Find(BlockOf(v));
+    const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
+    return id == kNoInstance ? kBackground : id;
+  };
 }
 
 std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
@@ -267,7 +275,7 @@ std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pos
   RayPass pass;
   pass.voxel_m = config_.voxel_m;
   pass.volumes.push_back({kBackground, &active_.field, Pose::Identity(), true});
-  pass.label = [&](const Eigen::Vector3f& point_W) { return ActiveNear(point_W); };
+  pass.make_label = [&] { return ActiveAtPoints(); };
   RayCastOptions first = options;
   first.surfaces = 1;
   return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/point_label.h"
 #include "mapper/volume_fusion.h"
 
 namespace tsdfpp {
@@ -53,6 +54,7 @@ class LiteralMap final : public MapRepresentation {
   struct ActiveField {
     ActiveField() = default;
     ActiveField(const ActiveField&) {}
+    bool is_current = false;
     TsdfGrid field;
     BlockGrid<std::vector<std::uint64_t>> made_from;  // revisions of the lists and of each volume
     GridMesh mesh;
@@ -65,8 +67,9 @@ class LiteralMap final : public MapRepresentation {
 
   void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
   void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
-  // The active object of the voxel nearest to a point (metres), the background where there is none.
-  InstanceId ActiveNear(const Eigen::Vector3f& point) const;
+  // Gives the active object of the voxel nearest to a point (metres), the background where there is
+  // none.
+  PointLabel ActiveAtPoints() const;
   void UpdateActiveField() const;
   // The list blocks in which the object was listed.
   std::vector<Index3> Unlist(InstanceId id);

@@ -125,6 +125,7 @@ Expected<void> AnchoredMap::Add(InstanceId id, const TsdfGrid& volume, const Pos
 }
 
 Expected<void> LiteralMap::Rename(InstanceId from, InstanceId to) {
+  active_.is_current = false;
   TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
   for (const auto& entry : lists_.entries()) {
     for (auto* entries : {&entry.block->active, &entry.block->inactive}) {
@@ -140,6 +141,7 @@ Expected<void> LiteralMap::Rename(InstanceId from, InstanceId to) {
 
 Expected<void> LiteralMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                                const Pose& T_WO) {
+  active_.is_current = false;
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
   ObjectVolume& added = volumes_[id];
   added.T_WO = T_WO;

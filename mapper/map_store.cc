@@ -125,6 +125,7 @@ void LiteralMap::Save(Sections& sections) const {
 }
 
 Expected<void> LiteralMap::Load(const Sections& sections) {
+  active_.is_current = false;
   TSDFPP_ASSIGN(volumes_, LoadAllVolumes(sections, config_));
   TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, 2));
   const auto is_observed = [this](InstanceId id, const Index3& index, int place) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 namespace tsdfpp {
 namespace {
@@ -44,6 +45,21 @@ void GridMesh::Mark(MeshPart* part, std::uint32_t what, Parts& list) {
   if (part == nullptr || (part->todo & what) != 0) return;
   part->todo |= what;
   list.push_back(part);
+}
+
+void GridMesh::Unsettle(MeshPart& part) {
+  if (!part.is_settled) return;
+  part.is_settled = false;
+  unsettled_.push_back(&part);
+}
+
+std::vector<MeshPart*> GridMesh::TakeUnsettled() { return std::exchange(unsettled_, {}); }
+
+MeshPart* GridMesh::PartAt(const Index3& block) const {
+  const std::uint64_t key = PackIndex(block);
+  const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
+  if (at == keys_.end() || *at != key) return nullptr;
+  return order_[static_cast<std::size_t>(at - keys_.begin())];
 }
 
 template <typename Offsets>
@@ -97,11 +113,16 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   for (const Spare& spare : spares) {
     if (spare.part == nullptr) continue;
     ++erased;
+    changed_.push_back(spare.part->index);
     for (MeshPart* part : spare.part->around) {
       if (part == nullptr || part->revision == kGone) continue;
       Mark(part, kCubes, cubes_todo_);
       Mark(part, kEdges, edges_todo_);
     }
+  }
+
+  if (erased > 0) {
+    std::erase_if(unsettled_, [](const MeshPart* part) { return part->revision == kGone; });
   }
 
   std::vector<std::pair<std::uint64_t, MeshPart*>> sorted(owned_.size());
@@ -168,7 +189,7 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
     work.changed = entries.size();
     for (MeshPart* part : order_) {
       part->todo = kCubes | kEdges | kVertices | kTriangles;
-      part->is_labelled = false;
+      changed_.push_back(part->index);
     }
     for (Parts* list : {&cubes_todo_, &edges_todo_, &vertices_todo_, &triangles_todo_}) {
       *list = order_;
@@ -178,9 +199,10 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     if (change[i] == kSame) continue;
     ++work.changed;
+    changed_.push_back(entries[i].index);
     MarkAround(*owned_[i], kReadMyValues, kVertices, vertices_todo_);
     for (const std::size_t place : kReadMyMasks) {
-      if (MeshPart* part = owned_[i]->around[place]) part->is_labelled = false;
+      if (MeshPart* part = owned_[i]->around[place]) Unsettle(*part);
     }
     if (change[i] == kValues) continue;
     MarkAround(*owned_[i], kReadMyMasks, kCubes, cubes_todo_);
@@ -190,6 +212,8 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
 
 MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
   MeshWork work;
+  changed_.clear();
+  remade_.clear();
   const std::size_t erased = MatchBlocks(grid);
   MarkChanged(grid, work);
   work.changed += erased;
@@ -220,8 +244,8 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
     for (MeshPart* part : list) {
       if ((part->todo & (kVertices | kTriangles)) != 0) {
         ++work.remade;
-        part->is_placed = false;
-        part->is_labelled = false;
+        remade_.push_back(part);
+        Unsettle(*part);
       }
       part->todo = 0;
     }
@@ -233,7 +257,8 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
 
 std::size_t GridMesh::Bytes() const {
   std::size_t bytes = order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
-                      owned_.capacity() * sizeof(owned_[0]);
+                      (remade_.capacity() + unsettled_.capacity()) * sizeof(MeshPart*) +
+                      changed_.capacity() * sizeof(Index3) + owned_.capacity() * sizeof(owned_[0]);
   for (const MeshPart* part : order_) {
     bytes += sizeof(MeshPart) + part->positions.capacity() * sizeof(part->positions[0]) +
              part->colours.capacity() * sizeof(part->colours[0]) +

@@ -40,6 +40,18 @@ class GridMesh {
   // By block, in Index3's order. The caller may change what a part says of the scene.
   const std::vector<MeshPart*>& parts() const { return order_; }
 
+  // Of the last update: the parts that were made again, and the blocks whose values changed, new
+  // and erased ones too.
+  const std::vector<MeshPart*>& remade() const { return remade_; }
+  const std::vector<Index3>& changed() const { return changed_; }
+
+  // The parts whose triangles, or values beside these, changed since this was last asked: what the
+  // scene adds to them is to be found again, and noted by `is_settled`.
+  std::vector<MeshPart*> TakeUnsettled();
+
+  // The part of a block, nullptr where there is none.
+  MeshPart* PartAt(const Index3& block) const;
+
   // Bytes of parts and of what they hold.
   std::size_t Bytes() const;
 
@@ -52,6 +64,7 @@ class GridMesh {
   template <typename Offsets>
   void MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t what, Parts& list);
   void MarkChanged(const TsdfGrid& grid, MeshWork& work);
+  void Unsettle(MeshPart& part);
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i
   Parts order_;
@@ -60,6 +73,9 @@ class GridMesh {
   Parts edges_todo_;
   Parts vertices_todo_;
   Parts triangles_todo_;
+  Parts remade_;
+  Parts unsettled_;
+  std::vector<Index3> changed_;
 };
 
 }  // namespace tsdfpp

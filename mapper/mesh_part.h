@@ -36,8 +36,7 @@ struct MeshPart {
   bool any_negative = false;
 
   // What the scene adds (mapper/scene_parts.h).
-  bool is_placed = false;               // `placed` belongs to `positions` as they are now
-  bool is_labelled = false;             // `face_ids` belong to the triangles and values around
+  bool is_settled = true;  // `face_ids` and `hidden` belong to triangles and values as they are
   std::vector<Eigen::Vector3f> placed;  // in the world; empty where the lattice is the world's
   std::vector<InstanceId> face_ids;     // labels of the triangles, of one field
   std::vector<std::uint8_t> hidden;     // 1 for triangles that are not visible; empty where all are

@@ -1,7 +1,5 @@
 #include "mapper/mesh_tools.h"
 
-#include <cmath>
-
 #include "mapper/map_representation.h"
 
 namespace tsdfpp {
@@ -28,11 +26,6 @@ TriangleMesh KeepFaces(const TriangleMesh& mesh, const std::vector<std::uint8_t>
     if (!mesh.face_ids.empty()) kept.face_ids.push_back(mesh.face_ids[i]);
   }
   return kept;
-}
-
-Index3 NearestVoxel(const Eigen::Vector3f& point, float voxel) {
-  const auto nearest = [&](float x) { return static_cast<int>(std::floor(x / voxel + 0.5F)); };
-  return {nearest(point.x()), nearest(point.y()), nearest(point.z())};
 }
 
 TriangleMesh AllObjectsMesh(const MapRepresentation& map) {

@@ -146,6 +146,7 @@ class Caster::Tile {
         surfaces_(At(caster.options_.surfaces)) {
     from_.fill(static_cast<float>(c_.options_.near_m));
     if (c_.pass_.make_hidden) hidden_ = c_.pass_.make_hidden();
+    if (c_.pass_.make_label) label_ = c_.pass_.make_label();
   }
 
   void Cast(std::size_t number) {
@@ -401,16 +402,16 @@ class Caster::Tile {
         *id++ = hit ? IdOf(hits, i) : kNoInstance;
       }
     }
-    if (c_.pass_.label) WriteLabels(hits, columns, rows, out.id);
+    if (label_) WriteLabels(hits, columns, rows, out.id);
     if (c_.options_.colour) WriteColours(hits, columns, rows, out.colour);
   }
 
-  void WriteLabels(const TileHits& hits, int columns, int rows, cv::Mat& ids) const {
+  void WriteLabels(const TileHits& hits, int columns, int rows, cv::Mat& ids) {
     for (int y = 0; y < rows; ++y) {
       for (int x = 0; x < columns; ++x) {
         const std::size_t i = OrderOfTile().place[At(kTileSide * y + x)];
         if (hits.block[i] < 0) continue;
-        ids.ptr<std::uint16_t>(v_ + y)[u_ + x] = c_.pass_.label(PointAt(i, hits.depth[i]));
+        ids.ptr<std::uint16_t>(v_ + y)[u_ + x] = label_(PointAt(i, hits.depth[i]));
       }
     }
   }
@@ -440,6 +441,7 @@ class Caster::Tile {
   TileValues trial_from_;
   std::vector<InstanceId> without_;
   RayPass::Hidden hidden_;
+  PointLabel label_;
   std::vector<HiddenQuery> queries_;
 };
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "mapper/point_label.h"
 #include "mapper/ray_blocks.h"
 #include "mapper/ray_cast.h"
 
@@ -29,8 +30,9 @@ struct RayPass {
   using Hidden =
       std::function<void(std::span<HiddenQuery> queries, std::span<const InstanceId> without)>;
   std::function<Hidden()> make_hidden;
-  // The object at a surface point (world, metres); empty: the volume's id.
-  std::function<InstanceId(const Eigen::Vector3f& point_W)> label;
+  // Makes what a worker asks for the object at a surface point (world, metres); empty: the volume's
+  // id.
+  std::function<PointLabel()> make_label;
   // Each volume by rays of its own, which know nothing of the others; the nearest of all wins.
   bool each_alone = false;
 };

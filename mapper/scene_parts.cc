@@ -138,14 +138,19 @@ void WriteTriangles(const Piece& piece, TriangleMesh& mesh) {
 
 MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now,
                             bool is_world_now) {
-  const bool moved = !SameNumbers(T_WL, T_WL_now) || lattice_is_world != is_world_now;
+  const bool moves = !SameNumbers(T_WL, T_WL_now) || lattice_is_world != is_world_now;
   T_WL = T_WL_now;
   lattice_is_world = is_world_now;
+  has_moved = has_moved || moves;
   const MeshWork work = mesh.Update(grid, voxel);
-  if (moved || work.changed > 0 || work.remade > 0) version = NewRevision();
-  ForEachPart(mesh.parts(), [&](MeshPart& part) {
-    if (part.is_placed && !moved) return;
-    part.is_placed = true;
+  changed.insert(changed.end(), mesh.changed().begin(), mesh.changed().end());
+  if (work.changed > 0) {
+    for (const Index3& index : mesh.changed()) {
+      const MeshPart* part = mesh.PartAt(index);
+      if (part != nullptr && part->any_negative) negative.Extend(index);
+    }
+  }
+  ForEachPart(moves ? mesh.parts() : mesh.remade(), [&](MeshPart& part) {
     part.placed.clear();
     if (lattice_is_world) return;
     part.placed.reserve(part.positions.size());
@@ -154,6 +159,13 @@ MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_
     }
   });
   return work;
+}
+
+void PlacedMesh::FindNegative() {
+  negative = {};
+  for (const MeshPart* part : mesh.parts()) {
+    if (part->any_negative) negative.Extend(part->index);
+  }
 }
 
 void BlockBox::Extend(const Index3& index) {
@@ -168,36 +180,91 @@ bool BlockBox::Holds(const Index3& index) const {
          index.x <= high.x && index.y <= high.y && index.z <= high.z;
 }
 
-BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
-  BlockBox box;
-  for (const MeshPart* part : object.mesh.parts()) {
-    if (part->any_negative) box.Extend(part->index);
-  }
-  if (box.is_empty) return box;
-  // What is covered is at most a voxel from a negative one, and a look-up voxel at most two from
-  // the block of its triangle: not as much as a block together.
-  if (object.lattice_is_world) {
-    box.low = box.low + Index3{-1, -1, -1};
-    box.high = box.high + Index3{1, 1, 1};
-    return box;
-  }
+BlockBox PlacedBox(const BlockBox& box, const PlacedMesh& object, double voxel_m, int margin) {
   BlockBox placed;
+  if (box.is_empty) return placed;
+  const Index3 low{box.low.x * kBlockSide - margin, box.low.y * kBlockSide - margin,
+                   box.low.z * kBlockSide - margin};
+  const Index3 high{(box.high.x + 1) * kBlockSide + margin, (box.high.y + 1) * kBlockSide + margin,
+                    (box.high.z + 1) * kBlockSide + margin};
+  if (object.lattice_is_world) {
+    placed.Extend(BlockOf(low));
+    placed.Extend(BlockOf(high + Index3{-1, -1, -1}));
+    return placed;
+  }
   for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d corner(
-        (i & 1) != 0 ? (box.high.x + 2) * kBlockSide : (box.low.x - 1) * kBlockSide,
-        (i & 2) != 0 ? (box.high.y + 2) * kBlockSide : (box.low.y - 1) * kBlockSide,
-        (i & 4) != 0 ? (box.high.z + 2) * kBlockSide : (box.low.z - 1) * kBlockSide);
+    const Eigen::Vector3d corner((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
+                                 (i & 4) != 0 ? high.z : low.z);
     placed.Extend(BlockOf(FloorOf(object.T_WL * (corner * voxel_m) / voxel_m)));
   }
   return placed;
 }
 
-void LabelTriangles(const GridMesh& mesh,
-                    const std::function<InstanceId(const Eigen::Vector3f&)>& label_at) {
-  ForEachPart(mesh.parts(), [&](MeshPart& part) {
-    if (part.is_labelled) return;
-    part.is_labelled = true;
+BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
+  // What is covered is at most a voxel from a negative one, and a look-up voxel at most two from
+  // the block of its triangle: not as much as a block together.
+  return PlacedBox(object.negative, object, voxel_m, kBlockSide);
+}
+
+std::optional<BlocksAround> BlocksAround::Of(const std::vector<BlockBox>& boxes) {
+  constexpr double kMost = 1 << 22;  // blocks in the bounds, a byte each
+  BlocksAround around;
+  BlockBox& bounds = around.bounds_;
+  for (const BlockBox& box : boxes) {
+    if (box.is_empty) continue;
+    bounds.Extend(box.low + Index3{-1, -1, -1});
+    bounds.Extend(box.high + Index3{1, 1, 1});
+  }
+  if (bounds.is_empty) return around;
+  const auto side = [](int low, int high) { return double{1} + high - low; };
+  if (side(bounds.low.x, bounds.high.x) * side(bounds.low.y, bounds.high.y) *
+          side(bounds.low.z, bounds.high.z) >
+      kMost) {
+    return std::nullopt;
+  }
+  around.held_.assign(around.PlaceOf(bounds.high) + 1, 0);
+  for (const BlockBox& box : boxes) {
+    if (box.is_empty) continue;
+    for (int z = box.low.z - 1; z <= box.high.z + 1; ++z) {
+      for (int y = box.low.y - 1; y <= box.high.y + 1; ++y) {
+        const std::size_t first = around.PlaceOf({box.low.x - 1, y, z});
+        std::fill_n(around.held_.begin() + static_cast<std::ptrdiff_t>(first),
+                    box.high.x - box.low.x + 3, std::uint8_t{1});
+      }
+    }
+  }
+  return around;
+}
+
+std::size_t BlocksAround::PlaceOf(const Index3& index) const {
+  const auto along = [](int at, int low) { return static_cast<std::size_t>(at - low); };
+  const std::size_t width = along(bounds_.high.x, bounds_.low.x) + 1;
+  const std::size_t depth = along(bounds_.high.y, bounds_.low.y) + 1;
+  return along(index.x, bounds_.low.x) +
+         width * (along(index.y, bounds_.low.y) + depth * along(index.z, bounds_.low.z));
+}
+
+bool BlocksAround::Holds(const Index3& index) const {
+  return bounds_.Holds(index) && held_[PlaceOf(index)] != 0;
+}
+
+bool BlocksAround::Meets(const BlockBox& box) const {
+  for (int z = box.low.z; !box.is_empty && z <= box.high.z; ++z) {
+    for (int y = box.low.y; y <= box.high.y; ++y) {
+      for (int x = box.low.x; x <= box.high.x; ++x) {
+        if (Holds({x, y, z})) return true;
+      }
+    }
+  }
+  return false;
+}
+
+void LabelTriangles(GridMesh& mesh, const std::function<PointLabel()>& make_label) {
+  ForEachPart(mesh.TakeUnsettled(), [&](MeshPart& part) {
+    part.is_settled = true;
     part.face_ids.clear();
+    if (part.triangles.empty()) return;
+    const PointLabel label_at = make_label();
     const CornersOf corner(part);
     for (const auto& [a, b, c] : part.triangles) {
       part.face_ids.push_back(label_at((corner(a) + corner(b) + corner(c)) / 3.0F));
@@ -205,20 +272,46 @@ void LabelTriangles(const GridMesh& mesh,
   });
 }
 
-void HideTriangles(const GridMesh& mesh, const std::function<bool(const MeshPart&)>& in_doubt,
-                   const IsHidden& is_hidden) {
-  ForEachPart(mesh.parts(), [&](MeshPart& part) {
-    part.hidden.clear();
-    if (part.triangles.empty() || !in_doubt(part)) return;
-    const CornersOf corner(part);
-    for (std::size_t t = 0; t < part.triangles.size(); ++t) {
-      const auto& [a, b, c] = part.triangles[t];
-      if (!is_hidden(corner(a), corner(b), corner(c))) continue;
-      part.hidden.resize(part.triangles.size(), 0);
-      part.hidden[t] = 1;
+void HideTriangles(const std::vector<MeshPart*>& parts,
+                   const std::function<bool(const MeshPart&)>& in_doubt,
+                   const std::function<IsHidden()>& new_test) {
+  // Vertices are named by the triangles of the part and of the lower ones around it: where these
+  // are others, or others are hidden, the part's vertices are numbered again.
+  constexpr std::uint32_t kNamesChanged = 1;
+  constexpr std::uint32_t kToBeNamed = 2;
+  ForEachPart(parts, [&](MeshPart& part) {
+    thread_local std::vector<std::uint8_t> hidden;
+    hidden.clear();
+    if (!part.triangles.empty() && in_doubt(part)) {
+      const IsHidden is_hidden = new_test();
+      const CornersOf corner(part);
+      for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+        const auto& [a, b, c] = part.triangles[t];
+        if (!is_hidden(corner(a), corner(b), corner(c))) continue;
+        hidden.resize(part.triangles.size(), 0);
+        hidden[t] = 1;
+      }
     }
+    if (part.is_settled && part.hidden == hidden) return;
+    part.is_settled = true;
+    part.hidden.assign(hidden.begin(), hidden.end());
+    part.todo = kNamesChanged;
   });
-  ForEachPart(mesh.parts(), RenameVertices);
+  std::vector<MeshPart*> to_name;
+  for (MeshPart* part : parts) {
+    if ((part->todo & kNamesChanged) == 0) continue;
+    for (std::size_t which = 0; which < 8; ++which) {
+      MeshPart* named = part->around[UpperPlace(which)];
+      if (named == nullptr || (named->todo & kToBeNamed) != 0) continue;
+      named->todo |= kToBeNamed;
+      to_name.push_back(named);
+    }
+  }
+  for (MeshPart* part : parts) part->todo = 0;
+  ForEachPart(to_name, [](MeshPart& part) {
+    part.todo = 0;
+    RenameVertices(part);
+  });
 }
 
 TriangleMesh Join(const std::vector<JoinedMesh>& meshes) {

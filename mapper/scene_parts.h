@@ -3,24 +3,15 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "mapper/mesh_cache.h"
+#include "mapper/point_label.h"
 
 namespace tsdfpp {
 
-// The mesh of an object's volume and where it stands. A copy starts empty.
-struct PlacedMesh {
-  GridMesh mesh;
-  Pose T_WL = Pose::Identity();
-  bool lattice_is_world = true;
-  std::uint64_t version = 0;  // a new one after each update that found a change
-
-  // Brings the mesh in line with the grid and stands it at T_WL.
-  MeshWork Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now, bool is_world_now);
-};
-
-// Blocks of the global lattice, both ends included.
+// Blocks of a lattice, both ends included.
 struct BlockBox {
   Index3 low;
   Index3 high;
@@ -30,22 +21,63 @@ struct BlockBox {
   bool Holds(const Index3& index) const;
 };
 
+// The mesh of an object's volume and where it stands. A copy starts empty.
+struct PlacedMesh {
+  GridMesh mesh;
+  Pose T_WL = Pose::Identity();
+  bool lattice_is_world = true;
+  BlockBox negative;  // of the lattice: at least the blocks that hold a negative voxel
+
+  // What happened since somebody last reset these: in blocks of the lattice.
+  std::vector<Index3> changed;
+  bool has_moved = true;
+
+  // Makes `negative` as small as it can be.
+  void FindNegative();
+
+  // Brings the mesh in line with the grid and stands it at T_WL.
+  MeshWork Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now, bool is_world_now);
+};
+
+// The global blocks that a box of blocks of the lattice touches when `margin` voxels are added on
+// each side.
+BlockBox PlacedBox(const BlockBox& box, const PlacedMesh& object, double voxel_m, int margin);
+
 // Where triangles of other objects may have a look-up voxel that this object covers: the blocks
 // around those that hold a negative voxel.
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m);
+
+// Some blocks of the global lattice and those that touch them.
+class BlocksAround {
+ public:
+  // Of all blocks of the boxes. Nothing where they are so far apart that this takes more than some
+  // megabytes.
+  static std::optional<BlocksAround> Of(const std::vector<BlockBox>& boxes);
+
+  bool Holds(const Index3& index) const;
+  // Whether the box holds one of them.
+  bool Meets(const BlockBox& box) const;
+
+ private:
+  std::size_t PlaceOf(const Index3& index) const;
+
+  BlockBox bounds_;
+  std::vector<std::uint8_t> held_;  // of the bounds
+};
 
 // Whether a triangle is hidden, from its three corners in the world.
 using IsHidden =
     std::function<bool(const Eigen::Vector3f&, const Eigen::Vector3f&, const Eigen::Vector3f&)>;
 
-// Finds out which triangles of the parts that `in_doubt` names are hidden; no other one is.
-void HideTriangles(const GridMesh& mesh, const std::function<bool(const MeshPart&)>& in_doubt,
-                   const IsHidden& is_hidden);
+// Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names,
+// by a test of their own each; no others are.
+void HideTriangles(const std::vector<MeshPart*>& parts,
+                   const std::function<bool(const MeshPart&)>& in_doubt,
+                   const std::function<IsHidden()>& new_test);
 
-// Labels the triangles of the parts whose values changed by what `label_at` says of their centroids
-// in the lattice, in metres.
-void LabelTriangles(const GridMesh& mesh,
-                    const std::function<InstanceId(const Eigen::Vector3f&)>& label_at);
+// Labels the triangles of the parts whose values changed by what a label of each part's own says of
+// their centroids in the lattice, in metres.
+void LabelTriangles(GridMesh& mesh, const std::function<PointLabel()>& make_label);
 
 // One of the meshes that are put together.
 struct JoinedMesh {

@@ -9,6 +9,7 @@
 
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
+#include "mapper/last_block.h"
 #include "mapper/layered_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
@@ -233,7 +234,7 @@ Pose SingleFieldMap::ObjectLattice(InstanceId) const { return Pose::Identity(); 
 
 MeshWork SingleFieldMap::UpdateMeshes() const {
   const MeshWork work = mesh_.Update(field_, config_.voxel());
-  LabelTriangles(mesh_, [&](const Eigen::Vector3f& centroid) { return LabelNear(centroid); });
+  LabelTriangles(mesh_, [&] { return LabelOfPoints(); });
   return work;
 }
 
@@ -247,17 +248,20 @@ std::vector<RaySurface> SingleFieldMap::CastRays(const Intrinsics& camera, const
   RayPass pass;
   pass.voxel_m = config_.voxel_m;
   pass.volumes.push_back({kBackground, &field_, Pose::Identity(), true});
-  pass.label = [&](const Eigen::Vector3f& point_W) { return LabelNear(point_W); };
+  pass.make_label = [&] { return LabelOfPoints(); };
   RayCastOptions first = options;
   first.surfaces = 1;
   return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
 }
 
-InstanceId SingleFieldMap::LabelNear(const Eigen::Vector3f& point) const {
-  const Index3 v = NearestVoxel(point, config_.voxel());
-  const LabelBlock* labels = labels_.Find(BlockOf(v));
-  const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
-  return id == kNoInstance ? kBackground : id;
+PointLabel SingleFieldMap::LabelOfPoints() const {
+  // One point after another is in the same block.
+  return [this, last = LastBlock(labels_)](const Eigen::Vector3f& point) mutable {
+    const Index3 v = NearestVoxel(point, config_.voxel());
+    const LabelBlock* labels = last.Find(BlockOf(v));
+    const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
+    return id == kNoInstance ? kBackground : id;
+  };
 }
 
 TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {

@@ -47,6 +47,7 @@ class TsdfppMap::Groups {
     ListBlock* lists = nullptr;
     std::int32_t first_change = kNone;
     std::int32_t first_vote = kNone;
+    bool relisted = false;  // other objects may be active than were
     bool emptied = false;
   };
   static constexpr std::int32_t kNone = -1;
@@ -149,19 +150,20 @@ VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) const {
   return {&lists.entries[static_cast<std::size_t>(place)], layers_, kBlockVoxels};
 }
 
-void TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
+bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
   if (lists.settled_id != id) {
     lists.settled_id = id;
     lists.settled = {};
   }
   for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= ~lists.settled[z];
-  if (!Any(votes)) return;
+  if (!Any(votes)) return false;
   // Nearly every vote is for the active object.
   const VotesCounted counted =
       VoteForActive(votes, id, config_.confidence_cap, lists.entries.data());
   for (std::size_t z = 0; z < votes.size(); ++z) lists.settled[z] |= counted.saturated[z];
   ForEachVoxel(counted.others,
                [&](int place) { ListOf(lists, place).Vote(id, config_.confidence_cap); });
+  return Any(counted.others);
 }
 
 void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -183,7 +185,9 @@ std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
     if (lists == nullptr) continue;
     // Overflow may have dropped the object from some of these; Remove() knows.
     ForEachVoxel(entry.block->cover, [&](int place) { ListOf(*lists, place).Remove(id); });
-    if (Any(entry.block->cover)) blocks.push_back(entry.index);
+    if (!Any(entry.block->cover)) continue;
+    blocks.push_back(entry.index);
+    NoteIndexChange(entry.index);
   }
   return blocks;
 }
@@ -209,6 +213,7 @@ void TsdfppMap::Activate(InstanceId id) {
     entry.block->cover = FindCover(grid, entry.index);
     if (!Any(entry.block->cover)) continue;
     ListBlock& lists = ListsOf(entry.index);
+    NoteIndexChange(entry.index);
     ForEachVoxel(entry.block->cover,
                  [&](int place) { ListOf(lists, place).PushFront(id, config_.moved_confidence); });
   }
@@ -254,6 +259,7 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
           ListBlock& lists = *group.lists;
           bool lost_any = false;
           groups.ForEachChange(group, [&](std::size_t k) {
+            group.relisted = true;
             ForEachVoxel(changes[k].lost,
                          [&](int place) { ListOf(lists, place).Remove(changes[k].id); });
             lost_any = lost_any || Any(changes[k].lost);
@@ -262,7 +268,7 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
             const FusedBlock& from = fused[k];
             BlockMask votes = from.votes;
             for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= from.block->cover[z];
-            Vote(lists, from.id, votes);
+            if (Vote(lists, from.id, votes)) group.relisted = true;
           });
           groups.ForEachChange(group, [&](std::size_t k) {
             ForEachVoxel(changes[k].gained, [&](int place) {
@@ -276,6 +282,7 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
       tbb::simple_partitioner());
   std::vector<Index3> empty;
   for (const Groups::Group& group : groups.all()) {
+    if (group.relisted) NoteIndexChange(group.index);
     if (group.emptied) empty.push_back(group.index);
   }
   index_.Erase(empty);
@@ -311,6 +318,7 @@ void TsdfppMap::Remove(InstanceId id) {
       list.Append(other, 1);
     }
   }
+  for (const Index3& block : blocks) NoteIndexChange(block);
   FreeEmptyLists(blocks);
   CheckInDebugBuilds(*this);
 }

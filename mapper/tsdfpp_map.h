@@ -43,7 +43,8 @@ class TsdfppMap final : public LayeredMap {
   ListBlock& ListsOf(const Index3& block);
   // To be changed: the voxel is no longer taken for settled.
   VoxelList ListOf(ListBlock& lists, int place) const;
-  void Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
+  // True where the active object may have become another one.
+  bool Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
   // The blocks of the index that lost a listing.
   std::vector<Index3> Deactivate(InstanceId id);
   // Puts the object first where it covers a voxel now.

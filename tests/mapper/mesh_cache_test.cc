@@ -5,8 +5,7 @@
 #include <tbb/global_control.h>
 
 #include "mapper/scene_parts.h"
-#include "tests/mapper/compare_maps.h"
-#include "tests/mapper/map_snapshot.h"
+#include "tests/mapper/from_scratch.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/mapper/visible_triangles.h"
@@ -20,12 +19,6 @@ using reference::Scene;
 
 constexpr float kVoxel_m = 0.02F;
 constexpr float kBack_m = 0.08F;
-
-std::string BytesOf(const TriangleMesh& mesh) {
-  std::string bytes;
-  AppendMesh(mesh, bytes);
-  return bytes;
-}
 
 // Values at random, so that every set of inside corners turns up; where `rough`, unobserved voxels
 // and voxels without colour as well.
@@ -187,20 +180,6 @@ TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
   middle.UpdateMasks(kBack_m);
   cache.Update(grid, kVoxel_m);
   EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kVoxel_m)));
-}
-
-// All meshes of a map against those of a copy, which starts without kept meshes.
-::testing::AssertionResult SameAsFromScratch(const MapRepresentation& map) {
-  const auto copy = map.Clone();
-  for (const InstanceId id : ToyIds()) {
-    if (BytesOf(map.ObjectMesh(id)) != BytesOf(copy->ObjectMesh(id))) {
-      return ::testing::AssertionFailure() << "mesh of object " << id;
-    }
-  }
-  if (BytesOf(map.SceneMesh()) != BytesOf(map.Clone()->SceneMesh())) {
-    return ::testing::AssertionFailure() << "scene";
-  }
-  return ::testing::AssertionSuccess();
 }
 
 class KeptMeshes : public ::testing::TestWithParam<Method> {};
