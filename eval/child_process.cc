@@ -144,8 +144,12 @@ ChildOutcome RunChildProcess(const std::string& name, const std::vector<std::str
   double looked_s = -kMemoryLook_s;
   std::string killed_for;
   while (true) {
-    const pid_t ended = wait4(child, &status, WNOHANG, &usage);
-    if (ended == child || (ended < 0 && errno != EINTR)) break;
+    // It is not reaped yet, so that its number still stands for its group below.
+    siginfo_t ended{};
+    const int asked = waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT);
+    if ((asked == 0 && ended.si_pid == child) || (asked != 0 && errno != EINTR)) {
+      break;
+    }
     if (killed_for.empty() && elapsed() - looked_s >= kMemoryLook_s) {
       looked_s = elapsed();
       outcome.peak_bytes = std::max(outcome.peak_bytes, ResidentOfGroup(child));
@@ -161,6 +165,8 @@ ChildOutcome RunChildProcess(const std::string& name, const std::vector<std::str
     std::this_thread::sleep_for(std::chrono::duration<double>(kExitLook_s));
   }
   kill(-child, SIGKILL);  // whatever it left running
+  while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  }
   outcome.wall_s = elapsed();
   const auto seconds = [](const timeval& time) {
     return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
