@@ -197,9 +197,12 @@ void FrameSabotage::Apply(const SequenceInfo& info, Frame& frame) const {
     case Sabotage::kPrincipalPoint:
       frame.intrinsics.cx += 1;
       return;
-    case Sabotage::kDepthScale:
-      frame.depth = frame.depth * kDepthScaleFactor;  // a new image
+    case Sabotage::kDepthScale: {
+      cv::Mat scaled;  // the truth may share the image
+      frame.depth.convertTo(scaled, -1, kDepthScaleFactor);
+      frame.depth = scaled;
       return;
+    }
     default:
       return;
   }
