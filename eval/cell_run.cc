@@ -7,8 +7,10 @@ namespace tsdfpp {
 CellMapper::CellMapper(const CellSettings& settings, const std::vector<ObjectInfo>& objects)
     : config_(*settings.Pipeline()) {
   if (settings.is_open3d()) {
+    SetOpen3dThreads(1);  // workers run side by side
     open3d_ = std::make_unique<Open3dVolume>(config_.map.voxel_m,
-                                             config_.map.trunc_front_voxels * config_.map.voxel_m);
+                                             config_.map.trunc_front_voxels * config_.map.voxel_m,
+                                             Open3dColour::kNone);
   } else {
     pipeline_ = std::make_unique<class Pipeline>(config_, objects);
   }
@@ -28,7 +30,7 @@ SceneMeshes CellMapper::Meshes(const std::set<InstanceId>& movers) {
     meshes = MeshesOf(pipeline_->map(), movers);
     times_.mesh_s.push_back(meshes.mesh_s);
   } else {
-    meshes.scene = open3d_->Mesh();
+    meshes.scene = open3d_->Triangles();
     meshes.labelled = false;
   }
   return meshes;

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "eval/adapters/open3d_peer.h"
 #include "eval/cell.h"
-#include "eval/open3d_volume.h"
 #include "eval/sequence_variant.h"
 #include "mapper/pipeline.h"
 

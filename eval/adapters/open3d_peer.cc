@@ -7,30 +7,49 @@
 #include <open3d/pipelines/integration/UniformTSDFVolume.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
+#include <string>
 
 namespace tsdfpp {
 
+namespace {
+
+using open3d::pipelines::integration::TSDFVolumeColorType;
+
+std::shared_ptr<open3d::geometry::RGBDImage> ImageOf(const Frame& frame, Open3dColour kind) {
+  const Intrinsics& k = frame.intrinsics;
+  open3d::geometry::Image depth;
+  depth.Prepare(k.width, k.height, 1, 4);
+  std::memcpy(depth.data_.data(), frame.depth.data, depth.data_.size());
+  open3d::geometry::Image colour;
+  if (kind == Open3dColour::kNone) {
+    return std::make_shared<open3d::geometry::RGBDImage>(colour, depth);
+  }
+  colour.Prepare(k.width, k.height, 3, 1);
+  std::memcpy(colour.data_.data(), frame.colour.data, colour.data_.size());
+  return open3d::geometry::RGBDImage::CreateFromColorAndDepth(colour, depth, 1.0, kMaxValidDepth_m,
+                                                              false);
+}
+
+}  // namespace
+
 struct Open3dVolume::Impl {
   open3d::pipelines::integration::ScalableTSDFVolume volume;
+  Open3dColour colour;
 };
 
-Open3dVolume::Open3dVolume(double voxel_m, double truncation_m)
+Open3dVolume::Open3dVolume(double voxel_m, double truncation_m, Open3dColour colour)
     : impl_(new Impl{
-          {voxel_m, truncation_m, open3d::pipelines::integration::TSDFVolumeColorType::RGB8}}) {}
+          {voxel_m, truncation_m,
+           colour == Open3dColour::kRgb ? TSDFVolumeColorType::RGB8 : TSDFVolumeColorType::NoColor},
+          colour}) {}
 
 Open3dVolume::~Open3dVolume() = default;
 
 double Open3dVolume::Integrate(const Frame& frame) {
   const Intrinsics& k = frame.intrinsics;
-  open3d::geometry::Image colour;
-  colour.Prepare(k.width, k.height, 3, 1);
-  std::memcpy(colour.data_.data(), frame.colour.data, colour.data_.size());
-  open3d::geometry::Image depth;
-  depth.Prepare(k.width, k.height, 1, 4);
-  std::memcpy(depth.data_.data(), frame.depth.data, depth.data_.size());
-  const auto image = open3d::geometry::RGBDImage::CreateFromColorAndDepth(colour, depth, 1.0,
-                                                                          kMaxValidDepth_m, false);
+  const auto image = ImageOf(frame, impl_->colour);
   const open3d::camera::PinholeCameraIntrinsic intrinsic(k.width, k.height, k.fx, k.fy, k.cx, k.cy);
   const Eigen::Matrix4d T_CW = frame.T_WC.inverse().matrix();
   const auto start = std::chrono::steady_clock::now();
@@ -73,6 +92,10 @@ std::size_t Open3dVolume::OccupiedBytes() const {
   return bytes;
 }
 
-void SetOpen3dThreads(int threads) { omp_set_num_threads(threads); }
+void SetOpen3dThreads(int threads) {
+  // Open3D takes one a core, whatever OpenMP is told, unless this variable is set.
+  setenv("OMP_NUM_THREADS", std::to_string(threads).c_str(), 1);
+  omp_set_num_threads(threads);
+}
 
 }  // namespace tsdfpp

@@ -1,4 +1,4 @@
-// What a user would pick instead: Open3D's ScalableTSDFVolume with colour, in a file of its own.
+// What a user would pick instead: Open3D's ScalableTSDFVolume, in a file of its own.
 #pragma once
 
 #include <memory>
@@ -7,10 +7,12 @@
 
 namespace tsdfpp {
 
+enum class Open3dColour { kNone, kRgb };
+
 class Open3dVolume {
  public:
   // Lengths in metres; Open3D has one truncation for both sides.
-  Open3dVolume(double voxel_m, double truncation_m);
+  Open3dVolume(double voxel_m, double truncation_m, Open3dColour colour = Open3dColour::kRgb);
   ~Open3dVolume();
 
   // Converts the frame, which is not timed, then integrates it; returns the seconds of the latter.
@@ -32,7 +34,8 @@ class Open3dVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-// Threads of Open3D's OpenMP loops.
+// Threads of Open3D's OpenMP loops. Several spin at their barriers on a busy machine, many times as
+// long as they work.
 void SetOpen3dThreads(int threads);
 
 }  // namespace tsdfpp
