@@ -26,7 +26,8 @@ TEST(CommandHelp, EverySubcommandHasHelp) {
   EXPECT_EQ(top.exit_code, 0);
   EXPECT_EQ(top.err, "");
   for (const char* command :
-       {"doctor", "generate", "map", "compare", "evaluate", "report", "metric"}) {
+       {"doctor", "generate", "verify", "export", "map", "compare", "evaluate", "report", "sweep",
+        "replay", "bench-set", "gate", "metric"}) {
     EXPECT_NE(top.out.find(command), std::string::npos) << command;
     const CommandOutput help = RunTsdfpp({command, "--help"}, folder.path());
     EXPECT_EQ(help.exit_code, 0) << command;
