@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
 #include "eval/pictures.h"
+#include "eval/record_images.h"
 #include "metrics/mesh_tools.h"
 #include "metrics/trajectory.h"
 
@@ -20,13 +20,9 @@ constexpr float kNearTable_m = 0.15F;  // around the table's box counts as near
 constexpr std::size_t kMoverTriangles = 4000;
 constexpr std::size_t kLayerTriangles = 6000;
 constexpr std::size_t kTruthTriangles = 8000;  // an object
-constexpr double kErrorStep_m = 0.0002;
-constexpr std::uint8_t kNeverSeen = 255;
 constexpr double kImageWidth = 480;
 constexpr double kPictureWidth = 640;
-constexpr int kWebpQuality = 82;
-constexpr int kWebpLossless = 101;  // what OpenCV takes above 100
-constexpr int kStride = 4;          // pixels between the depths kept for ages
+constexpr int kDepthStride = 4;  // pixels between those that the depth images' range is taken from
 
 nlohmann::json PoseJson(const Pose& T) {
   const Eigen::Quaterniond q(T.rotation());
@@ -44,12 +40,6 @@ nlohmann::json GridJson(const PositionGrid& grid) {
 
 // To so many parts of one: the text is short, which a step's multiple in binary is not.
 double Rounded(double value, double parts) { return std::round(value * parts) / parts; }
-
-std::size_t TrackerOf(const SceneTruth& truth, InstanceId id) {
-  std::size_t i = 0;
-  while (i < truth.trackers().size() && truth.trackers()[i].id() != id) ++i;
-  return i;
-}
 
 // Faces whose first corner lies in `box`, and the others.
 std::pair<TriangleMesh, TriangleMesh> SplitByBox(const TriangleMesh& mesh,
@@ -112,51 +102,6 @@ std::vector<InstanceId> IdsOf(const TriangleMesh& mesh) {
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   return ids;
-}
-
-cv::Mat Smaller(const cv::Mat& image, double width, int interpolation) {
-  cv::Mat small;
-  const double scale = std::min(1.0, width / image.cols);
-  cv::resize(image, small, {}, scale, scale, interpolation);
-  return small;
-}
-
-// Near is warm, far is cold, what was not measured is black.
-cv::Mat DrawDepth(const cv::Mat& depth, float nearest_m, float farthest_m) {
-  cv::Mat grey;
-  depth.convertTo(grey, CV_8U, -255.0 / (farthest_m - nearest_m),
-                  255.0 * farthest_m / (farthest_m - nearest_m));
-  cv::Mat bgr;
-  cv::applyColorMap(grey, bgr, cv::COLORMAP_TURBO);
-  cv::Mat rgb;
-  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
-  for (int v = 0; v < depth.rows; ++v) {
-    for (int u = 0; u < depth.cols; ++u) {
-      if (!IsValidDepth(depth.at<float>(v, u))) rgb.at<cv::Vec3b>(v, u) = {0, 0, 0};
-    }
-  }
-  return rgb;
-}
-
-cv::Mat DrawMask(const cv::Mat& mask) {
-  cv::Mat rgb(mask.size(), CV_8UC3);
-  for (int v = 0; v < mask.rows; ++v) {
-    for (int u = 0; u < mask.cols; ++u) {
-      const InstanceId id = mask.at<InstanceId>(v, u);
-      const Colour colour = id == kNoInstance ? Colour{0, 0, 0} : ObjectColour(id);
-      rgb.at<cv::Vec3b>(v, u) = {colour[0], colour[1], colour[2]};
-    }
-  }
-  return rgb;
-}
-
-std::string WebpBytes(const cv::Mat& rgb, bool lossless) {
-  cv::Mat bgr;
-  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".webp", bgr, bytes,
-               {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality});
-  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace
@@ -225,63 +170,15 @@ nlohmann::json ReportRecorder::AddMesh(const TriangleMesh& mesh, const VertexMea
           {"index_bytes", Add(packed.index_bytes)}};
 }
 
-VertexMeasures ReportRecorder::Measure(const TriangleMesh& mesh, InstanceId id) const {
-  VertexMeasures measures;
-  measures.error.resize(mesh.vertices.size(), 255);
-  measures.age.resize(mesh.vertices.size(), kNeverSeen);
-  const SceneTruth& truth = *result_.truth;
-  const std::size_t i = TrackerOf(truth, id);
-  if (i == truth.trackers().size()) return measures;
-  const Pose T_OW = truth.T_WO(i).inverse();
-  std::vector<Eigen::Vector3f> points_O;
-  points_O.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3f& p : mesh.vertices) {
-    points_O.push_back((T_OW * p.cast<double>()).cast<float>());
-  }
-  const NearestSurface nearest = truth.surface(i).index_O().Nearest(points_O);
-  for (std::size_t v = 0; v < points_O.size(); ++v) {
-    measures.error[v] = static_cast<std::uint8_t>(
-        std::clamp(std::round(nearest.distance_m[v] / kErrorStep_m), 0.0, 255.0));
-  }
-  // An object carries its surface along: where its points were at a frame is asked of its poses.
-  std::vector<Pose> T_CO;
-  const auto trajectory = truth.trajectories().find(id);
-  for (const Sight& sight : sights_) {
-    Pose T_WO = truth.T_WO(i);
-    if (trajectory != truth.trajectories().end()) {
-      const auto at = trajectory->second.find(sight.frame);
-      if (at != trajectory->second.end()) T_WO = at->second;
-    }
-    T_CO.push_back(sight.T_WC.inverse() * T_WO);
-  }
-  const double slack_m = 3 * result_.config.map.voxel_m;
-  const int now = sights_.empty() ? 0 : sights_.back().frame;
-  const double frames = result_.last_frame - result_.info.first_index + 1;
-  for (std::size_t v = 0; v < points_O.size(); ++v) {
-    for (std::size_t s = sights_.size(); s-- > 0;) {
-      const Sight& sight = sights_[s];
-      const Intrinsics& k = sight.intrinsics;
-      const Eigen::Vector3d p_C = T_CO[s] * points_O[v].cast<double>();
-      if (p_C.z() <= 0) continue;
-      const int u = static_cast<int>(std::lround((k.fx * p_C.x() / p_C.z() + k.cx) / kStride));
-      const int w = static_cast<int>(std::lround((k.fy * p_C.y() / p_C.z() + k.cy) / kStride));
-      if (u < 0 || w < 0 || u >= sight.depth.cols || w >= sight.depth.rows) continue;
-      const float depth_m = sight.depth.at<float>(w, u);
-      if (!IsValidDepth(depth_m) || std::abs(depth_m - p_C.z()) > slack_m) continue;
-      measures.age[v] = static_cast<std::uint8_t>(
-          std::min(254.0, std::round((now - sight.frame) * 254 / frames)));
-      break;
-    }
-  }
-  return measures;
-}
-
 void ReportRecorder::AddChunks(const TriangleMesh& mesh, const char* layer, std::size_t triangles,
                                nlohmann::json& chunks) {
+  const double slack_m = 3 * result_.config.map.voxel_m;
+  const int frames = result_.last_frame - result_.info.first_index + 1;
   const auto add = [&](const TriangleMesh& part, InstanceId id, std::size_t most) {
     if (part.triangles.empty()) return;
     const TriangleMesh small = Decimate(part, most);
-    nlohmann::json chunk = AddMesh(small, Measure(small, id));
+    nlohmann::json chunk =
+        AddMesh(small, sights_.Measure(small, id, *result_.truth, slack_m, frames));
     chunk["id"] = id;
     chunk["layer"] = layer;
     chunks.push_back(std::move(chunk));
@@ -313,8 +210,8 @@ void ReportRecorder::AddChunks(const TriangleMesh& mesh, const char* layer, std:
 void ReportRecorder::AddKeyFrame(const Frame& frame) {
   if (farthest_m_ == 0) {
     std::vector<float> depths;
-    for (int v = 0; v < frame.depth.rows; v += kStride) {
-      for (int u = 0; u < frame.depth.cols; u += kStride) {
+    for (int v = 0; v < frame.depth.rows; v += kDepthStride) {
+      for (int u = 0; u < frame.depth.cols; u += kDepthStride) {
         if (IsValidDepth(frame.depth.at<float>(v, u)))
           depths.push_back(frame.depth.at<float>(v, u));
       }
@@ -334,14 +231,7 @@ void ReportRecorder::AddKeyFrame(const Frame& frame) {
 }
 
 void ReportRecorder::SeeFrame(const Frame& true_frame) {
-  cv::Mat depth((true_frame.depth.rows + kStride - 1) / kStride,
-                (true_frame.depth.cols + kStride - 1) / kStride, CV_32FC1);
-  for (int v = 0; v < depth.rows; ++v) {
-    for (int u = 0; u < depth.cols; ++u) {
-      depth.at<float>(v, u) = true_frame.depth.at<float>(v * kStride, u * kStride);
-    }
-  }
-  sights_.push_back({true_frame.index, true_frame.intrinsics, true_frame.T_WC, depth});
+  sights_.See(true_frame);
   nlohmann::json poses = nlohmann::json::object();
   for (const InstanceId id : result_.truth->moved()) {
     poses[std::to_string(id)] = PoseJson(result_.truth->T_WO(TrackerOf(*result_.truth, id)));
@@ -486,7 +376,7 @@ Expected<void> ReportRecorder::Write() {
                           {"cy", k.cy}}},
                         {"grid", GridJson(grid_)},
                         {"error_step_m", kErrorStep_m},
-                        {"age_step_frames", frames / 254},
+                        {"age_step_frames", frames / kAgeSteps},
                         {"depth_range_m", {Rounded(nearest_m_, 1000), Rounded(farthest_m_, 1000)}},
                         {"objects", std::move(objects)},
                         {"frames", std::move(frames_)},

@@ -11,6 +11,7 @@
 
 #include "eval/compare.h"
 #include "eval/packed_mesh.h"
+#include "eval/sight_log.h"
 
 namespace tsdfpp {
 
@@ -41,21 +42,12 @@ class ReportRecorder {
   Expected<void> Write();
 
  private:
-  // Where the camera was at a frame and how far it saw, on every kStride-th pixel.
-  struct Sight {
-    int frame = 0;
-    Intrinsics intrinsics;
-    Pose T_WC = Pose::Identity();
-    cv::Mat depth;
-  };
-
   nlohmann::json Add(const std::string& bytes);
   nlohmann::json AddImage(const cv::Mat& rgb, bool lossless);
   Expected<void> WriteStill(const std::string& name, int frame, const std::string& bytes) const;
   nlohmann::json AddMesh(const TriangleMesh& mesh, const VertexMeasures& measures);
   void AddChunks(const TriangleMesh& mesh, const char* layer, std::size_t triangles,
                  nlohmann::json& chunks);
-  VertexMeasures Measure(const TriangleMesh& mesh, InstanceId id) const;
   void AddKeyFrame(const Frame& frame);
   nlohmann::json TruthJson();
   std::size_t IndexOf(const CompareRun& run) const;
@@ -64,7 +56,7 @@ class ReportRecorder {
   std::filesystem::path out_;
   std::vector<int> key_frames_;
   PositionGrid grid_;
-  std::vector<Sight> sights_;
+  SightLog sights_;
   std::string bytes_;
   nlohmann::json frames_ = nlohmann::json::array();
   nlohmann::json keys_ = nlohmann::json::array();
