@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <thread>
 
 #include "cli/command.h"
-#include "cli/stop_on_signal.h"
+#include "cli/sweep_progress.h"
 #include "core/files.h"
 
 namespace tsdfpp {
@@ -52,19 +51,9 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const Options& options) 
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
   SweepOptions sweep;
   sweep.out = std::filesystem::path(options.out) / "work";
-  sweep.jobs = options.jobs > 0
-                   ? options.jobs
-                   : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  sweep.stop = &StopOnSignal::stop();
-  Expected<SweepResult> made;
-  {
-    const StopOnSignal handler;
-    ProgressBar bar("bench-set");
-    sweep.progress = [&](int done, int total) { bar.Show(done, total); };
-    made = RunSweep(config, sweep);
-  }
-  if (!made && StopOnSignal::stop()) StopOnSignal::Die(made.error());
-  if (!made) return tl::unexpected(made.error());
+  sweep.jobs = JobsOrCores(options.jobs);
+  TSDFPP_ASSIGN(const SweepResult made,
+                WithSweepBar("bench-set", sweep, [&] { return RunSweep(config, sweep); }));
   CommandResult result{nlohmann::json::array(), ""};
   for (const AxisValue& method : config.grids.front().values.at("method")) {
     const std::string name = AxisText(method);
@@ -72,7 +61,7 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const Options& options) 
     std::replace(stem.begin(), stem.end(), '/', '-');
     const std::filesystem::path file =
         std::filesystem::path(options.out) / fmt::format("{}.json", stem);
-    nlohmann::json json = BenchResultJson(set, *made, name, options.commit);
+    nlohmann::json json = BenchResultJson(set, made, name, options.commit);
     TSDFPP_RETURN_IF_ERROR(WriteFile(file, json.dump(1) + "\n"));
     result.json.push_back(std::move(json));
     result.text += fmt::format("{}\n", file.string());

@@ -3,10 +3,9 @@
 
 #include <cstdlib>
 #include <ctime>
-#include <thread>
 
 #include "cli/command.h"
-#include "cli/stop_on_signal.h"
+#include "cli/sweep_progress.h"
 #include "core/files.h"
 #include "eval/gate_audit.h"
 #include "eval/gate_explain.h"
@@ -65,21 +64,6 @@ Expected<void> Check(const Options& options) {
   return {};
 }
 
-// What `work` gives, with a bar for the frames that are mapped.
-template <typename Work>
-auto WithBar(GateOptions& options, const Work& work) {
-  decltype(work()) result;
-  {
-    const StopOnSignal handler;
-    ProgressBar bar("gate");
-    options.sweep.stop = &StopOnSignal::stop();
-    options.sweep.progress = [&](int done, int total) { bar.Show(done, total); };
-    result = work();
-  }
-  if (!result && StopOnSignal::stop()) StopOnSignal::Die(result.error());
-  return result;
-}
-
 Expected<CommandResult> Update(const Options& options, const GateRun& run,
                                const References& before) {
   if (!run.controls_hold()) {
@@ -98,7 +82,7 @@ Expected<CommandResult> Update(const Options& options, const GateRun& run,
 
 Expected<CommandResult> Audit(const GatesConfig& config, const References& references,
                               GateOptions& gate) {
-  TSDFPP_ASSIGN(const std::vector<GateAudit> audits, WithBar(gate, [&] {
+  TSDFPP_ASSIGN(const std::vector<GateAudit> audits, WithSweepBar("gate", gate.sweep, [&] {
                   return AuditGates(config, references, gate, kFreshSeeds, kFirstFreshSeed);
                 }));
   const std::string text = AuditMarkdown(audits);
@@ -152,9 +136,7 @@ Expected<CommandResult> RunGateCommand(const Options& options) {
   gate.sabotage = *sabotage;
   gate.sweep.out =
       options.out.empty() ? std::filesystem::path("out/gates") : std::filesystem::path(options.out);
-  gate.sweep.jobs = options.jobs > 0
-                        ? options.jobs
-                        : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  gate.sweep.jobs = JobsOrCores(options.jobs);
   if (options.audit) return Audit(config, references, gate);
   if (!options.explain.empty()) {
     if (config.FindGate(options.explain) == nullptr) {
@@ -162,8 +144,9 @@ Expected<CommandResult> RunGateCommand(const Options& options) {
     }
     gate.only = options.explain;
   }
-  TSDFPP_ASSIGN(const GateRun run,
-                WithBar(gate, [&] { return RunGates(config, references, gate); }));
+  TSDFPP_ASSIGN(const GateRun run, WithSweepBar("gate", gate.sweep, [&] {
+                  return RunGates(config, references, gate);
+                }));
   if (options.update) return Update(options, run, references);
   if (!options.explain.empty()) return Explain(run, references, gate.sweep.out);
   return Report(run, references, gate.sweep.out);

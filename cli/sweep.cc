@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <thread>
-
 #include "cli/command.h"
-#include "cli/stop_on_signal.h"
+#include "cli/sweep_progress.h"
 #include "eval/sweep_report.h"
 
 namespace tsdfpp {
@@ -50,26 +48,16 @@ Expected<CommandResult> RunSweepCommand(const Options& options) {
   SweepOptions sweep;
   sweep.out = options.out.empty() ? std::filesystem::path("out") / "experiments" / config.name
                                   : std::filesystem::path(options.out);
-  sweep.jobs = options.jobs > 0
-                   ? options.jobs
-                   : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  sweep.stop = &StopOnSignal::stop();
-  Expected<SweepResult> made;
-  {
-    const StopOnSignal handler;
-    ProgressBar bar("sweep");
-    sweep.progress = [&](int done, int total) { bar.Show(done, total); };
-    made = RunSweep(config, sweep);
-  }
-  if (!made && StopOnSignal::stop()) StopOnSignal::Die(made.error());
-  if (!made) return tl::unexpected(made.error());
-  const std::vector<Condition> conditions = ConditionsOf(*made);
-  nlohmann::json json = SweepJson(*made, conditions);
-  json["run_now"] = made->run_now;
+  sweep.jobs = JobsOrCores(options.jobs);
+  TSDFPP_ASSIGN(const SweepResult made,
+                WithSweepBar("sweep", sweep, [&] { return RunSweep(config, sweep); }));
+  const std::vector<Condition> conditions = ConditionsOf(made);
+  nlohmann::json json = SweepJson(made, conditions);
+  json["run_now"] = made.run_now;
   return CommandResult{std::move(json),
-                       SweepText(*made, conditions) +
+                       SweepText(made, conditions) +
                            fmt::format("{}: {} of {} cells were run now, the others were there\n",
-                                       sweep.out.string(), made->run_now, made->cells)};
+                                       sweep.out.string(), made.run_now, made.cells)};
 }
 
 }  // namespace

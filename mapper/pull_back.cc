@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "mapper/cube_rows.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -103,21 +105,9 @@ CubeBits CubesOf(const PatchBits& observed, const PatchBits& negative) {
   CubeBits cubes;
   for (std::size_t z = 0; z + 1 < kPatchSide; ++z) {
     for (std::size_t y = 0; y + 1 < kPatchSide; ++y) {
-      std::uint32_t all = 0xFFFF;
-      std::uint32_t any_negative = 0;
-      std::uint32_t any_positive = 0;
-      for (std::size_t corner = 0; corner < 4; ++corner) {
-        const std::uint32_t o = observed[z + (corner >> 1U)][y + (corner & 1U)];
-        const std::uint32_t n = negative[z + (corner >> 1U)][y + (corner & 1U)];
-        all &= o;
-        any_negative |= n;
-        any_positive |= o & ~n;
-      }
-      all &= all >> 1U;
-      any_negative |= any_negative >> 1U;
-      any_positive |= any_positive >> 1U;
-      cubes.crossed[z][y] = static_cast<std::uint16_t>(all & any_negative & any_positive);
-      cubes.any_negative[z][y] = static_cast<std::uint16_t>(any_negative);
+      const CubeRow row = CubeRowOf(observed, negative, z, y);
+      cubes.crossed[z][y] = static_cast<std::uint16_t>(row.crossed());
+      cubes.any_negative[z][y] = static_cast<std::uint16_t>(row.any_negative);
     }
   }
   return cubes;
