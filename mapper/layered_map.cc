@@ -40,7 +40,8 @@ std::optional<VoxelValue> ValueOf(const TsdfGrid& grid, const Index3& voxel) {
   const int place = PlaceInBlock(voxel);
   const auto i = static_cast<std::size_t>(place);
   if (block == nullptr || block->weight[i] <= 0) return std::nullopt;
-  return VoxelValue{block->distance[i], block->weight[i], block->ColourAt(place)};
+  return VoxelValue{block->distance[i], static_cast<float>(block->weight[i]),
+                    block->ColourAt(place)};
 }
 
 std::vector<InstanceId> LayeredMap::Objects() const {

@@ -228,8 +228,11 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
   PatchValues values;
   blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.distance[i]; }, values);
   interpolate(values, points, wanted.data(), out.distance.data());
-  blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.weight[i]; }, values);
-  interpolate(values, points, wanted.data(), out.weight.data());
+  blocks.Fill(
+      [](const TsdfBlock& block, std::size_t i) { return static_cast<float>(block.weight[i]); },
+      values);
+  std::array<float, kBlockVoxels> weight{};
+  interpolate(values, points, wanted.data(), weight.data());
   PatchValues counts;
   blocks.Fill([](const TsdfBlock& block,
                  std::size_t i) { return static_cast<float>(block.colour_count[i]); },
@@ -247,11 +250,11 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
                      {out.colour[0].data(), out.colour[1].data(), out.colour[2].data()},
                      total.data());
   keep_wanted(out.distance);
-  keep_wanted(out.weight);
   for (auto& channel : out.colour) keep_wanted(channel);
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const bool coloured = wanted[i] != 0 && total[i] > 0;
-    out.colour_count[i] = coloured ? static_cast<std::uint16_t>(count[i] + 0.5F) : 0;
+    out.weight[i] = wanted[i] != 0 ? static_cast<std::uint8_t>(weight[i] + 0.5F) : 0;
+    out.colour_count[i] = coloured ? static_cast<std::uint8_t>(count[i] + 0.5F) : 0;
   }
   return true;
 }

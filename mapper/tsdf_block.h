@@ -36,10 +36,10 @@ std::uint64_t NewRevision();
 
 // Aligned to cache lines, which whole vectors then do not straddle.
 struct alignas(64) TsdfBlock {
-  std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
-  std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
+  std::array<float, kBlockVoxels> distance{};       // metres, positive in front of the surface
+  std::array<std::uint8_t, kBlockVoxels> weight{};  // observations; 0 is unobserved
   std::array<std::array<std::uint16_t, kBlockVoxels>, 3> colour{};  // by channel, 8.8 fixed point
-  std::array<std::uint16_t, kBlockVoxels> colour_count{};
+  std::array<std::uint8_t, kBlockVoxels> colour_count{};
 
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
@@ -67,7 +67,7 @@ struct alignas(64) TsdfBlock {
   FixedColour FixedColourAt(std::size_t i) const {
     return {colour[0][i], colour[1][i], colour[2][i]};
   }
-  void SetColour(std::size_t i, const FixedColour& fixed, std::uint16_t count) {
+  void SetColour(std::size_t i, const FixedColour& fixed, std::uint8_t count) {
     for (std::size_t channel = 0; channel < 3; ++channel) colour[channel][i] = fixed[channel];
     colour_count[i] = count;
   }

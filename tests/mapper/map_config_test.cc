@@ -73,6 +73,7 @@ TEST(MapConfigTest, EachBadFieldIsNamedWithItsValue) {
       {"layers", "-1", [](MapConfig& c) { c.layers = -1; }},
       {"layers", "9", [](MapConfig& c) { c.layers = 9; }},
       {"weight_cap", "0", [](MapConfig& c) { c.weight_cap = 0; }},
+      {"weight_cap", "256", [](MapConfig& c) { c.weight_cap = 256; }},
       {"confidence_cap", "0", [](MapConfig& c) { c.confidence_cap = 0; }},
       {"moved_confidence", "-2", [](MapConfig& c) { c.moved_confidence = -2; }},
       {"moved_confidence", "11", [](MapConfig& c) { c.moved_confidence = c.confidence_cap + 1; }},

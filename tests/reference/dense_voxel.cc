@@ -59,7 +59,8 @@ void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel, bool
   if (seen.s < -config.back()) return;
   const auto cap = static_cast<float>(config.weight_cap);
   const float s = std::min(seen.s, config.front());
-  voxel.distance = voxel.distance + (s - voxel.distance) / (voxel.weight + 1.0F);
+  const float part = 1.0F / (voxel.weight + 1.0F);
+  voxel.distance = voxel.distance + (s - voxel.distance) * part;
   voxel.weight = std::min(voxel.weight + 1.0F, cap);
   const float colour_band = static_cast<float>(2 * config.voxel_m);
   if (!InBand(seen.s, config)) return;
@@ -125,7 +126,7 @@ std::optional<DenseVoxel> InterpolateVoxel(const Neighbourhood& place,
   };
   DenseVoxel voxel;
   voxel.distance = mean([](const DenseVoxel& corner) { return corner.distance; });
-  voxel.weight = mean([](const DenseVoxel& corner) { return corner.weight; });
+  voxel.weight = std::floor(mean([](const DenseVoxel& corner) { return corner.weight; }) + 0.5F);
   const float count =
       mean([](const DenseVoxel& corner) { return static_cast<float>(corner.colours); });
   voxel.colours = static_cast<int>(std::floor(count + 0.5F));
