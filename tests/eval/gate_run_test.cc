@@ -5,6 +5,7 @@
 
 #include "core/files.h"
 #include "eval/gate_report.h"
+#include "eval/gate_times.h"
 #include "eval/sweep_metrics.h"
 #include "tests/core/temp_folder.h"
 
@@ -79,6 +80,49 @@ TEST_F(GateRunTest, RatiosToAPeer) {
             Verdict::kFail);
   EXPECT_EQ(JudgeGate(gate, Data({5, 7, 9}, {1, 0, 3}), nullptr, kStatistics).verdict,
             Verdict::kInvalid);
+}
+
+// Of each pair of frames, so that a machine that is slow for a while changes nothing.
+TEST_F(GateRunTest, TimesAreComparedFrameByFrame) {
+  Gate gate = Of(Gate::Kind::kPaired, {{}, 0.5});
+  gate.metric = kFrameTimeMetric;
+  gate.ratio = true;
+  const auto timed = [&](const std::vector<double>& ms, const std::string& run) {
+    CellResult& cell = cells_.emplace_back(CellWith(Measured::Undefined("not of this test")));
+    cell.examined.assign(SweepMetrics().size(), Measured::Of(1e9));  // must not be looked at
+    for (std::size_t i = 0; i < ms.size(); ++i)
+      cell.image_digests.emplace(static_cast<int>(10 * i), "d");
+    cell.frame_ms = ms;
+    cell.timed_in = run;
+    return &cell;
+  };
+  // Theirs: 100 ms, then 1000 ms as something else began to work. Ours takes 0.2 of it but for two
+  // frames in which the machine stalled.
+  std::vector<double> theirs(12, 100);
+  theirs.resize(24, 1000);
+  std::vector<double> ours;
+  for (const double ms : theirs) ours.push_back(0.2 * ms);
+  ours[3] = ours[17] = 5000;
+  const auto judge = [&](double factor, const std::string& run, std::size_t frames = 24) {
+    std::vector<double> scaled;
+    for (std::size_t i = 0; i < frames; ++i) scaled.push_back(factor * ours[i]);
+    GateData data;
+    for (const char* seed : {"seed=1;", "seed=2;"}) {
+      data[seed] = {timed(scaled, run), timed(theirs, "one")};
+    }
+    return JudgeGate(gate, data, nullptr, kStatistics);
+  };
+  const Judgement good = judge(1, "one");
+  EXPECT_EQ(good.verdict, Verdict::kPass) << good.why;
+  EXPECT_NEAR(*good.mean.value, 0.2, 1e-12);
+  EXPECT_EQ(judge(3, "one").verdict, Verdict::kFail) << "three times as slow";
+  EXPECT_EQ(judge(1, "one", 10).verdict, Verdict::kPass) << "20 frames of two seeds";
+  const Judgement few = judge(1, "one", 9);
+  EXPECT_EQ(few.verdict, Verdict::kInconclusive);
+  EXPECT_EQ(few.why, "18 frames were timed, 20 are needed");
+  const Judgement apart = judge(1, "another");
+  EXPECT_EQ(apart.verdict, Verdict::kInvalid);
+  EXPECT_EQ(apart.why, "seed=1;: the two were not timed in one run");
 }
 
 TEST_F(GateRunTest, ReferencesAreTwoSided) {
