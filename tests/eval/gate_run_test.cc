@@ -6,6 +6,7 @@
 #include "core/files.h"
 #include "eval/gate_report.h"
 #include "eval/gate_times.h"
+#include "eval/report_gates.h"
 #include "eval/sweep_metrics.h"
 #include "tests/core/temp_folder.h"
 
@@ -245,11 +246,61 @@ TEST(GateReportTest, JUnitIsEscapedAndCounted) {
 }
 
 TEST(GateReportTest, MarkdownNamesWhatFailsAndBreaksNoTable) {
-  const std::string text =
-      GateMarkdown(RunOf(Verdict::kFail, "a|b<i>"), {{"a|b<i>", "See [picture](p.png)."}});
+  const std::string text = GateMarkdown(
+      RunOf(Verdict::kFail, "a|b<i>"), {{"a|b<i>", {"seed=1;", 40, "c<u>r", "in words", "p.png"}}});
   EXPECT_NE(text.find("| a\\|b&lt;i&gt; | **fail** |"), std::string::npos) << text;
-  EXPECT_NE(text.find("See [picture](p.png)."), std::string::npos) << text;
+  EXPECT_NE(text.find("Worst at seed=1; frame 40, c&lt;u&gt;r: ![picture](pictures/p.png)"),
+            std::string::npos)
+      << text;
   EXPECT_EQ(GateMarkdown(RunOf(Verdict::kPass, "g"), {}).find("**"), std::string::npos);
+}
+
+// What the report's page reads is what the gates wrote; else there is a sentence.
+TEST(GateReportTest, ResultsComeBackForTheReport) {
+  const test::TempFolder folder;
+  const auto file = folder.path() / "gates.json";
+  GateRun run = RunOf(Verdict::kFail, "g");
+  run.sabotages.push_back({Sabotage::kFrozenObject, run.gates});
+  ControlOutcome control;
+  control.control.name = "c";
+  control.control.metric = kMetric;
+  control.verdict = Verdict::kPass;
+  run.controls.push_back(control);
+  ASSERT_TRUE(
+      WriteGateReports(run, {{"g", {"seed=1;", 40, "car", "in words", "g.png"}}}, folder.path()));
+  ASSERT_TRUE(WriteFile(folder.path() / kGatePictures / "g.png", "png"));
+  const auto results = ReadGateResults(file);
+  ASSERT_TRUE(results.has_value()) << results.error().message;
+  EXPECT_EQ((*results)["gates"][0]["verdict"], "fail");
+  EXPECT_EQ((*results)["gates"][0]["explanation"]["frame"], 40);
+  EXPECT_EQ((*results)["pictures"]["g"], "data:image/png;base64,cG5n");
+
+  const auto spoilt = [&](const std::function<void(nlohmann::json&)>& spoil) -> std::string {
+    nlohmann::json json = nlohmann::json::parse(ReadFile(file).value());
+    spoil(json);
+    const auto other = folder.path() / "spoilt.json";
+    EXPECT_TRUE(WriteFile(other, json.dump()));
+    const auto read = ReadGateResults(other);
+    if (read) return (*read)["pictures"].dump();
+    EXPECT_EQ(read.error().kind, ErrorKind::kData);
+    return read.error().message.substr(folder.path().string().size() + 1);
+  };
+  using Json = nlohmann::json;
+  EXPECT_EQ(spoilt([](Json& j) { j["schema"] = 7; }), "spoilt.json: schema is 7, expected 1");
+  EXPECT_EQ(spoilt([](Json& j) { j.erase("controls"); }),
+            "spoilt.json: 'controls' is missing or no list");
+  EXPECT_EQ(spoilt([](Json& j) { j["gates"][0]["verdict"] = 3; }),
+            "spoilt.json: a gate's 'verdict' is missing or no text");
+  EXPECT_EQ(spoilt([](Json& j) { j["gates"][0].erase("bounds"); }),
+            "spoilt.json: gate 'g' has no bounds or no mean");
+  EXPECT_EQ(
+      spoilt([](Json& j) { j["sabotages"][0].erase("caught"); }),
+      "spoilt.json: sabotage 'frozen-object' does not say whether it was caught, and by what");
+  EXPECT_EQ(spoilt([](Json& j) { j = Json::array(); }), "spoilt.json is no JSON object");
+  // No file but those of the folder of pictures.
+  EXPECT_EQ(spoilt([](Json& j) { j["gates"][0]["explanation"]["picture"] = "../gates.json"; }),
+            "{}");
+  EXPECT_EQ(ReadGateResults(folder.path() / "none.json").error().kind, ErrorKind::kData);
 }
 
 TEST(GateReportTest, ExitCodeAndColours) {
