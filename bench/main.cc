@@ -16,6 +16,7 @@
 #include "bench/mesh.h"
 #include "bench/rays.h"
 #include "bench/render.h"
+#include "bench/scaling.h"
 #include "bench/side_by_side.h"
 
 namespace tsdfpp {
@@ -113,6 +114,18 @@ void AddFigures(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunFigures(*options); }; });
 }
 
+void AddScaling(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<ScalingOptions>();
+  CLI::App* command = app.add_subcommand("scaling", "What docs/scaling.md shows, as CSV");
+  command->add_option("--out", options->out, "Output folder")->capture_default_str();
+  command->add_option("--parts", options->parts, "Some of them")
+      ->delimiter(',')
+      ->capture_default_str();
+  AddCount(command, "--frames", options->frames, "Of the long runs", 1000, 10000000);
+  AddCount(command, "--runs", options->runs, "Of the others", 1, 1000);
+  command->callback([=, &chosen] { chosen = [=] { return RunScaling(*options); }; });
+}
+
 }  // namespace
 }  // namespace tsdfpp
 
@@ -135,6 +148,7 @@ int main(int argc, char** argv) {
   tsdfpp::AddRays(app, chosen);
   tsdfpp::AddMesh(app, chosen);
   tsdfpp::AddFigures(app, chosen);
+  tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {
         return command->get_name() == argv[1];
