@@ -60,7 +60,7 @@ void AppendScores(const Footage& footage, const PipelineConfig& config,
   for (const std::string& cell :
        {Cell(result.visible_completion), Cell(table.visible_completion),
         Cell(table.preserved.preservation_behind_other), Cell(movers, 3),
-        Cell(1e4 * result.ghost_area_m2, 0), Cell(1e4 * result.revealed_ghost_area_m2, 0),
+        Cell(1e4 * result.ghost_area_m2, 0), Cell(1e4 * *result.revealed_ghost_area_m2.value, 0),
         Cell(result.sanity.all), Cell(least, 3)}) {
     row.push_back(cell);
   }

@@ -13,8 +13,8 @@
 #include <memory>
 
 #include "bench/median.h"
-#include "bench/open3d_peer.h"
-#include "bench/voxel_block_grid.h"
+#include "eval/adapters/open3d_peer.h"
+#include "eval/adapters/voxel_block_grid.h"
 #include "eval/open_source.h"
 #include "mapper/pipeline.h"
 

@@ -14,9 +14,9 @@
 #include <map>
 #include <sstream>
 
-#include "bench/open3d_peer.h"
-#include "bench/voxel_block_grid.h"
 #include "core/files.h"
+#include "eval/adapters/open3d_peer.h"
+#include "eval/adapters/voxel_block_grid.h"
 #include "eval/open_source.h"
 #include "mapper/pipeline.h"
 
@@ -104,38 +104,12 @@ MapConfig ConfigOf(const Case& of) {
   return config;
 }
 
-// The milliseconds of one object's pose update, until the index can be read.
-Times PoseUpdates(const MapRepresentation& map, InstanceId id, const Pose& T_WO) {
-  constexpr int kMoves = 20;
-  constexpr double kStep_m = 0.003;
-  const auto copy = map.Clone();
-  copy->SetObjectPose(id, T_WO);
-  copy->ListAt({0, 0, 0});
-  Times times;
-  for (int i = 1; i <= kMoves; ++i) {
-    Pose moved = T_WO;
-    moved.translation().x() += kStep_m * i;
-    moved.rotate(Eigen::AngleAxisd(0.01 * i, Eigen::Vector3d::UnitZ()));
-    const auto start = Clock::now();
-    copy->SetObjectPose(id, moved);
-    copy->ListAt({0, 0, 0});
-    times.ms.push_back(Milliseconds(start));
-  }
-  return times;
-}
-
-struct Measured {
-  Table frames;
-  Table pose_updates;
-};
-
 // Every method in turn, frame by frame.
 Expected<void> MeasureMethods(FrameSource& source, const Case& of, const SideBySideOptions& options,
-                              const std::vector<Method>& methods, int threads, Measured& measured) {
+                              const std::vector<Method>& methods, int threads, Table& measured) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads));
   const int last = std::min(source.info().frame_count, options.frames);
-  const InstanceId object = source.info().objects.at(1).id;
   for (int run = 0; run < options.runs; ++run) {
     std::vector<std::unique_ptr<Pipeline>> pipelines;
     std::vector<Times> times(methods.size());
@@ -143,10 +117,8 @@ Expected<void> MeasureMethods(FrameSource& source, const Case& of, const SideByS
       pipelines.push_back(std::make_unique<Pipeline>(
           PipelineConfig{method, ConfigOf(of), PoseSource::kGiven, {}}, source.info().objects));
     }
-    Pose T_WO = Pose::Identity();
     for (int i = 0; i < last; ++i) {
       TSDFPP_ASSIGN(const Frame frame, ReadFrame(source, of, i));
-      if (frame.T_WO.contains(object)) T_WO = frame.T_WO.at(object);
       for (std::size_t m = 0; m < pipelines.size(); ++m) {
         const auto start = Clock::now();
         pipelines[m]->Process(frame);
@@ -156,11 +128,8 @@ Expected<void> MeasureMethods(FrameSource& source, const Case& of, const SideByS
     for (std::size_t m = 0; m < pipelines.size(); ++m) {
       const std::string name(MethodName(methods[m]));
       times[m].bytes = pipelines[m]->map().Memory().bytes;
-      Times& best = measured.frames[name][threads];
+      Times& best = measured[name][threads];
       if (best.ms.empty() || times[m].Worst() < best.Worst()) best = times[m];
-      const Times moves = PoseUpdates(pipelines[m]->map(), object, T_WO);
-      Times& best_moves = measured.pose_updates[name][threads];
-      if (best_moves.ms.empty() || moves.Median() < best_moves.Median()) best_moves = moves;
     }
   }
   return {};
@@ -221,16 +190,18 @@ std::string RowsOf(const Table& table, const std::vector<int>& threads,
       rows += fmt::format(" {:.1f} | {:.1f} | {:.1f} | {:.1f} |", times.Median(), times.At(0.99),
                           times.Worst(), faster_peer.at(count) / times.Median());
     }
-    const double scaling =
-        by_threads.at(threads.front()).Median() / by_threads.at(threads.back()).Median();
-    rows += fmt::format(" {:.2f} | {:.0f} |\n", scaling,
-                        1e-6 * static_cast<double>(by_threads.at(threads.back()).bytes));
+    if (threads.size() > 1) {
+      rows += fmt::format(" {:.2f} |", by_threads.at(threads.front()).Median() /
+                                           by_threads.at(threads.back()).Median());
+    }
+    rows +=
+        fmt::format(" {:.0f} |\n", 1e-6 * static_cast<double>(by_threads.at(threads.back()).bytes));
   }
   return rows;
 }
 
 std::string TablesOf(const Case& of, const SideBySideOptions& options, const Table& peers,
-                     const Measured& measured) {
+                     const Table& measured) {
   std::map<int, double> faster_peer;
   for (const int count : options.threads) {
     double least = std::numeric_limits<double>::infinity();
@@ -243,21 +214,15 @@ std::string TablesOf(const Case& of, const SideBySideOptions& options, const Tab
   for (const int count : options.threads) {
     text += fmt::format(" {} T: median | p99 | worst | x faster |", count);
   }
-  text +=
-      fmt::format(" {} T / {} T | MB |\n|---|", options.threads.front(), options.threads.back());
-  for (std::size_t i = 0; i < 4 * options.threads.size() + 2; ++i) text += "---|";
+  const bool several = options.threads.size() > 1;
+  if (several) {
+    text += fmt::format(" {} T / {} T |", options.threads.front(), options.threads.back());
+  }
+  text += " MB |\n|---|";
+  for (std::size_t i = 0; i < 4 * options.threads.size() + (several ? 2 : 1); ++i) text += "---|";
   text += '\n';
   text += RowsOf(peers, options.threads, faster_peer);
-  text += RowsOf(measured.frames, options.threads, faster_peer);
-  text += "\nPose update of one object until the index can be read, median and worst ms:";
-  for (const auto& [name, by_threads] : measured.pose_updates) {
-    text += fmt::format(" {}", name);
-    for (const int count : options.threads) {
-      const Times& times = by_threads.at(count);
-      text += fmt::format(" {:.2f} / {:.2f} ({} T)", times.Median(), times.Worst(), count);
-    }
-    text += name == measured.pose_updates.rbegin()->first ? ".\n" : ";";
-  }
+  text += RowsOf(measured, options.threads, faster_peer);
   return text;
 }
 
@@ -317,10 +282,13 @@ Expected<void> RunSideBySide(const SideBySideOptions& options) {
   const int first = source->info().first_index;
   const int last = std::min(source->info().frame_count, options.frames);
   std::string page = fmt::format(
-      "# What mapping costs\n\nPrinted by `build/release/tsdfpp_bench side-by-side --frames {} "
-      "--runs "
-      "{} --page docs/performance.md` on {}: {}, {}x{}, frames {} to {} counted.\n\n",
-      options.frames, options.runs, Machine(), source->info().name, k.width, k.height,
+      "# What mapping costs\n\nPrinted by `build/release/tsdfpp_bench side-by-side --scene {} "
+      "--cases "
+      "{} --frames {} --threads {} --methods {} --runs {} --page docs/performance.md` on {}: "
+      "{}x{}, "
+      "frames {} to {} counted.\n\n",
+      options.scene, fmt::join(options.cases, ","), options.frames, fmt::join(options.threads, ","),
+      fmt::join(options.methods, ","), options.runs, Machine(), k.width, k.height,
       first + options.warm_up, first + last - 1);
   page += kHowToRead;
   for (const Case& of : cases) {
@@ -329,7 +297,7 @@ Expected<void> RunSideBySide(const SideBySideOptions& options) {
       TSDFPP_RETURN_IF_ERROR(MeasurePeers(of, options, "passive", peers));
       TSDFPP_RETURN_IF_ERROR(MeasurePeers(of, options, "active", peers));
     }
-    Measured measured;
+    Table measured;
     for (const int threads : options.threads) {
       TSDFPP_RETURN_IF_ERROR(MeasureMethods(*source, of, options, methods, threads, measured));
     }

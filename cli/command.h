@@ -23,6 +23,7 @@ struct CommonOptions {
 struct CommandResult {
   nlohmann::json json;
   std::string text;
+  int exit_code = 0;  // of a command that ran but whose verdict is not good
 };
 
 // Registers the subcommand's options on `app`; returns what to run once they are parsed.
@@ -31,9 +32,14 @@ Run AddDoctor(CLI::App& app, const CommonOptions& common);
 Run AddGenerate(CLI::App& app, const CommonOptions& common);
 Run AddVerify(CLI::App& app, const CommonOptions& common);
 Run AddExport(CLI::App& app, const CommonOptions& common);
+Run AddGate(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
+Run AddEvaluate(CLI::App& app, const CommonOptions& common);
 Run AddMetric(CLI::App& app, const CommonOptions& common);
+Run AddBenchSet(CLI::App& app, const CommonOptions& common);
+Run AddReplay(CLI::App& app, const CommonOptions& common);
+Run AddSweep(CLI::App& app, const CommonOptions& common);
 
 // A progress bar on stderr, with frames a second and the time left, where that is a terminal;
 // silent elsewhere.

@@ -1,6 +1,8 @@
 #include "eval/compare.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
@@ -8,6 +10,8 @@
 #include "cli/command.h"
 #include "cli/sequence_options.h"
 #include "eval/compare_report.h"
+#include "eval/open_source.h"
+#include "eval/stand_in_truth.h"
 
 namespace tsdfpp {
 namespace {
@@ -18,15 +22,73 @@ struct Options {
   std::string methods = "tsdf,tsdf++,tsdf++/anchored";
   std::string profiles = "paper,close";
   std::string poses = "gt";
+  std::vector<std::string> adapters;
+  int reveal = -1;
+  std::string removed;
   CompareConfig config;
 };
+
+// Half the map's voxel: what stands in for the truth is finer than what is compared with it.
+constexpr double kStandInVoxels = 0.5;
+
+// The source with the plan that was typed, or the paper's where a dataset of somebody else's has
+// none; true surfaces are reconstructed where that has none.
+Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSource> source,
+                                                      const Options& options,
+                                                      CompareConfig& config) {
+  const SequenceInfo& info = source->info();
+  const bool foreign = IsForeignCofusion(options.source.path);
+  if (options.reveal < 0 && options.removed.empty() && !foreign) return source;
+  const int last = info.first_index + info.frame_count - 1;
+  RevealPlan plan = info.reveal.value_or(PaperPlan(info));
+  if (options.reveal >= 0) plan.frame = options.reveal;
+  if (plan.frame < info.first_index || plan.frame > last) {
+    return UsageError("--reveal {} is out of range: {} has frames {} to {}", plan.frame, info.name,
+                      info.first_index, last);
+  }
+  if (!options.removed.empty()) {
+    TSDFPP_ASSIGN(plan.removed, FindObjects(info, SplitList(options.removed)));
+  }
+  if (std::find(plan.removed.begin(), plan.removed.end(), kBackground) != plan.removed.end()) {
+    return UsageError("--removed names the background, which cannot be removed");
+  }
+  std::vector<TrueModel> models;
+  if (foreign) {
+    const double voxel_m = kStandInVoxels * config.map.voxel_m;
+    ProgressBar bar("truth");
+    TSDFPP_ASSIGN(models, ReconstructTruth(*source, voxel_m,
+                                           [&](int done, int total) { bar.Show(done, total); }));
+    config.truth = StandInOptions(voxel_m);
+    config.truth_note = StandInNote(info, voxel_m);
+    spdlog::info("{}", config.truth_note);
+    spdlog::info("{}: reveal at frame {}, {} objects removed", info.name, plan.frame,
+                 plan.removed.size());
+  }
+  return WithPlan(std::move(source), plan, std::move(models));
+}
 
 Expected<CommandResult> RunCompareCommand(const Options& options) {
   CompareConfig config = options.config;
   config.methods.clear();
+  const std::vector<std::string> known = AdapterNames();
   for (const std::string& name : SplitList(options.methods)) {
+    if (std::find(known.begin(), known.end(), name) != known.end()) {
+      TSDFPP_ASSIGN(AdapterConfig adapter, FindAdapter(name));
+      config.adapters.push_back(std::move(adapter));
+      continue;
+    }
     TSDFPP_ASSIGN(const Method method, MethodFromName(name));
     config.methods.push_back(method);
+  }
+  for (const std::string& file : options.adapters) {
+    TSDFPP_ASSIGN(AdapterConfig adapter, ReadAdapter(file));
+    config.adapters.push_back(std::move(adapter));
+  }
+  for (const AdapterConfig& adapter : config.adapters) {
+    const auto same = [&](const AdapterConfig& other) { return other.name == adapter.name; };
+    if (std::count_if(config.adapters.begin(), config.adapters.end(), same) > 1) {
+      return UsageError("two adapters have the name {}", adapter.name);
+    }
   }
   config.profiles = SplitList(options.profiles);
   config.poses.clear();
@@ -34,7 +96,8 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
     TSDFPP_ASSIGN(const PoseSource poses, PoseSourceFromName(name));
     config.poses.push_back(poses);
   }
-  if (config.methods.empty() || config.profiles.empty() || config.poses.empty()) {
+  if ((config.methods.empty() && config.adapters.empty()) || config.profiles.empty() ||
+      config.poses.empty()) {
     return UsageError("--methods, --profiles and --poses each need one name at least");
   }
   for (const auto& [option, list] :
@@ -52,12 +115,17 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));
     TSDFPP_RETURN_IF_ERROR(probe.Validate());
   }
-  TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
-  const std::string command = fmt::format(
+  TSDFPP_ASSIGN(auto opened, OpenArguments(options.source));
+  TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened), options, config));
+  std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
-      "--until {}",
+      "--until {}{}",
       TextOf(options.source), options.out, options.methods, options.profiles, options.poses,
-      config.map.voxel_m, config.every, config.until);
+      config.map.voxel_m, config.every, config.until, config.keep_meshes ? " --keep-meshes" : "",
+      config.record ? " --record" : "");
+  if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
+  if (!options.removed.empty()) command += " --removed " + options.removed;
+  for (const std::string& file : options.adapters) command += " --adapter " + file;
   ProgressBar bar("compare");
   const auto show = [&](int done, int total) { bar.Show(done, total); };
   TSDFPP_ASSIGN(const CompareResult result,
@@ -75,7 +143,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
   app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
   app.add_option("--methods", options->methods,
                  "Maps to compare, by commas: tsdf, tsdf/min, tsdf++, tsdf++/literal, "
-                 "tsdf++/anchored, volumes")
+                 "tsdf++/anchored, volumes; " +
+                     fmt::format("{}", fmt::join(AdapterNames(), ", ")))
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();
@@ -89,6 +158,18 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
   app.add_option("--until", options->config.until,
                  "Where to stop: reveal, end, or a frame's number")
       ->capture_default_str();
+  app.add_option("--reveal", options->reveal,
+                 "Frame after which objects are removed, in place of the sequence's own plan")
+      ->check(WholeBetween(0, 1'000'000));
+  app.add_option("--removed", options->removed,
+                 "Those objects, ids or names, by commas, in place of the sequence's own plan");
+  app.add_option("--adapter", options->adapters,
+                 "Another mapper to compare (docs/adapters.md); may be given several times")
+      ->check(NotEmpty("a .toml file"));
+  app.add_flag("--keep-meshes", options->config.keep_meshes,
+               "Write every evaluated frame's meshes, as `tsdfpp evaluate` reads them");
+  app.add_flag("--record", options->config.record,
+               "Keep what the 3-D view of `tsdfpp report` shows, below OUT/record/");
   return [options] { return RunCompareCommand(*options); };
 }
 

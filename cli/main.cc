@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/report.h"
 
 namespace {
 
@@ -34,8 +35,16 @@ int RunCommand(int argc, char** argv) {
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+  add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
+      tsdfpp::AddEvaluate);
+  add("report", "Make a page of what compare wrote, in one HTML file", tsdfpp::AddReport);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
+  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired", tsdfpp::AddSweep);
+  add("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
+  add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
+      tsdfpp::AddBenchSet);
+  add("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
 
   try {
     app.parse(argc, argv);
@@ -66,7 +75,7 @@ int RunCommand(int argc, char** argv) {
   }
   const std::string text = common.json ? result->json.dump(2) + "\n" : result->text;
   std::fputs(text.c_str(), stdout);
-  return std::fflush(stdout) == 0 ? 0 : static_cast<int>(ErrorKind::kEnvironment);
+  return std::fflush(stdout) == 0 ? result->exit_code : static_cast<int>(ErrorKind::kEnvironment);
 }
 
 }  // namespace

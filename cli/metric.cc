@@ -2,45 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <memory>
 
-#include "core/files.h"
-#include "core/ply.h"
-#include "sim/mesh_files.h"
-
 namespace tsdfpp {
-
-Expected<TriangleMesh> ReadSurfaceFile(const std::filesystem::path& path, double scale) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  TriangleMesh mesh;
-  if (ending == ".ply") {
-    TSDFPP_ASSIGN(mesh, ReadPly(path));
-  } else if (ending == ".obj" || ending == ".stl") {
-    TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-    TSDFPP_ASSIGN(const RawMesh raw,
-                  ending == ".obj" ? ReadObj(path, bytes) : ReadStl(path, bytes));
-    for (const Eigen::Vector3d& vertex : raw.vertices) {
-      mesh.vertices.emplace_back(vertex.cast<float>());
-    }
-    for (const RawTriangle& triangle : raw.triangles) mesh.triangles.push_back(triangle.vertex);
-  } else {
-    return UsageError("{}: a surface is expected to be a .ply, .obj or .stl file", path.string());
-  }
-  for (Eigen::Vector3f& vertex : mesh.vertices) {
-    vertex = (scale * vertex.cast<double>()).cast<float>();
-    if (!vertex.allFinite()) {
-      return DataError("{}: at scale {} a position is too large for single precision",
-                       path.string(), scale);
-    }
-  }
-  return mesh;
-}
 
 std::string LengthText(const Measured& metres) {
   if (!metres.value) return "undefined: " + metres.why_not;

@@ -6,6 +6,7 @@
 
 #include "cli/metric.h"
 #include "eval/evaluation.h"
+#include "eval/surface_file.h"
 #include "metrics/association.h"
 #include "metrics/object_pose.h"
 #include "metrics/trajectory_report.h"
@@ -182,7 +183,7 @@ Expected<CommandResult> RunPose(const Options& options) {
 
 Run AddMetricPose(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("MODEL", options->model, "The object's mesh or points: .ply, .obj, .stl")
+  app.add_option("MODEL", options->model, "The object's mesh or points: .ply, .obj, .stl, .glb")
       ->required();
   app.add_option("REF", options->truth, "True poses: lines t tx ty tz qx qy qz qw")->required();
   app.add_option("EST", options->estimate, "Estimated poses, the same")->required();

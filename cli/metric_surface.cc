@@ -5,6 +5,7 @@
 
 #include "cli/metric.h"
 #include "eval/evaluation.h"
+#include "eval/surface_file.h"
 #include "metrics/surface_comparison.h"
 
 namespace tsdfpp {
@@ -122,7 +123,8 @@ Expected<CommandResult> RunSurface(const Options& options, bool scale_is_given) 
 
 Run AddMetricSurface(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("RECONSTRUCTION", options->reconstruction, "Mesh or points: .ply, .obj, .stl")
+  app.add_option("RECONSTRUCTION", options->reconstruction,
+                 "Mesh or points: .ply, .obj, .stl, .glb")
       ->required();
   app.add_option("TRUTH", options->truth, "The true surface, the same")->required();
   app.add_option("--tau", options->taus, "Thresholds of precision, recall and F, metres, by commas")

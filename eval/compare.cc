@@ -9,7 +9,9 @@
 
 #include "core/files.h"
 #include "eval/compare_report.h"
+#include "eval/mesh_folder.h"
 #include "eval/pictures.h"
+#include "eval/report_record.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -56,6 +58,50 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   return runs;
 }
 
+// Runs the adapters, one after the other, on the frames as they are given to a mapper.
+Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given,
+                           const std::filesystem::path& out, CompareResult& result) {
+  std::map<DatasetFormat, std::filesystem::path> sequences;
+  Expected<void> done;
+  for (const AdapterConfig& adapter : result.config.adapters) {
+    const DatasetFormat layout = adapter.layout;
+    std::filesystem::path& sequence = sequences[layout];
+    if (sequence.empty()) {
+      sequence = out / fmt::format(".sequence-{}", DatasetFormatName(layout));
+      std::error_code ignored;
+      std::filesystem::remove_all(sequence, ignored);
+      done = WriteForAdapters(source, layout, result.last_frame, sequence);
+    }
+    if (!done) break;
+    AdapterTask task = given;
+    task.sequence = sequence;
+    AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
+    done = RunAdapter(run, task, out / adapter.name);
+    if (!done) break;
+  }
+  for (const auto& [layout, sequence] : sequences) {
+    std::error_code ignored;
+    std::filesystem::remove_all(sequence, ignored);
+  }
+  return done;
+}
+
+// Scores what an adapter wrote of its trajectories, if anything.
+void ScoreTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
+                       const SceneTruth& truth, const Trajectory& camera) {
+  const std::filesystem::path folder = run.folder / "trajectories";
+  std::error_code ignored;
+  if (run.failure || run.matches.empty() || !std::filesystem::exists(folder, ignored)) return;
+  auto scores =
+      EvaluateTrajectories(folder, names, run.matches.back(), truth.trajectories(), camera);
+  if (scores) {
+    run.trajectories = std::move(*scores);
+  } else {
+    run.failure =
+        Error{scores.error().kind, fmt::format("{}: {}", run.config.name, scores.error().message)};
+  }
+}
+
 }  // namespace
 
 CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profile_name,
@@ -77,6 +123,11 @@ std::string CompareRun::FolderName() const {
   return name;
 }
 
+bool IsEvaluated(const CompareResult& result, int frame) {
+  return (frame - result.info.first_index + 1) % result.config.every == 0 ||
+         frame == result.last_frame || frame == result.reveal_frame;
+}
+
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
                                    const std::filesystem::path& out, const std::string& command,
                                    const CompareProgress& progress) {
@@ -93,7 +144,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     return UsageError("--out '{}' is a sequence, expected another folder", out.string());
   }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(out));
-  TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source));
+  TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source, config.truth));
   result.truth = std::make_unique<SceneTruth>(std::move(truth));
   std::vector<ObjectInfo> names;
   for (std::size_t i = 0; i < result.truth->trackers().size(); ++i) {
@@ -109,7 +160,20 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
 
   const int first = result.info.first_index;
   const int total = result.last_frame - first + 1;
+  AdapterTask task{{}, first, result.last_frame, {}, result.movers, config.map.voxel_m, 0};
+  for (int index = first; index <= result.last_frame; ++index) {
+    if (IsEvaluated(result, index)) task.frames.push_back(index);
+  }
+  MapConfig settings = config.map;
+  if (!config.profiles.empty()) {
+    TSDFPP_RETURN_IF_ERROR(settings.SetProfile(config.profiles.front()));
+  }
+  task.truncation_m = settings.voxel_m * settings.trunc_front_voxels;
+  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, out, result));
+  Trajectory camera;
   PictureMaker pictures(result, out);
+  std::optional<ReportRecorder> recorder;
+  if (config.record) recorder.emplace(result, out);
   for (int index = first; index <= result.last_frame; ++index) {
     const auto read_start = std::chrono::steady_clock::now();
     TSDFPP_ASSIGN(const Frame frame, source.Read(index));
@@ -120,19 +184,27 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     result.read_s += since(read_start);
     if (frame.mask.empty()) return DataError("{}: frame {} has no mask", result.info.name, index);
     TSDFPP_RETURN_IF_ERROR(result.truth->Observe(true_frame ? *true_frame : frame));
+    camera[index] = true_frame ? true_frame->T_WC : frame.T_WC;
     const bool reveal = index == result.reveal_frame;
-    const bool evaluate =
-        (index - first + 1) % config.every == 0 || index == result.last_frame || reveal;
+    const bool evaluate = IsEvaluated(result, index);
+    if (recorder) recorder->SeeFrame(true_frame ? *true_frame : frame);
     for (const auto& run : result.runs) {
       const std::int64_t before = ResidentBytes();
       run->times.Add(run->pipeline.Process(frame));
       run->process_growth_bytes += ResidentBytes() - before;
+      if (recorder) recorder->SeeMap(*run);
       if (!evaluate) continue;
-      run->evaluations.push_back(Evaluate(run->pipeline.map(), *result.truth, names, result.movers,
-                                          run->config.map.voxel_m, run->last_seen));
+      SceneMeshes meshes = MeshesOf(run->pipeline.map(), result.movers);
+      if (config.keep_meshes) {
+        TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run->FolderName() / "frames", index));
+      }
+      run->evaluations.push_back(EvaluateMeshes(std::move(meshes), *result.truth, names,
+                                                result.movers, run->config.map.voxel_m,
+                                                run->last_seen));
       Evaluation& evaluation = run->evaluations.back();
       run->times.mesh_s.push_back(evaluation.mesh_s);
-      TSDFPP_RETURN_IF_ERROR(pictures.Take(*run, evaluation, frame));
+      TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
+      if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(*run, evaluation, frame));
       const bool examined = reveal || (!result.reveal_frame && index == result.last_frame);
       if (examined) {
         const std::filesystem::path folder = out / run->FolderName();
@@ -144,9 +216,21 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
       evaluation.revealed = {};
       evaluation.table_reconstructed = {};
     }
+    for (const auto& run : result.adapters) {
+      if (!evaluate) continue;
+      EvaluateAdapter(*run, *result.truth, names, task);
+      if (run->failure) continue;
+      Evaluation& evaluation = run->evaluations.back();
+      TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
+      evaluation.scene = {};
+      evaluation.revealed = {};
+      evaluation.table_reconstructed = {};
+    }
     if (progress) progress(index - first + 1, total);
   }
+  for (const auto& run : result.adapters) ScoreTrajectories(*run, names, *result.truth, camera);
   TSDFPP_RETURN_IF_ERROR(pictures.Finish());
+  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Write());
   result.total_s = since(start);
   TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
   TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 
+#include "eval/adapter.h"
 #include "eval/evaluation.h"
 #include "eval/map_output.h"
 #include "mapper/pipeline.h"
@@ -22,6 +23,16 @@ struct CompareConfig {
   // "reveal" stops at the reveal frame (the last one where the sequence has none), "end" goes on to
   // the last frame without removal, a number stops there.
   std::string until = "reveal";
+  // Writes each map's meshes at every evaluated frame below `<folder>/frames`, as `tsdfpp evaluate`
+  // reads them (eval/mesh_folder.h).
+  bool keep_meshes = false;
+  // Other mappers, which get the same frames. They have one voxel size and truncation: the map's,
+  // and the first profile's in front of the surface.
+  std::vector<AdapterConfig> adapters;
+  TruthOptions truth;
+  // Said wherever scores are shown, e.g. what stands in for true surfaces; may be empty.
+  std::string truth_note;
+  bool record = false;  // what `tsdfpp report` shows in 3-D, below record/ (docs/report.md)
 };
 
 // One map of the comparison.
@@ -50,15 +61,20 @@ struct CompareResult {
   std::set<InstanceId> movers;
   std::unique_ptr<SceneTruth> truth;  // as at the last frame
   std::vector<std::unique_ptr<CompareRun>> runs;
-  double read_s = 0;  // rendering or reading
+  std::vector<std::unique_ptr<AdapterRun>> adapters;  // failed ones among them
+  double read_s = 0;                                  // rendering or reading
   double total_s = 0;
 };
+
+// Whether the maps are evaluated at a frame: every `every`-th, the reveal, the last.
+bool IsEvaluated(const CompareResult& result, int frame);
 
 // Called after each frame.
 using CompareProgress = std::function<void(int done, int total)>;
 
 // Errors: those of the source; kUsage where `until` is no frame of it or the config is wrong; kData
-// where a frame has no mask; kEnvironment where `out` cannot be written. Writes meshes and pictures
+// where a frame has no mask; kEnvironment where `out` cannot be written. An adapter that fails is
+// reported, and the others go on. Writes meshes and pictures
 // below `out` on the way (docs/formats.md), then summary.json, frames.csv and report.html.
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
                                    const std::filesystem::path& out, const std::string& command,

@@ -1,98 +1,29 @@
 #include "eval/compare_report.h"
 
-#include <functional>
 #include <thread>
 
 #include "core/files.h"
+#include "eval/base64.h"
+#include "eval/evaluation_columns.h"
 #include "metrics/trajectory.h"
 
 namespace tsdfpp {
 namespace {
 
-const Evaluation& Examined(const CompareResult& result, const CompareRun& run) {
-  for (const Evaluation& evaluation : run.evaluations) {
+const Evaluation& Examined(const CompareResult& result,
+                           const std::vector<Evaluation>& evaluations) {
+  for (const Evaluation& evaluation : evaluations) {
     if (evaluation.frame == result.reveal_frame) return evaluation;
   }
-  return run.evaluations.back();
+  return evaluations.back();
+}
+const Evaluation& Examined(const CompareResult& result, const CompareRun& run) {
+  return Examined(result, run.evaluations);
 }
 
-// Mean, over the moving objects, of their completion.
-Measured MoversCompletion(const CompareResult& result, const Evaluation& evaluation) {
-  double sum = 0;
-  int count = 0;
-  for (const ObjectScores& object : evaluation.objects) {
-    if (!result.movers.contains(object.info.id) || !object.preserved.completion.value) continue;
-    sum += *object.preserved.completion.value;
-    ++count;
-  }
-  return count == 0 ? Measured::Undefined("no moving object was seen") : Measured::Of(sum / count);
-}
-
-// The least share of right pixels of the whole image and of any object.
-Measured LeastSanity(const Evaluation& evaluation) {
-  Measured least = evaluation.sanity.all;
-  for (const auto& [id, share] : evaluation.sanity.by_object) {
-    if (share.value && (!least.value || *share.value < *least.value)) least = share;
-  }
-  return least;
-}
-
-struct Column {
-  std::string title;
-  std::string csv;
-  std::function<Measured(const CompareResult&, const Evaluation&)> value;
-  int decimals;
-};
-
-// The figures of the table and of frames.csv, in one place.
-const std::vector<Column>& Columns() {
-  static const std::vector<Column> columns{
-      {"kept", "table_preservation_behind_other",
-       [](const CompareResult&, const Evaluation& e) {
-         return e.objects.front().preserved.preservation_behind_other;
-       },
-       3},
-      {"retention", "table_retention_behind_other",
-       [](const CompareResult&, const Evaluation& e) {
-         return e.objects.front().preserved.retention_behind_other;
-       },
-       3},
-      {"hole cm2", "table_hole_area_cm2",
-       [](const CompareResult&, const Evaluation& e) {
-         return e.objects.front().preserved.hole_area_cm2;
-       },
-       0},
-      {"visible", "visible_completion",
-       [](const CompareResult&, const Evaluation& e) { return e.visible_completion; }, 3},
-      {"table", "table_visible_completion",
-       [](const CompareResult&, const Evaluation& e) {
-         return e.objects.front().visible_completion;
-       },
-       3},
-      {"movers", "movers_completion", MoversCompletion, 3},
-      {"ghost cm2", "ghost_area_cm2",
-       [](const CompareResult&, const Evaluation& e) {
-         return Measured::Of(1e4 * e.ghost_area_m2);
-       },
-       0},
-      {"ghost after", "revealed_ghost_area_cm2",
-       [](const CompareResult&, const Evaluation& e) {
-         return Measured::Of(1e4 * e.revealed_ghost_area_m2);
-       },
-       0},
-      {"sane", "sanity_all", [](const CompareResult&, const Evaluation& e) { return e.sanity.all; },
-       3},
-      {"sane least", "sanity_least",
-       [](const CompareResult&, const Evaluation& e) { return LeastSanity(e); }, 3},
-      {"kept any label", "table_preservation_any_label",
-       [](const CompareResult&, const Evaluation& e) {
-         return e.objects.front().preserved.by_cause.front().any_label;
-       },
-       3},
-      {"purity", "table_label_purity",
-       [](const CompareResult&, const Evaluation& e) { return e.objects.front().label_purity; }, 3},
-  };
-  return columns;
+// "open3d (any label)" where it tells no objects apart.
+std::string TitleOf(const AdapterRun& run) {
+  return run.config.name + (run.evaluations.back().labelled ? "" : " (any label)");
 }
 
 std::string Text(const Measured& measured, int decimals) {
@@ -107,19 +38,29 @@ double MedianMs(const nlohmann::json& spread) {
 std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
   std::vector<std::vector<std::string>> rows(1);
   rows[0] = {"map"};
-  for (const Column& column : Columns()) rows[0].push_back(column.title);
+  for (const EvaluationColumn& column : EvaluationColumns()) rows[0].push_back(column.title);
   rows[0].insert(rows[0].end(), {"move ms", "fuse ms", "MB"});
   for (const auto& run : result.runs) {
     const Evaluation& evaluation = Examined(result, *run);
     std::vector<std::string> row{run->Title()};
-    for (const Column& column : Columns()) {
-      row.push_back(Text(column.value(result, evaluation), column.decimals));
+    for (const EvaluationColumn& column : EvaluationColumns()) {
+      row.push_back(Text(column.value(result.movers, evaluation), column.decimals));
     }
     const nlohmann::json times = run->times.ToJson();
     row.push_back(fmt::format("{:.1f}", MedianMs(times["update_poses"])));
     row.push_back(fmt::format("{:.1f}", MedianMs(times["fuse"])));
     row.push_back(
         fmt::format("{:.0f}", static_cast<double>(run->pipeline.map().Memory().bytes) / 1e6));
+    rows.push_back(std::move(row));
+  }
+  for (const auto& run : result.adapters) {
+    if (run->failure) continue;
+    const Evaluation& evaluation = Examined(result, run->evaluations);
+    std::vector<std::string> row{TitleOf(*run)};
+    for (const EvaluationColumn& column : EvaluationColumns()) {
+      row.push_back(Text(column.value(result.movers, evaluation), column.decimals));
+    }
+    row.insert(row.end(), {"-", "-", "-"});  // its times and memory are another program's
     rows.push_back(std::move(row));
   }
   return rows;
@@ -146,18 +87,18 @@ nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& 
                                           : "the baseline was not run with these settings"));
   }
   nlohmann::json differences;
-  for (const Column& column : Columns()) {
+  for (const EvaluationColumn& column : EvaluationColumns()) {
     double sum = 0;
     int count = 0;
     for (std::size_t i = 0; i < run.evaluations.size(); ++i) {
-      const Measured ours = column.value(result, run.evaluations[i]);
-      const Measured theirs = column.value(result, baseline->evaluations[i]);
+      const Measured ours = column.value(result.movers, run.evaluations[i]);
+      const Measured theirs = column.value(result.movers, baseline->evaluations[i]);
       if (!ours.value || !theirs.value) continue;
       sum += *ours.value - *theirs.value;
       ++count;
     }
-    const Measured ours = column.value(result, Examined(result, run));
-    const Measured theirs = column.value(result, Examined(result, *baseline));
+    const Measured ours = column.value(result.movers, Examined(result, run));
+    const Measured theirs = column.value(result.movers, Examined(result, *baseline));
     nlohmann::json& entry = differences[column.csv];
     entry["frames"] = count;
     entry["mean"] = ToJson(count == 0 ? Measured::Undefined("never defined for both maps")
@@ -182,12 +123,7 @@ nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run
     // cancel.
     const ObjectTrajectoryScores scores =
         ScoreObjectTrajectory(estimate->second, truth->second, Pose::Identity(), Pose::Identity());
-    trajectories[std::to_string(id)] = {{"frames", scores.frames},
-                                        {"ate_rmse_m", ToJson(scores.ate_rmse_m)},
-                                        {"rotation_rmse_deg", ToJson(scores.rotation_rmse_deg)},
-                                        {"cofusion_rmse_m", ToJson(scores.cofusion_rmse_m)},
-                                        {"rpe_rmse_m", ToJson(scores.rpe_rmse_m)},
-                                        {"rpe_rmse_deg", ToJson(scores.rpe_rmse_deg)}};
+    trajectories[std::to_string(id)] = ToJson(scores);
   }
   return trajectories;
 }
@@ -223,20 +159,46 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
 
 std::string Csv(const CompareResult& result) {
   std::string csv = "frame,method,profile,poses";
-  for (const Column& column : Columns()) csv += "," + column.csv;
+  for (const EvaluationColumn& column : EvaluationColumns()) csv += "," + column.csv;
   csv += ",mesh_s,evaluate_s\n";
   for (const auto& run : result.runs) {
     for (const Evaluation& evaluation : run->evaluations) {
       csv += fmt::format("{},{},{},{}", evaluation.frame, MethodName(run->config.method),
                          run->profile, PoseSourceName(run->config.poses));
-      for (const Column& column : Columns()) {
-        const Measured value = column.value(result, evaluation);
+      for (const EvaluationColumn& column : EvaluationColumns()) {
+        const Measured value = column.value(result.movers, evaluation);
         csv += value.value ? fmt::format(",{:.6g}", *value.value) : ",";
       }
       csv += fmt::format(",{:.4f},{:.4f}\n", evaluation.mesh_s, evaluation.evaluate_s);
     }
   }
+  for (const auto& run : result.adapters) {
+    for (const Evaluation& evaluation : run->evaluations) {
+      csv += fmt::format("{},{},,", evaluation.frame, run->config.name);
+      for (const EvaluationColumn& column : EvaluationColumns()) {
+        const Measured value = column.value(result.movers, evaluation);
+        csv += value.value ? fmt::format(",{:.6g}", *value.value) : ",";
+      }
+      csv += fmt::format(",,{:.4f}\n", evaluation.evaluate_s);
+    }
+  }
   return csv;
+}
+
+// A line an adapter: what it cost, or why it failed.
+std::vector<std::string> AdapterLines(const CompareResult& result) {
+  std::vector<std::string> lines;
+  for (const auto& run : result.adapters) {
+    const std::string cost =
+        fmt::format("{:.1f} s, {:.1f} s of CPU, at most {:.0f} MB", run->outcome.wall_s,
+                    run->outcome.cpu_s, static_cast<double>(run->outcome.peak_bytes) / 1e6);
+    lines.push_back(run->failure ? fmt::format("failed: {} ({})", run->failure->message, cost)
+                                 : fmt::format("{}: {}", run->config.name, cost));
+    for (const std::string& remark : run->remarks) {
+      lines.push_back(fmt::format("{}: {}", run->config.name, remark));
+    }
+  }
+  return lines;
 }
 
 std::string Escaped(const std::string& text) {
@@ -253,23 +215,6 @@ std::string Escaped(const std::string& text) {
     }
   }
   return escaped;
-}
-
-std::string Base64(const std::string& bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      bits = bits << 8U | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += i + k <= bytes.size() ? kDigits[(bits >> (18 - 6 * k)) & 63U] : '=';
-    }
-  }
-  return text;
 }
 
 std::string Headline(const CompareResult& result) {
@@ -306,6 +251,8 @@ std::string SummaryTable(const CompareResult& result) {
     }
     text += "\n";
   }
+  for (const std::string& line : AdapterLines(result)) text += line + "\n";
+  if (!result.config.truth_note.empty()) text += result.config.truth_note + "\n";
   return text;
 }
 
@@ -325,6 +272,18 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
                          {"read_s", result.read_s},
                          {"total_s", result.total_s},
                          {"runs", runs}};
+  if (!result.config.truth_note.empty()) summary["truth"] = result.config.truth_note;
+  if (!result.adapters.empty()) {
+    summary["adapters"] = nlohmann::json::array();
+    for (const auto& run : result.adapters) {
+      nlohmann::json one = ToJson(*run);
+      if (!run->failure) {
+        one["title"] = TitleOf(*run);
+        one["examined"] = ToJson(Examined(result, run->evaluations));
+      }
+      summary["adapters"].push_back(std::move(one));
+    }
+  }
   summary["reveal_frame"] =
       result.reveal_frame ? nlohmann::json(*result.reveal_frame) : nlohmann::json(nullptr);
   return summary;
@@ -377,6 +336,12 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       "and after the removal. sane: share of mapped pixels whose depth and id the visible scene "
       "shows, over "
       "all and of the worst object. Times are medians a frame on this machine.</p>\n";
+  if (!result.config.truth_note.empty()) {
+    html += fmt::format("<p>{}</p>\n", Escaped(result.config.truth_note));
+  }
+  for (const std::string& line : AdapterLines(result)) {
+    html += fmt::format("<p>{}</p>\n", Escaped(line));
+  }
   for (const PictureFile& picture : pictures) {
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(out / picture.file));
     html += fmt::format(

@@ -51,19 +51,17 @@ SurfaceIndex IndexNear(const TriangleMesh& faces, const SampleSet& samples_O,
   return SurfaceIndex(FacesNear(faces, {box.min() - margin, box.max() + margin}));
 }
 
-std::unique_ptr<MapRepresentation> CopyWithout(const MapRepresentation& map,
-                                               const std::set<InstanceId>& removed) {
-  auto copy = map.Clone();
-  for (const InstanceId id : removed) copy->Remove(id);
-  return copy;
-}
+constexpr const char* kNoLabels = "the mesh has no labels";
 
 class Evaluator {
  public:
   Evaluator(const SceneTruth& truth, double voxel_m) : truth_(truth), voxel_m_(voxel_m) {}
 
-  // Everything about object i on the scene mesh `mesh`, from which the other movers were removed.
+  // Everything about object i on the scene mesh `mesh`, from which `removed` were removed.
+  // `unlabelled` are samples of a mesh without labels, by the object that each is nearest to; null
+  // where there are labels.
   ObjectScores ScoreObject(std::size_t i, const ObjectInfo& info, const TriangleMesh& mesh,
+                           const std::vector<SampleSet>* unlabelled,
                            const std::set<InstanceId>& removed, LastSeenStore& last_seen,
                            Selection* reconstructed_out) const {
     const SeenTracker& tracker = truth_.trackers()[i];
@@ -75,7 +73,8 @@ class Evaluator {
 
     ObjectScores scores;
     scores.info = info;
-    const TriangleMesh faces = FacesOf(mesh, info.id);
+    const TriangleMesh own = unlabelled == nullptr ? FacesOf(mesh, info.id) : TriangleMesh{};
+    const TriangleMesh& faces = unlabelled == nullptr ? own : mesh;
     const SampleMatch match = MatchSamples(
         samples, seen, T_WO, IndexNear(faces, samples, seen, T_WO, kSearchMargin_m), limit_m);
     const Selection reconstructed = Reconstructed(match, voxel_m_);
@@ -91,7 +90,8 @@ class Evaluator {
     last_seen.Update(reconstructed, SelectSeenWith(tracker, SampleStatus::kVisible, within));
     scores.completion = CompletionDistances(samples, seen, match);
 
-    const SampleSet surface = SampleReconstruction(faces, {});
+    const SampleSet surface =
+        unlabelled == nullptr ? SampleReconstruction(faces, {}) : (*unlabelled)[i];
     std::vector<double> thresholds_m;
     thresholds_m.reserve(kThresholdsVoxels.size());
     for (const double voxels : kThresholdsVoxels) thresholds_m.push_back(voxels * voxel_m_);
@@ -102,9 +102,28 @@ class Evaluator {
           ShareOf(samples, seen, Reconstructed(match, thresholds_m[k]), "nothing was seen yet");
       scores.f_score[k] = FScore(scores.accuracy.precision[k], scores.recall[k]);
     }
-    scores.label_purity = ScoreLabelPurity(surface, info.id, truth_.PlacedWithout(removed));
+    scores.label_purity = unlabelled == nullptr
+                              ? ScoreLabelPurity(surface, info.id, truth_.PlacedWithout(removed))
+                              : Measured::Undefined(kNoLabels);
     if (reconstructed_out != nullptr) *reconstructed_out = reconstructed;
     return scores;
+  }
+
+  // Samples of a mesh without labels, split by the true surface that is nearest.
+  std::vector<SampleSet> SplitByNearest(const SampleSet& samples_W) const {
+    const NearestTruth nearest = FindNearestTruth(samples_W.points, truth_.PlacedWithout({}));
+    std::vector<SampleSet> parts(truth_.trackers().size());
+    for (std::size_t k = 0; k < samples_W.size(); ++k) {
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        if (truth_.trackers()[i].id() != nearest.object[k]) continue;
+        parts[i].points.push_back(samples_W.points[k]);
+        parts[i].normals.push_back(samples_W.normals[k]);
+        parts[i].region.push_back(samples_W.region[k]);
+        parts[i].triangle.push_back(samples_W.triangle[k]);
+        parts[i].area_m2.push_back(samples_W.area_m2[k]);
+      }
+    }
+    return parts;
   }
 
   // Share of the selected samples of object i that the mesh has.
@@ -136,40 +155,71 @@ LastSeenStores MakeLastSeenStores(const SceneTruth& truth) {
   return stores;
 }
 
-Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
-                    const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
-                    double voxel_m, LastSeenStores& last_seen) {
-  Evaluation result;
-  result.frame = truth.recent().back().index;
-  auto start = Clock::now();
-  result.scene = map.SceneMesh();
-  result.mesh_s = Since(start);
-  result.revealed = movers.empty() ? result.scene : CopyWithout(map, movers)->SceneMesh();
-  std::map<InstanceId, TriangleMesh> alone;  // each mover with the other movers removed
+const TriangleMesh& SceneMeshes::Without(const std::set<InstanceId>& removed) const {
+  return removed.empty() || !labelled ? scene : without.at(removed);
+}
+
+std::set<std::set<InstanceId>> RemovalsOf(const std::set<InstanceId>& movers) {
+  std::set<std::set<InstanceId>> removals{movers};
   for (const InstanceId id : movers) {
     std::set<InstanceId> others = movers;
     others.erase(id);
-    alone[id] = CopyWithout(map, others)->SceneMesh();
+    removals.insert(std::move(others));
   }
+  return removals;
+}
 
-  start = Clock::now();
+SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& movers) {
+  SceneMeshes meshes;
+  const auto start = Clock::now();
+  meshes.scene = map.SceneMesh();
+  meshes.mesh_s = Since(start);
+  for (const std::set<InstanceId>& removed : RemovalsOf(movers)) {
+    if (removed.empty()) continue;
+    const auto copy = map.Clone();
+    for (const InstanceId id : removed) copy->Remove(id);
+    meshes.without[removed] = copy->SceneMesh();
+  }
+  return meshes;
+}
+
+Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
+                    const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
+                    double voxel_m, LastSeenStores& last_seen) {
+  return EvaluateMeshes(MeshesOf(map, movers), truth, names, movers, voxel_m, last_seen);
+}
+
+Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
+                          const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
+                          double voxel_m, LastSeenStores& last_seen) {
+  Evaluation result;
+  result.frame = truth.recent().back().index;
+  result.labelled = meshes.labelled;
+  result.mesh_s = meshes.mesh_s;
+  const TriangleMesh& revealed = meshes.Without(movers);
+
+  const auto start = Clock::now();
   const auto score_objects = [&] {
     const Evaluator evaluator(truth, voxel_m);
+    std::vector<SampleSet> nearest;
+    if (!meshes.labelled)
+      nearest = evaluator.SplitByNearest(SampleReconstruction(meshes.scene, {}));
     double visible_area = 0;
     double visible_present = 0;
     for (std::size_t i = 0; i < truth.trackers().size(); ++i) {
       const SeenTracker& tracker = truth.trackers()[i];
       const SampleSet& samples = tracker.samples_O();
       const InstanceId id = tracker.id();
-      const bool moves = movers.contains(id);
       std::set<InstanceId> removed = movers;
       removed.erase(id);
       result.objects.push_back(evaluator.ScoreObject(
-          i, names[i], moves ? alone[id] : result.revealed, removed, last_seen[i],
-          id == kBackground ? &result.table_reconstructed : nullptr));
+          i, names[i], meshes.Without(removed), meshes.labelled ? nullptr : &nearest, removed,
+          last_seen[i], id == kBackground ? &result.table_reconstructed : nullptr));
 
       const Selection visible = SelectSeenWith(tracker, SampleStatus::kVisible, SelectAll(samples));
-      const Selection present = evaluator.ReconstructedOn(FacesOf(result.scene, id), i, visible);
+      const Selection present =
+          meshes.labelled ? evaluator.ReconstructedOn(FacesOf(meshes.scene, id), i, visible)
+                          : evaluator.ReconstructedOn(meshes.scene, i, visible);
       Selection both = visible;
       Selection scored = ScoredSamples(truth, i);
       for (std::size_t k = 0; k < both.size(); ++k) {
@@ -185,18 +235,22 @@ Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
                                                  : Measured::Undefined("nothing seen is visible");
   };
   const auto score_scene = [&] {
-    const GhostScores ghosts = ScoreGhosts(SampleReconstruction(result.scene, {}),
+    const GhostScores ghosts = ScoreGhosts(SampleReconstruction(meshes.scene, {}),
                                            truth.PlacedWithout({}), voxel_m, &truth.free_space());
     result.ghost_area_m2 = ghosts.area_m2;
     result.ghost_share = ghosts.share_of_mesh;
-    result.revealed_ghost_area_m2 = ScoreGhosts(SampleReconstruction(result.revealed, {}),
-                                                truth.PlacedWithout(movers), voxel_m, nullptr)
-                                        .area_m2;
-    result.sanity = ScoreSanity(result.scene, truth.recent(), voxel_m);
+    result.revealed_ghost_area_m2 =
+        meshes.labelled ? Measured::Of(ScoreGhosts(SampleReconstruction(revealed, {}),
+                                                   truth.PlacedWithout(movers), voxel_m, nullptr)
+                                           .area_m2)
+                        : Measured::Undefined(kNoLabels);
+    result.sanity = ScoreSanity(meshes.scene, truth.recent(), voxel_m);
   };
   // Each writes its own part of the result.
   tbb::parallel_invoke(score_objects, score_scene);
   result.evaluate_s = Since(start);
+  result.revealed = revealed;
+  result.scene = std::move(meshes.scene);
   return result;
 }
 
@@ -257,6 +311,15 @@ nlohmann::json ToJson(const ObjectScores& scores) {
 
 }  // namespace
 
+nlohmann::json ToJson(const ObjectTrajectoryScores& scores) {
+  return {{"frames", scores.frames},
+          {"ate_rmse_m", ToJson(scores.ate_rmse_m)},
+          {"rotation_rmse_deg", ToJson(scores.rotation_rmse_deg)},
+          {"cofusion_rmse_m", ToJson(scores.cofusion_rmse_m)},
+          {"rpe_rmse_m", ToJson(scores.rpe_rmse_m)},
+          {"rpe_rmse_deg", ToJson(scores.rpe_rmse_deg)}};
+}
+
 nlohmann::json ToJson(const Evaluation& evaluation) {
   nlohmann::json objects = nlohmann::json::array();
   for (const ObjectScores& scores : evaluation.objects) objects.push_back(ToJson(scores));
@@ -265,11 +328,12 @@ nlohmann::json ToJson(const Evaluation& evaluation) {
     sanity["objects"][std::to_string(id)] = ToJson(share);
   }
   return {{"frame", evaluation.frame},
+          {"labelled", evaluation.labelled},
           {"objects", objects},
           {"visible_completion", ToJson(evaluation.visible_completion)},
           {"ghost_area_m2", evaluation.ghost_area_m2},
           {"ghost_share", ToJson(evaluation.ghost_share)},
-          {"revealed_ghost_area_m2", evaluation.revealed_ghost_area_m2},
+          {"revealed_ghost_area_m2", ToJson(evaluation.revealed_ghost_area_m2)},
           {"sanity", sanity},
           {"mesh_s", evaluation.mesh_s},
           {"evaluate_s", evaluation.evaluate_s}};

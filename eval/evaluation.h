@@ -1,6 +1,7 @@
 // All scores of one map at one frame (facts/metrics.md; docs/metrics.md).
 #pragma once
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -9,6 +10,7 @@
 #include "mapper/map_representation.h"
 #include "metrics/accuracy.h"
 #include "metrics/preservation.h"
+#include "metrics/trajectory.h"
 
 namespace tsdfpp {
 
@@ -32,13 +34,31 @@ struct ObjectScores {
   Measured label_purity;
 };
 
+// The meshes that one evaluation looks at, in the world's frame.
+struct SceneMeshes {
+  TriangleMesh scene;  // visible, nothing removed
+  // The visible scene after these objects were removed; see RemovalsOf.
+  std::map<std::set<InstanceId>, TriangleMesh> without;
+  // Do faces carry ids? Where they do not, nothing can be removed, and every score takes faces of
+  // any label: the label-agnostic score.
+  bool labelled = true;
+  double mesh_s = 0;  // making `scene`
+
+  // `scene` where nothing is removed or nothing can be.
+  const TriangleMesh& Without(const std::set<InstanceId>& removed) const;
+};
+
+// The removals that an evaluation looks at: all `movers`, and for each of them all the others.
+std::set<std::set<InstanceId>> RemovalsOf(const std::set<InstanceId>& movers);
+
 struct Evaluation {
   int frame = 0;
+  bool labelled = true;               // as SceneMeshes; else purity and ghosts after are undefined
   std::vector<ObjectScores> objects;  // background first
   Measured visible_completion;        // all regions and objects, by area
   double ghost_area_m2 = 0;           // of the visible scene, in observed free space
   Measured ghost_share;
-  double revealed_ghost_area_m2 = 0;  // after all movers were removed
+  Measured revealed_ghost_area_m2;  // after all movers were removed
   SanityScores sanity;
   TriangleMesh scene;             // visible, nothing removed
   TriangleMesh revealed;          // after all movers were removed
@@ -47,8 +67,16 @@ struct Evaluation {
   double evaluate_s = 0;          // all the rest but the removals' copies and meshes
 };
 
-// `movers` are the objects that the experiment removes. `names` are the objects in the order of the
-// trackers. The map is not changed: each removal acts on a copy.
+// `movers` are the objects that the experiment removes; `meshes` has all of RemovalsOf(movers) that
+// are not empty. `names` are the objects in the order of the trackers. `mesh_s` stays 0.
+Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
+                          const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
+                          double voxel_m, LastSeenStores& last_seen);
+
+// What the map's visible scene is before and after the removals, each of which acts on a copy.
+SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& movers);
+
+// EvaluateMeshes of MeshesOf.
 Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
                     const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
                     double voxel_m, LastSeenStores& last_seen);
@@ -56,5 +84,6 @@ Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
 // null, with a reason beside it, where a value is undefined.
 nlohmann::json ToJson(const Measured& measured);
 nlohmann::json ToJson(const Evaluation& evaluation);
+nlohmann::json ToJson(const ObjectTrajectoryScores& scores);
 
 }  // namespace tsdfpp

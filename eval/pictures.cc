@@ -15,19 +15,6 @@ constexpr double kCellWidth = 384;  // pixels; images are scaled to it
 constexpr double kTablePixel_m = 0.0025;
 constexpr std::size_t kMaxColumns = 4;
 
-// Okabe and Ito's colours, which colour-blind readers can tell apart; the background is grey.
-Colour ColourOf(InstanceId id) {
-  constexpr std::array<Colour, 7> kPalette{{{0, 114, 178},
-                                            {230, 159, 0},
-                                            {0, 158, 115},
-                                            {204, 121, 167},
-                                            {86, 180, 233},
-                                            {213, 94, 0},
-                                            {240, 228, 66}}};
-  if (id == kBackground) return {205, 203, 198};
-  return kPalette[(id - 1U) % kPalette.size()];
-}
-
 void Write(cv::Mat& image, const std::string& text, cv::Point at, double size = 0.5,
            int thickness = 1) {
   cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, size, cv::Scalar(30, 30, 30), thickness,
@@ -76,6 +63,18 @@ cv::Mat Grid(const std::vector<std::string>& columns, const std::vector<std::str
 
 }  // namespace
 
+Colour ObjectColour(InstanceId id) {
+  constexpr std::array<Colour, 7> kPalette{{{0, 114, 178},
+                                            {230, 159, 0},
+                                            {0, 158, 115},
+                                            {204, 121, 167},
+                                            {86, 180, 233},
+                                            {213, 94, 0},
+                                            {240, 228, 66}}};
+  if (id == kBackground) return {205, 203, 198};
+  return kPalette[(id - 1U) % kPalette.size()];
+}
+
 cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, const Pose& T_WC,
                   double scale) {
   const Raster raster = Rasterise(scene_W, intrinsics, T_WC);
@@ -93,7 +92,9 @@ cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, con
       const float facing = normal.dot((camera_W - a).normalized());
       const float light =
           facing > 0 ? 0.35F + 0.45F * facing + 0.2F * std::max(0.0F, normal.z()) : 0.2F;
-      const Colour base = ColourOf(scene_W.face_ids[static_cast<std::size_t>(face)]);
+      const Colour base = scene_W.face_ids.empty()
+                              ? ObjectColour(kBackground)
+                              : ObjectColour(scene_W.face_ids[static_cast<std::size_t>(face)]);
       auto& pixel = image.at<cv::Vec3b>(v, u);
       for (int c = 0; c < 3; ++c) {
         pixel[c] = static_cast<std::uint8_t>(static_cast<float>(base[static_cast<std::size_t>(c)]) *
@@ -183,35 +184,41 @@ std::vector<int> PictureMaker::Columns() const {
   return columns;
 }
 
-Expected<void> PictureMaker::Take(const CompareRun& run, const Evaluation& evaluation,
+Expected<void> PictureMaker::Take(const void* run, const Evaluation& evaluation,
                                   const Frame& frame) {
   const double scale = frame.intrinsics.width / kCellWidth;
   const std::vector<int> columns = Columns();
   if (std::find(columns.begin(), columns.end(), frame.index) != columns.end()) {
-    cells_[&run][frame.index] = DrawScene(evaluation.scene, frame.intrinsics, frame.T_WC, scale);
+    cells_[run][frame.index] = DrawScene(evaluation.scene, frame.intrinsics, frame.T_WC, scale);
     cv::resize(frame.colour, camera_[frame.index], {}, 1 / scale, 1 / scale, cv::INTER_AREA);
   }
   if (frame.index != ExaminedFrame()) return {};
-  after_removal_[&run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, scale);
+  after_removal_[run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, scale);
   cv::Mat table = DrawTable(*result_.truth, evaluation.table_reconstructed, kTablePixel_m);
   const Measured& hole = evaluation.objects.front().preserved.hole_area_cm2;
   const std::string text =
       hole.value ? fmt::format("hole {:.0f} of {:.0f} cm2 hidden", *hole.value,
                                evaluation.objects.front().preserved.behind_other_area_cm2)
                  : "nothing hidden";
+  if (table.empty())
+    table = cv::Mat(1, static_cast<int>(kCellWidth), CV_8UC3, cv::Scalar(255, 255, 255));
   cv::copyMakeBorder(table, table, 0, 26, 0, 0, cv::BORDER_CONSTANT, cv::Scalar(255, 255, 255));
   Write(table, text, {4, table.rows - 8}, 0.5);
-  tables_[&run] = table;
+  tables_[run] = table;
   return {};
 }
 
 Expected<void> PictureMaker::Finish() {
+  if (cells_.empty()) return {};  // every adapter failed, and there was nothing else
   for (const PoseSource poses : result_.config.poses) {
     std::vector<std::string> table_rows;
     std::vector<std::vector<cv::Mat>> table_cells;
     std::vector<std::string> table_columns;
     for (const Method method : result_.config.methods)
       table_columns.emplace_back(MethodName(method));
+    for (const auto& run : result_.adapters) {
+      if (!run->failure) table_columns.push_back(run->config.name);
+    }
     for (const std::string& profile : result_.config.profiles) {
       std::vector<std::string> titles;
       std::vector<cv::Mat> camera_row;
@@ -224,14 +231,21 @@ Expected<void> PictureMaker::Finish() {
       std::vector<std::vector<cv::Mat>> cells{camera_row};
       table_rows.push_back("profile " + profile);
       table_cells.emplace_back();
+      const auto add = [&](const void* run, const std::string& title) {
+        std::vector<cv::Mat> row;
+        for (const int frame : Columns()) row.push_back(cells_.at(run).at(frame));
+        row.push_back(after_removal_.at(run));
+        rows.push_back(title);
+        cells.push_back(row);
+        table_cells.back().push_back(tables_.at(run));
+      };
       for (const auto& run : result_.runs) {
         if (run->profile != profile || run->config.poses != poses) continue;
-        std::vector<cv::Mat> row;
-        for (const int frame : Columns()) row.push_back(cells_.at(run.get()).at(frame));
-        row.push_back(after_removal_.at(run.get()));
-        rows.emplace_back(MethodName(run->config.method));
-        cells.push_back(row);
-        table_cells.back().push_back(tables_.at(run.get()));
+        add(run.get(), std::string(MethodName(run->config.method)));
+      }
+      // An adapter has no profile; it stands beside each.
+      for (const auto& run : result_.adapters) {
+        if (!run->failure) add(run.get(), run->config.name);
       }
       const std::string file = fmt::format("figure-{}-{}.png", profile, PoseSourceName(poses));
       TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Grid(titles, rows, cells)));

@@ -21,9 +21,10 @@ class PictureMaker {
   // `result` must outlive it and have its runs.
   PictureMaker(const CompareResult& result, std::filesystem::path out);
 
-  // Takes what the pictures need of one evaluation. Errors: kEnvironment where a picture cannot be
+  // Takes what the pictures need of one evaluation; `run` is a CompareRun or an AdapterRun of the
+  // result. Errors: kEnvironment where a picture cannot be
   // written.
-  Expected<void> Take(const CompareRun& run, const Evaluation& evaluation, const Frame& frame);
+  Expected<void> Take(const void* run, const Evaluation& evaluation, const Frame& frame);
   // Writes figure-<profile>-<poses>.png (a row a method; columns frames and after the removal) and
   // table-<profile>-<poses>.png (the table from above after the removal, holes in red).
   Expected<void> Finish();
@@ -38,14 +39,19 @@ class PictureMaker {
   const CompareResult& result_;
   std::filesystem::path out_;
   std::vector<PictureFile> files_;
-  std::map<const CompareRun*, std::map<int, cv::Mat>> cells_;  // by frame
-  std::map<const CompareRun*, cv::Mat> after_removal_;
-  std::map<const CompareRun*, cv::Mat> tables_;
+  std::map<const void*, std::map<int, cv::Mat>> cells_;  // by frame
+  std::map<const void*, cv::Mat> after_removal_;
+  std::map<const void*, cv::Mat> tables_;
   std::map<int, cv::Mat> camera_;  // colour images of the columns
 };
 
-// A mesh with face ids as the frame's camera sees it, `scale` times smaller: one colour an object,
-// shaded; white where there is nothing. CV_8UC3, red-green-blue.
+// Okabe and Ito's colours, which colour-blind readers can tell apart, in turn by id; the background
+// is grey.
+Colour ObjectColour(InstanceId id);
+
+// A mesh as the frame's camera sees it, `scale` times smaller: one colour an object (the
+// background's where there are no face ids), shaded; white where there is nothing. CV_8UC3,
+// red-green-blue.
 cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, const Pose& T_WC,
                   double scale);
 

@@ -78,16 +78,36 @@ Raster Rasterise(const TriangleMesh& mesh_W, const Intrinsics& intrinsics, const
         }
       });
   const int bands = (intrinsics.height + kRowsPerBand - 1) / kRowsPerBand;
+  // The triangles that meet each band, in their order.
+  std::vector<std::vector<std::uint32_t>> of_band(static_cast<std::size_t>(bands));
+  const auto width = static_cast<float>(intrinsics.width);
+  const auto height = static_cast<float>(intrinsics.height);
+  for (std::size_t i = 0; i < mesh_W.triangles.size(); ++i) {
+    const auto& t = mesh_W.triangles[i];
+    const Projected& a = projected[t[0]];
+    const Projected& b = projected[t[1]];
+    const Projected& c = projected[t[2]];
+    if (a.inverse_z < 0 || b.inverse_z < 0 || c.inverse_z < 0) continue;
+    const float low = std::min({a.v, b.v, c.v});
+    const float high = std::max({a.v, b.v, c.v});
+    // Written so that what is no number belongs to no band.
+    if (!(high >= 0 && low <= height - 1) || !(std::max({a.u, b.u, c.u}) >= 0) ||
+        !(std::min({a.u, b.u, c.u}) <= width - 1)) {
+      continue;
+    }
+    const int first = static_cast<int>(std::max(low, 0.0F)) / kRowsPerBand;
+    const int last = static_cast<int>(std::min(high, height - 1)) / kRowsPerBand;
+    for (int band = first; band <= last; ++band) {
+      of_band[static_cast<std::size_t>(band)].push_back(static_cast<std::uint32_t>(i));
+    }
+  }
   tbb::parallel_for(0, bands, [&](int band) {
     const int first = band * kRowsPerBand;
     const int last = std::min(intrinsics.height, first + kRowsPerBand) - 1;
-    for (std::size_t i = 0; i < mesh_W.triangles.size(); ++i) {
+    for (const std::uint32_t i : of_band[static_cast<std::size_t>(band)]) {
       const auto& t = mesh_W.triangles[i];
-      const Projected& a = projected[t[0]];
-      const Projected& b = projected[t[1]];
-      const Projected& c = projected[t[2]];
-      if (a.inverse_z < 0 || b.inverse_z < 0 || c.inverse_z < 0) continue;
-      RasteriseTriangle(a, b, c, static_cast<int>(i), first, last, out);
+      RasteriseTriangle(projected[t[0]], projected[t[1]], projected[t[2]], static_cast<int>(i),
+                        first, last, out);
     }
   });
   return out;

@@ -147,7 +147,8 @@ SanityScores ScoreSanity(const TriangleMesh& scene_W, const std::deque<Frame>& r
       if (mapped.at<std::uint8_t>(v, u) == 0) continue;
       const int face = raster.face.at<int>(v, u);
       const bool right =
-          face >= 0 && scene_W.face_ids[static_cast<std::size_t>(face)] == id &&
+          face >= 0 &&
+          (scene_W.face_ids.empty() || scene_W.face_ids[static_cast<std::size_t>(face)] == id) &&
           std::abs(raster.depth.at<float>(v, u) - now.depth.at<float>(v, u)) <= voxel_m;
       for (Count* of : {&count, &all}) {
         ++of->mapped;

@@ -2,17 +2,18 @@
 
 namespace tsdfpp {
 
-Expected<SceneTruth> SceneTruth::Create(FrameSource& source) {
+Expected<SceneTruth> SceneTruth::Create(FrameSource& source, const TruthOptions& options) {
   TSDFPP_ASSIGN(std::vector<TrueModel> models, source.Truth());
   std::sort(models.begin(), models.end(),
             [](const TrueModel& a, const TrueModel& b) { return a.info.id < b.info.id; });
   SceneTruth truth;
   for (TrueModel& model : models) {
     const InstanceId id = model.info.id;
-    const auto& surface =
-        truth.surfaces_.emplace_back(std::make_unique<TruthSurface>(std::move(model)));
+    const auto& surface = truth.surfaces_.emplace_back(
+        std::make_unique<TruthSurface>(std::move(model), options.closed));
     truth.trackers_.emplace_back(
-        WithoutInner(SampleModel(surface->model(), SampleConfig{}), surface->solid_O()), id);
+        WithoutInner(SampleModel(surface->model(), options.sampling), surface->solid_O()), id,
+        options.visibility);
     truth.T_WO_.push_back(Pose::Identity());
   }
   return truth;

@@ -17,10 +17,16 @@ namespace tsdfpp {
 // The name of the background's region under the moving objects, whose preservation is the question.
 inline constexpr const char* kTableRegion = "table";
 
+struct TruthOptions {
+  SampleConfig sampling;        // of the true surfaces
+  VisibilityConfig visibility;  // of the samples
+  bool closed = true;           // the surfaces bound solids; else nothing is inside them
+};
+
 class SceneTruth {
  public:
   // Errors: those of FrameSource::Truth.
-  static Expected<SceneTruth> Create(FrameSource& source);
+  static Expected<SceneTruth> Create(FrameSource& source, const TruthOptions& options = {});
 
   // Takes in a frame, in order. Objects without a pose in the frame stay where they were.
   // Errors: kData where the images do not fit.

@@ -51,14 +51,23 @@ Expected<Method> MethodFromName(std::string_view name) {
 }
 
 std::string_view ResamplingName(Resampling resampling) {
-  return resampling == Resampling::kAll ? "all" : "observed";
+  switch (resampling) {
+    case Resampling::kAll:
+      return "all";
+    case Resampling::kObserved:
+      return "observed";
+    case Resampling::kNearest:
+      return "nearest";
+  }
+  std::abort();
 }
 
 Expected<Resampling> ResamplingFromName(std::string_view name) {
-  for (const Resampling resampling : {Resampling::kAll, Resampling::kObserved}) {
+  for (const Resampling resampling :
+       {Resampling::kAll, Resampling::kObserved, Resampling::kNearest}) {
     if (name == ResamplingName(resampling)) return resampling;
   }
-  return UsageError("resampling '{}' is unknown, expected all or observed", name);
+  return UsageError("resampling '{}' is unknown, expected all, observed or nearest", name);
 }
 
 Expected<void> MapConfig::Validate() const {

@@ -26,9 +26,10 @@ inline constexpr double kColourBand_voxels = 2;
 enum class Resampling {
   kAll,       // all eight observed
   kObserved,  // the nearest one; the mean is taken over those that are observed
+  kNearest,   // the nearest one, whose values are taken as they are
 };
 
-// "all", "observed".
+// "all", "observed", "nearest".
 std::string_view ResamplingName(Resampling resampling);
 // Errors: kUsage.
 Expected<Resampling> ResamplingFromName(std::string_view name);

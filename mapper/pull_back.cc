@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "mapper/cube_rows.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -103,21 +105,9 @@ CubeBits CubesOf(const PatchBits& observed, const PatchBits& negative) {
   CubeBits cubes;
   for (std::size_t z = 0; z + 1 < kPatchSide; ++z) {
     for (std::size_t y = 0; y + 1 < kPatchSide; ++y) {
-      std::uint32_t all = 0xFFFF;
-      std::uint32_t any_negative = 0;
-      std::uint32_t any_positive = 0;
-      for (std::size_t corner = 0; corner < 4; ++corner) {
-        const std::uint32_t o = observed[z + (corner >> 1U)][y + (corner & 1U)];
-        const std::uint32_t n = negative[z + (corner >> 1U)][y + (corner & 1U)];
-        all &= o;
-        any_negative |= n;
-        any_positive |= o & ~n;
-      }
-      all &= all >> 1U;
-      any_negative |= any_negative >> 1U;
-      any_positive |= any_positive >> 1U;
-      cubes.crossed[z][y] = static_cast<std::uint16_t>(all & any_negative & any_positive);
-      cubes.any_negative[z][y] = static_cast<std::uint16_t>(any_negative);
+      const CubeRow row = CubeRowOf(observed, negative, z, y);
+      cubes.crossed[z][y] = static_cast<std::uint16_t>(row.crossed());
+      cubes.any_negative[z][y] = static_cast<std::uint16_t>(row.any_negative);
     }
   }
   return cubes;
@@ -149,6 +139,13 @@ bool AllEight(const PatchBits& bits, std::int32_t place) {
 std::int32_t NearestCorner(const PulledPoints& points, std::size_t i) {
   const auto upper = [&](std::size_t axis) { return points.fraction[axis][i] >= 0.5F ? 1 : 0; };
   return points.corner[i] + 256 * upper(2) + 16 * upper(1) + upper(0);
+}
+
+// Takes each point to its nearest corner.
+void RoundFractions(PulledPoints& points) {
+  for (auto& fractions : points.fraction) {
+    for (float& fraction : fractions) fraction = fraction >= 0.5F ? 1.0F : 0.0F;
+  }
 }
 
 PulledPoints PointsOf(const std::array<double, 12>& T, double voxel_m, const Index3& block) {
@@ -205,12 +202,17 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
 
 bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_inverse,
                    double voxel_m, const Index3& index, TsdfBlock& out, Resampling resampling) {
-  const PulledPoints points = PointsOf(T_inverse, voxel_m, index);
+  PulledPoints points = PointsOf(T_inverse, voxel_m, index);
   const PatchBlocks blocks(reader, points);
   if (!blocks.any()) return false;
   const PatchBits observed = blocks.Bits(&TsdfBlock::observed);
   const bool all_count = resampling == Resampling::kAll;
-  const auto interpolate = all_count ? InterpolateAll : InterpolateObserved;
+  const bool nearest = resampling == Resampling::kNearest;
+  // At the nearest corner itself, the only one that then counts.
+  if (nearest) RoundFractions(points);
+  const auto interpolate = all_count ? InterpolateAll
+                           : nearest ? InterpolateCounted
+                                     : InterpolateObserved;
   Lanes wanted;
   bool any = false;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <memory>
 
+#include "mapper/cube_rows.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -50,20 +52,7 @@ bool FindCrossed(const UpperNeighbours& blocks, CrossedCubes& out) {
   std::uint32_t columns = 0;
   for (std::size_t z = 0; z < kBlockSide; ++z) {
     for (std::size_t y = 0; y < kBlockSide; ++y) {
-      std::uint32_t all = 0x1FF;
-      std::uint32_t any_negative = 0;
-      std::uint32_t any_positive = 0;
-      for (std::size_t corner = 0; corner < 4; ++corner) {
-        const std::uint32_t o = observed[z + (corner >> 1U)][y + (corner & 1U)];
-        const std::uint32_t n = negative[z + (corner >> 1U)][y + (corner & 1U)];
-        all &= o;
-        any_negative |= n;
-        any_positive |= o & ~n;
-      }
-      all &= all >> 1U;
-      any_negative |= any_negative >> 1U;
-      any_positive |= any_positive >> 1U;
-      const std::uint32_t row = all & any_negative & any_positive & 0xFFU;
+      const std::uint32_t row = CubeRowOf(observed, negative, z, y).crossed() & 0xFFU;
       if (row == 0) continue;
       columns |= row;
       out.bits[2 * z + (y >> 2U)] |= row << (8 * (y & 3U));

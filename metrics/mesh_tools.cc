@@ -57,6 +57,12 @@ TriangleMesh FacesOf(const TriangleMesh& mesh, InstanceId id) {
   return Select(mesh, [&](std::size_t t) { return mesh.face_ids[t] == id; });
 }
 
+TriangleMesh FacesWithout(const TriangleMesh& mesh, const std::set<InstanceId>& ids) {
+  return Select(mesh, [&](std::size_t t) {
+    return mesh.face_ids.empty() || !ids.contains(mesh.face_ids[t]);
+  });
+}
+
 TriangleMesh FacesNear(const TriangleMesh& mesh, const Eigen::AlignedBox3f& box) {
   return Select(mesh, [&](std::size_t t) {
     Eigen::AlignedBox3f bounds(Corner(mesh, t, 0));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <set>
 
 #include "core/types.h"
 
@@ -21,6 +22,9 @@ double SurfaceArea(const TriangleMesh& mesh);
 
 // The faces labelled `id`, with the vertices they use. A mesh without labels gives an empty mesh.
 TriangleMesh FacesOf(const TriangleMesh& mesh, InstanceId id);
+
+// The faces labelled with none of `ids`, with the vertices they use.
+TriangleMesh FacesWithout(const TriangleMesh& mesh, const std::set<InstanceId>& ids);
 
 // The faces whose bounding boxes meet `box`, with the vertices they use and their labels. Leaving
 // out what is farther than a limit from the queried samples keeps an index small; a distance below

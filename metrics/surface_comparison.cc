@@ -57,19 +57,6 @@ std::string SizeText(const Eigen::AlignedBox3f& box) {
   return fmt::format("{:.4g} x {:.4g} x {:.4g} m", size.x(), size.y(), size.z());
 }
 
-Expected<void> CheckUnits(const Side& reconstruction, const Side& truth) {
-  const double ours = static_cast<double>(reconstruction.box.sizes().maxCoeff());
-  const double theirs = static_cast<double>(truth.box.sizes().maxCoeff());
-  if (!(ours > 0 && theirs > 0)) return {};
-  const double ratio = ours / theirs;
-  if (ratio < kMostSizeRatio && ratio > 1 / kMostSizeRatio) return {};
-  return DataError(
-      "{}: measures {}, but {} {}: is it in another unit? Give its scale (--scale "
-      "{:.3g} would fit, --scale 1 takes it as it is)",
-      reconstruction.name, SizeText(reconstruction.box), truth.name, SizeText(truth.box),
-      std::pow(10, -std::round(std::log10(ratio))));
-}
-
 // Distances from these points to the other surface.
 std::vector<double> DistancesTo(const Side& to, std::span<const Eigen::Vector3f> points,
                                 const SurfaceIndex* triangles, const PointIndex* others) {
@@ -171,6 +158,22 @@ Measured FacetsOf(const Side& side) {
 
 }  // namespace
 
+Expected<void> CheckUnits(const Eigen::AlignedBox3f& reconstruction,
+                          const std::string& reconstruction_name, const Eigen::AlignedBox3f& truth,
+                          const std::string& truth_name) {
+  if (reconstruction.isEmpty() || truth.isEmpty()) return {};
+  const double ours = static_cast<double>(reconstruction.sizes().maxCoeff());
+  const double theirs = static_cast<double>(truth.sizes().maxCoeff());
+  if (!(ours > 0 && theirs > 0)) return {};
+  const double ratio = ours / theirs;
+  if (ratio < kMostSizeRatio && ratio > 1 / kMostSizeRatio) return {};
+  return DataError(
+      "{}: measures {}, but {} {}: is it in another unit? Give its scale (--scale "
+      "{:.3g} would fit, --scale 1 takes it as it is)",
+      reconstruction_name, SizeText(reconstruction), truth_name, SizeText(truth),
+      std::pow(10, -std::round(std::log10(ratio))));
+}
+
 Expected<SurfaceComparison> CompareSurfaces(const TriangleMesh& reconstruction_mesh,
                                             const std::string& reconstruction_name,
                                             const TriangleMesh& truth_mesh,
@@ -179,7 +182,9 @@ Expected<SurfaceComparison> CompareSurfaces(const TriangleMesh& reconstruction_m
   TSDFPP_ASSIGN(const Side reconstruction,
                 MakeSide(reconstruction_mesh, reconstruction_name, config, 0));
   TSDFPP_ASSIGN(const Side truth, MakeSide(truth_mesh, truth_name, config, 1));
-  if (!scale_is_given) TSDFPP_RETURN_IF_ERROR(CheckUnits(reconstruction, truth));
+  if (!scale_is_given)
+    TSDFPP_RETURN_IF_ERROR(
+        CheckUnits(reconstruction.box, reconstruction_name, truth.box, truth_name));
 
   // No query is farther from a surface than across both boxes.
   const double farthest_m =

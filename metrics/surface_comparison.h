@@ -2,6 +2,7 @@
 // poses, nothing aligned. What `tsdfpp metric surface` prints.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,9 +71,14 @@ struct SurfaceComparison {
   std::vector<std::string> remarks;  // sentences on what looks wrong, though it has a value
 };
 
+// Errors: kData where the longest sides of two boxes, in metres, differ by a factor of 50 or more:
+// a unit was mistaken, and the sentence proposes a scale. No error where a box has no side.
+Expected<void> CheckUnits(const Eigen::AlignedBox3f& reconstruction,
+                          const std::string& reconstruction_name, const Eigen::AlignedBox3f& truth,
+                          const std::string& truth_name);
+
 // Errors: kData, one sentence: a surface is empty, has no area, has a position that is not finite;
-// or the longest sides of the two differ by a factor of 50 or more and `scale_is_given` is not set
-// (a unit was mistaken: the sentence proposes a scale). `reconstruction_name` and `truth_name` are
+// or CheckUnits fails and `scale_is_given` is not set. `reconstruction_name` and `truth_name` are
 // for sentences.
 Expected<SurfaceComparison> CompareSurfaces(const TriangleMesh& reconstruction,
                                             const std::string& reconstruction_name,

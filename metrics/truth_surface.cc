@@ -6,10 +6,16 @@
 
 namespace tsdfpp {
 
-TruthSurface::TruthSurface(TrueModel model)
+namespace {
+
+const TriangleMesh kNothing;
+
+}  // namespace
+
+TruthSurface::TruthSurface(TrueModel model, bool closed)
     : model_(std::move(model)),
       index_O_(model_.mesh_O),
-      solid_O_(model_.mesh_O),
+      solid_O_(closed ? model_.mesh_O : kNothing),
       bounds_O_(BoundsOf(model_.mesh_O)) {}
 
 NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,

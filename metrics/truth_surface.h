@@ -14,7 +14,8 @@ namespace tsdfpp {
 // One object's true surface. Neither copied nor moved, for its parts refer to each other.
 class TruthSurface {
  public:
-  explicit TruthSurface(TrueModel model);
+  // `closed`: the model bounds a solid; else nothing is inside it.
+  explicit TruthSurface(TrueModel model, bool closed = true);
   TruthSurface(const TruthSurface&) = delete;
   TruthSurface& operator=(const TruthSurface&) = delete;
 

@@ -4,4 +4,5 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 bash scripts/setup.sh
 bash scripts/build.sh --target tsdfpp_command
-build/release/tsdfpp compare scenes/toycar3.toml --out out/toycar3 --every 32
+build/release/tsdfpp compare scenes/toycar3.toml --out out/toycar3 --every 32 --record
+build/release/tsdfpp report out/toycar3

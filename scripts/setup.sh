@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what tsdfpp needs on a Debian 12: packages, and MuJoCo into .deps/. Idempotent; quick the second time.
+# Installs what tsdfpp needs on a Debian 12: packages, and MuJoCo and the page's libraries into .deps/. Idempotent; quick the second time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -23,6 +23,8 @@ fi
 mapfile -t wanted < <(grep -vE '^(#|$)' scripts/debian-packages.txt)
 missing=()
 for package in "${wanted[@]}"; do
+  # Node.js from elsewhere brings its own npm and does not get along with Debian's.
+  case "${package%%=*}" in nodejs) command -v node >/dev/null && continue ;; npm) command -v npm >/dev/null && continue ;; esac
   state=$(dpkg-query -W -f '${db:Status-Status}' "${package%%=*}" 2>/dev/null || true)
   [ "$state" = installed ] || missing+=("$package")
 done
@@ -52,4 +54,15 @@ elif [ ! -f ".deps/mujoco/lib/libmujoco.so.$mujoco_version" ]; then
   rm -rf .deps/mujoco
   mkdir -p .deps
   mv "$scratch/mujoco" .deps/mujoco
+fi
+
+# What the page of `tsdfpp report` is bundled with, at the versions of the lock file.
+if ! cmp -s viewer/package-lock.json .deps/viewer/package-lock.json; then
+  say "fetching the libraries of the report's page"
+  rm -rf .deps/viewer.part
+  mkdir -p .deps/viewer.part
+  cp viewer/package.json viewer/package-lock.json viewer/.npmrc .deps/viewer.part/
+  (cd .deps/viewer.part && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error >/dev/null)
+  rm -rf .deps/viewer
+  mv .deps/viewer.part .deps/viewer
 fi

@@ -25,7 +25,9 @@ TEST(CommandHelp, EverySubcommandHasHelp) {
   const CommandOutput top = RunTsdfpp({"--help"}, folder.path());
   EXPECT_EQ(top.exit_code, 0);
   EXPECT_EQ(top.err, "");
-  for (const char* command : {"doctor", "generate", "map", "compare", "metric"}) {
+  for (const char* command :
+       {"doctor", "generate", "verify", "export", "map", "compare", "evaluate", "report", "sweep",
+        "replay", "bench-set", "gate", "metric"}) {
     EXPECT_NE(top.out.find(command), std::string::npos) << command;
     const CommandOutput help = RunTsdfpp({command, "--help"}, folder.path());
     EXPECT_EQ(help.exit_code, 0) << command;

@@ -7,11 +7,11 @@
 #include <map>
 #include <string>
 
+#include "eval/adapters/open3d_peer.h"
 #include "mapper/map_representation.h"
 #include "metrics/preservation.h"
 #include "metrics/truth_surface.h"
 #include "metrics/visibility.h"
-#include "tests/eval/open3d_volume.h"
 #include "tests/eval/seen_surface.h"
 #include "tests/mapper/map_snapshot.h"
 
@@ -193,9 +193,10 @@ TEST(StaticControl, AllMapsAndOpen3dAgree) {
     candidates.emplace_back(std::string(MethodName(method)), MapOf(method, 0, *set)->SceneMesh(),
                             *set, margin_m);
   }
-  Open3dVolume open3d(config.voxel_m, config.front());
+  SetOpen3dThreads(1);
+  Open3dVolume open3d(config.voxel_m, config.front(), Open3dColour::kNone);
   for (const Frame& frame : set->frames) open3d.Integrate(frame);
-  candidates.emplace_back("Open3D", open3d.Mesh(), *set, margin_m);
+  candidates.emplace_back("Open3D", open3d.Triangles(), *set, margin_m);
 
   const TruthScore truth(*set, config.voxel_m);
   const std::vector<Part> parts = Parts(*set);

@@ -30,6 +30,21 @@ class ReferenceTest : public ::testing::TestWithParam<std::tuple<Method, double>
   SideBySide Begin(const MapConfig& config) const {
     return SideBySide(method(), config, ToyBox(), ToyIds());
   }
+  // Moves and turns of one voxel and half a voxel too, where the nearest neighbour is a tie.
+  void CompareMoves(Resampling resampling) const {
+    MapConfig changed = config();
+    changed.resampling = resampling;
+    Scene scene = TableWithToys();
+    SideBySide maps = Begin(changed);
+    maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+    scene.T_WO[kBrick].translation() += Eigen::Vector3d(kToyVoxel_m / 2, kToyVoxel_m, 0);
+    maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
+    scene.T_WO[kBall] = MakePose(0.7, {0.2, 0.1, 1}, {0.10, -0.06, kTableTop_m + 0.06});
+    maps.SetPosesAndFuse(RenderToys(scene, 0.8));
+    scene.T_WO[kBrick] = MakePose(0.9, Eigen::Vector3d::UnitZ(), {0.08, 0.09, kTableTop_m + 0.03});
+    maps.SetPosesAndFuse(RenderToys(scene, 1.2));
+    maps.CompareWholeBox();
+  }
 };
 
 INSTANTIATE_TEST_SUITE_P(Methods, ReferenceTest,
@@ -208,21 +223,9 @@ TEST_P(ReferenceTest, InvalidDepthAndNoLabel) {
   maps.CompareWholeBox();
 }
 
-// Moves and turns of one voxel and half a voxel too, where the nearest neighbour is a tie.
-TEST_P(ReferenceTest, ResamplingFromTheObservedNeighbours) {
-  MapConfig observed = config();
-  observed.resampling = Resampling::kObserved;
-  Scene scene = TableWithToys();
-  SideBySide maps = Begin(observed);
-  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
-  scene.T_WO[kBrick].translation() += Eigen::Vector3d(kToyVoxel_m / 2, kToyVoxel_m, 0);
-  maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
-  scene.T_WO[kBall] = MakePose(0.7, {0.2, 0.1, 1}, {0.10, -0.06, kTableTop_m + 0.06});
-  maps.SetPosesAndFuse(RenderToys(scene, 0.8));
-  scene.T_WO[kBrick] = MakePose(0.9, Eigen::Vector3d::UnitZ(), {0.08, 0.09, kTableTop_m + 0.03});
-  maps.SetPosesAndFuse(RenderToys(scene, 1.2));
-  maps.CompareWholeBox();
-}
+TEST_P(ReferenceTest, ResamplingFromTheObservedNeighbours) { CompareMoves(Resampling::kObserved); }
+
+TEST_P(ReferenceTest, ResamplingFromTheNearestNeighbour) { CompareMoves(Resampling::kNearest); }
 
 TEST_P(ReferenceTest, WithoutContradiction) {
   MapConfig trusting = config();

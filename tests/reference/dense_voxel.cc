@@ -107,7 +107,9 @@ std::optional<DenseVoxel> InterpolateVoxel(const Neighbourhood& place,
   const auto observed = std::count_if(corners.begin(), corners.end(),
                                       [](const DenseVoxel& voxel) { return voxel.observed(); });
   if (resampling == Resampling::kAll && observed < 8) return std::nullopt;
-  if (!corners[NearestCorner(place)].observed()) return std::nullopt;
+  const DenseVoxel& nearest = corners[NearestCorner(place)];
+  if (!nearest.observed()) return std::nullopt;
+  if (resampling == Resampling::kNearest) return nearest;
   const auto mean = [&](const auto& value_of) {
     std::array<float, 8> values{};
     for (int i = 0; i < 8; ++i) values[i] = value_of(corners[i]);

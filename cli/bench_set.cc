@@ -1,0 +1,107 @@
+#include "eval/bench_set.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "cli/command.h"
+#include "cli/sweep_progress.h"
+#include "core/files.h"
+
+namespace tsdfpp {
+namespace {
+
+struct Options {
+  std::string name;
+  std::string sets = "eval/bench-sets";
+  std::string run;
+  std::string out;
+  std::string commit = "unknown";
+  std::string leaderboard;
+  int jobs = 0;
+};
+
+Expected<CommandResult> Describe(const BenchSet& set) {
+  CommandResult result{{{"bench_set", set.name},
+                        {"bench_hash", set.hash},
+                        {"scale", set.scale},
+                        {"voxel_m", set.voxel_m},
+                        {"trunc_front", set.trunc_front},
+                        {"trunc_back", set.trunc_back},
+                        {"metrics", set.metrics},
+                        {"sequences", nlohmann::json::array()}},
+                       ""};
+  for (const BenchSequence& frozen : set.sequences) {
+    TSDFPP_ASSIGN(const BenchSequence now, HashSequence(set, frozen));
+    const bool same = now.scene_hash == frozen.scene_hash && now.truth_hash == frozen.truth_hash;
+    result.json["sequences"].push_back({{"name", now.name},
+                                        {"scene", now.scene},
+                                        {"scene_hash", now.scene_hash},
+                                        {"truth_hash", now.truth_hash},
+                                        {"as_frozen", same}});
+    result.text += fmt::format("{:<12} scene {} truth {} {}\n", now.name, now.scene_hash,
+                               now.truth_hash, same ? "as frozen" : "NOT as frozen");
+  }
+  return result;
+}
+
+Expected<CommandResult> RunMethods(const BenchSet& set, const Options& options) {
+  if (options.out.empty()) return UsageError("--out is required with --run");
+  TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
+  TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
+  SweepOptions sweep;
+  sweep.out = std::filesystem::path(options.out) / "work";
+  sweep.jobs = JobsOrCores(options.jobs);
+  TSDFPP_ASSIGN(const SweepResult made,
+                WithSweepBar("bench-set", sweep, [&] { return RunSweep(config, sweep); }));
+  CommandResult result{nlohmann::json::array(), ""};
+  for (const AxisValue& method : config.grids.front().values.at("method")) {
+    const std::string name = AxisText(method);
+    std::string stem = name;
+    std::replace(stem.begin(), stem.end(), '/', '-');
+    const std::filesystem::path file =
+        std::filesystem::path(options.out) / fmt::format("{}.json", stem);
+    nlohmann::json json = BenchResultJson(set, made, name, options.commit);
+    TSDFPP_RETURN_IF_ERROR(WriteFile(file, json.dump(1) + "\n"));
+    result.json.push_back(std::move(json));
+    result.text += fmt::format("{}\n", file.string());
+  }
+  return result;
+}
+
+Expected<CommandResult> RunBenchSet(const Options& options) {
+  TSDFPP_ASSIGN(const BenchSet set, BenchSet::Load(options.sets, options.name));
+  if (!options.run.empty()) return RunMethods(set, options);
+  if (!options.leaderboard.empty()) {
+    TSDFPP_ASSIGN(const std::string page, Leaderboard(set, options.leaderboard));
+    if (options.out.empty()) return CommandResult{{{"page", page}}, page};
+    TSDFPP_RETURN_IF_ERROR(WriteFile(options.out, page));
+    return CommandResult{{{"page", options.out}}, fmt::format("{}\n", options.out)};
+  }
+  return Describe(set);
+}
+
+}  // namespace
+
+Run AddBenchSet(CLI::App& app, const CommonOptions&) {
+  auto options = std::make_shared<Options>();
+  app.add_option("NAME", options->name, "A benchmark, e.g. v1")->required();
+  app.add_option("--sets", options->sets, "Folder of the benchmarks")->capture_default_str();
+  CLI::Option* run =
+      app.add_option("--run", options->run, "Run these methods of ours on it, by commas")
+          ->check(NotEmpty("names of methods"));
+  app.add_option("--commit", options->commit, "The methods' commit, noted in the results")
+      ->capture_default_str();
+  app.add_option("--jobs", options->jobs, "Processes; one a core by default")
+      ->check(WholeBetween(1, 256));
+  app.add_option("--leaderboard", options->leaderboard,
+                 "Print the page of all results (*.json) in this folder")
+      ->check(NotEmpty("a folder"))
+      ->excludes(run);
+  app.add_option("--out", options->out,
+                 "With --run the folder of the results, with --leaderboard the page's file")
+      ->check(NotEmpty("a folder or a file"));
+  return [options] { return RunBenchSet(*options); };
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,74 @@
+#include "cli/report.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "core/files.h"
+#include "eval/report_page.h"
+#include "eval/report_video.h"
+
+namespace tsdfpp {
+namespace {
+
+struct Options {
+  std::string run;
+  std::string compare;
+  std::string out;
+  bool video = false;
+};
+
+Expected<CommandResult> RunVideo(const Options& options) {
+  const std::filesystem::path out = options.out.empty()
+                                        ? std::filesystem::path(options.run) / "report.mp4"
+                                        : std::filesystem::path(options.out);
+  if (!options.compare.empty()) {
+    return UsageError("--compare is for the page, expected it without --video");
+  }
+  TSDFPP_ASSIGN(const ReportVideo video, WriteReportVideo(options.run, out));
+  return CommandResult{{{"video", out.string()},
+                        {"frames", video.frames},
+                        {"width", video.width},
+                        {"height", video.height},
+                        {"seconds", video.seconds}},
+                       fmt::format("video: {} ({:.0f} s, {} x {})\n", out.string(), video.seconds,
+                                   video.width, video.height)};
+}
+
+Expected<CommandResult> RunReport(const Options& options) {
+  if (options.video) return RunVideo(options);
+  std::vector<std::filesystem::path> folders{options.run};
+  std::string command = "tsdfpp report " + options.run;
+  if (!options.compare.empty()) {
+    folders.emplace_back(options.compare);
+    command += " --compare " + options.compare;
+  }
+  const std::filesystem::path out = options.out.empty()
+                                        ? std::filesystem::path(options.run) / "report.html"
+                                        : std::filesystem::path(options.out);
+  if (!options.out.empty()) command += " --out " + options.out;
+  TSDFPP_ASSIGN(const ReportPage page, MakeReportPage(folders, command));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out, page.html));
+  for (const std::string& remark : page.remarks) spdlog::warn("{}", remark);
+  return CommandResult{
+      {{"report", out.string()}, {"bytes", page.html.size()}, {"remarks", page.remarks}},
+      fmt::format("report: {} ({:.1f} MB)\n", out.string(),
+                  static_cast<double>(page.html.size()) / 1e6)};
+}
+
+}  // namespace
+
+Run AddReport(CLI::App& app, const CommonOptions&) {
+  auto options = std::make_shared<Options>();
+  app.add_option("RUN", options->run, "Folder that tsdfpp compare wrote")
+      ->check(NotEmpty("a folder"))
+      ->required();
+  app.add_option("--compare", options->compare, "A second such folder, to set against the first")
+      ->check(NotEmpty("a folder"));
+  app.add_option("--out", options->out, "The file; RUN/report.html or RUN/report.mp4 by default")
+      ->check(NotEmpty("a file"));
+  app.add_flag("--video", options->video,
+               "A film (MP4, H.264) in place of the page: camera, masks, the maps, the removal");
+  return [options] { return RunReport(*options); };
+}
+
+}  // namespace tsdfpp

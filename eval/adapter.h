@@ -1,0 +1,91 @@
+// Somebody else's mapper in a comparison: what to run, and how to read what it wrote
+// (docs/adapters.md).
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/frame_source.h"
+#include "eval/child_process.h"
+#include "eval/evaluate_meshes.h"
+#include "sequence/sequence_options.h"
+
+namespace tsdfpp {
+
+struct AdapterConfig {
+  std::string name;                                 // of the method
+  std::vector<std::string> command;                 // with words in braces, see docs/adapters.md
+  DatasetFormat layout = DatasetFormat::kCofusion;  // of the sequence; or tum, klg, 7scenes
+  double time_limit_s = 600;
+  double memory_limit_mb = 4000;
+  double scale = 1;  // metres a unit of the meshes
+  MatchMode match = MatchMode::kNames;
+  std::filesystem::path folder;  // where its file is: {adapter}
+
+  // Errors: kUsage, naming the key.
+  Expected<void> Validate() const;
+  std::string ToToml() const;
+};
+
+// Errors: kUsage, naming file and key: no such file, not TOML, a key that is unknown, missing or
+// wrong.
+Expected<AdapterConfig> ReadAdapter(const std::filesystem::path& toml);
+
+// "adapters/<name>.toml" beside the running program, the adapters that come with the project.
+// Errors: kUsage, naming those there are.
+Expected<AdapterConfig> FindAdapter(const std::string& name);
+std::vector<std::string> AdapterNames();
+
+// What a mapper may know of an experiment.
+struct AdapterTask {
+  std::filesystem::path sequence;
+  int first_frame = 0;
+  int last_frame = 0;
+  std::vector<int> frames;       // after which meshes are wanted
+  std::set<InstanceId> removed;  // objects to remove from the map
+  double voxel_m = 0.01;
+  double truncation_m = 0.1;
+};
+
+// The command with the words in braces replaced. Errors: kUsage where a word is unknown.
+Expected<std::vector<std::string>> CommandOf(const AdapterConfig& config, const AdapterTask& task,
+                                             const std::filesystem::path& out);
+
+// One adapter in a comparison.
+struct AdapterRun {
+  explicit AdapterRun(AdapterConfig adapter) : config(std::move(adapter)) {}
+
+  AdapterConfig config;
+  std::filesystem::path folder;  // what it wrote: meshes/, trajectories/, timing.json; log.txt
+  ChildOutcome outcome;
+  std::optional<Error> failure;  // the outcome's, or what is wrong with its files
+  nlohmann::json timing;         // its own words; null where it wrote none
+  LastSeenStores last_seen;
+  std::vector<Evaluation> evaluations;
+  std::vector<std::vector<PartMatch>> matches;  // an evaluation
+  std::vector<std::string> remarks;
+  std::optional<TrajectoryEvaluation> trajectories;
+};
+
+// Runs it into `out`, which is made anew. A failure of the adapter is the run's, not an error.
+// Errors: kUsage of CommandOf; kEnvironment where `out` cannot be made.
+Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task,
+                          const std::filesystem::path& out);
+
+// Scores its meshes at the truth's current frame, unless it failed before; what is wrong with them
+// becomes the run's failure.
+void EvaluateAdapter(AdapterRun& run, const SceneTruth& truth, const std::vector<ObjectInfo>& names,
+                     const AdapterTask& task);
+
+// Writes the frames up to `last` as an adapter gets them: what the sensor gave, without the true
+// surfaces. Errors: those of the source and of writing.
+Expected<void> WriteForAdapters(FrameSource& source, DatasetFormat layout, int last,
+                                const std::filesystem::path& out);
+
+nlohmann::json ToJson(const AdapterRun& run);
+
+}  // namespace tsdfpp

@@ -1,0 +1,129 @@
+#include "eval/cell.h"
+
+#include "core/files.h"
+#include "core/pose_text.h"
+#include "sequence/sequence_json.h"
+
+namespace tsdfpp {
+namespace {
+
+template <typename T>
+void Append(std::string& bytes, const std::vector<T>& values) {
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
+void Append(std::string& bytes, const cv::Mat& image) {
+  for (int v = 0; v < image.rows; ++v) {
+    bytes.append(image.ptr<char>(v), static_cast<std::size_t>(image.cols) * image.elemSize());
+  }
+}
+
+// The values by the metrics' names.
+nlohmann::json Named(const std::vector<Measured>& values) {
+  nlohmann::json json;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    json[SweepMetrics()[i].name] = ToJson(values[i]);
+  }
+  return json;
+}
+
+std::vector<Measured> FromNamed(const nlohmann::json& json, std::size_t count) {
+  std::vector<Measured> values;
+  for (std::size_t i = 0; i < count; ++i) {
+    const nlohmann::json& value = json.at(SweepMetrics()[i].name);
+    values.push_back(value.is_number() ? Measured::Of(value.get<double>())
+                                       : Measured::Undefined(value.at("why")));
+  }
+  return values;
+}
+
+}  // namespace
+
+Cell MakeCell(const CellSettings& settings, const SequenceVariant& variant,
+              const std::string& program, const std::string& renderer) {
+  const std::string frames =
+      fmt::format("program {}\nrenderer {}\n{}", program, renderer, variant.Key());
+  std::string key =
+      fmt::format("tsdfpp cell {}\nmap {}\n{}", kCellSchema, MapKey(settings), frames);
+  std::string id = HashText(key);
+  return {settings, std::move(key), std::move(id), HashText(frames)};
+}
+
+std::string ImageDigest(const Frame& frame) {
+  std::string bytes;
+  Append(bytes, frame.depth);
+  Append(bytes, frame.mask);
+  Append(bytes, frame.colour);
+  bytes += PoseToText(frame.T_WC);
+  for (const auto& [id, T_WO] : frame.T_WO) bytes += fmt::format("{} {}", id, PoseToText(T_WO));
+  return HashText(bytes);
+}
+
+std::string MeshDigest(const TriangleMesh& mesh) {
+  std::string bytes;
+  Append(bytes, mesh.vertices);
+  Append(bytes, mesh.triangles);
+  Append(bytes, mesh.colours);
+  Append(bytes, mesh.face_ids);
+  return HashText(bytes);
+}
+
+nlohmann::json CellToJson(const Cell& cell, const CellResult& result) {
+  nlohmann::json frames = nlohmann::json::array();
+  for (const CellFrame& frame : result.frames) {
+    frames.push_back({{"frame", frame.frame},
+                      {"examined", frame.examined},
+                      {"scores", Named(frame.values)},
+                      {"map_digest", frame.map_digest}});
+  }
+  nlohmann::json images = nlohmann::json::object();
+  for (const auto& [frame, digest] : result.image_digests) images[std::to_string(frame)] = digest;
+  return {{"schema", kCellSchema},
+          {"id", cell.id},
+          {"sequence", cell.sequence},
+          {"key", cell.key},
+          {"settings", SettingsJson(cell.settings)},
+          {"examined", Named(result.examined)},
+          {"removed", result.removed},
+          {"frames", frames},
+          {"evaluation", result.evaluation},
+          {"times", result.times},
+          {"images", images}};
+}
+
+Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  if (json.is_discarded() || !json.is_object()) return DataError("cell {}: not JSON", cell.id);
+  try {
+    if (json.at("schema") != kCellSchema || json.at("key") != cell.key) {
+      return DataError("cell {}: is of another program or of other settings", cell.id);
+    }
+    CellResult result;
+    for (const nlohmann::json& entry : json.at("frames")) {
+      result.frames.push_back({entry.at("frame"), entry.at("examined"),
+                               FromNamed(entry.at("scores"), EvaluationMetricCount()),
+                               entry.at("map_digest")});
+    }
+    result.examined = FromNamed(json.at("examined"), SweepMetrics().size());
+    result.evaluation = json.at("evaluation");
+    result.removed = json.at("removed").get<std::vector<InstanceId>>();
+    result.times = json.at("times");
+    for (const auto& [frame, digest] : json.at("images").items()) {
+      result.image_digests[std::stoi(frame)] = digest;
+    }
+    return result;
+  } catch (const std::exception& error) {
+    return DataError("cell {}: a field is missing or wrong ({})", cell.id, error.what());
+  }
+}
+
+Expected<CellResult> CellStore::Read(const Cell& cell) const {
+  TSDFPP_ASSIGN(const std::string text, ReadFile(PathOf(cell.id)));
+  return CellFromJson(text, cell);
+}
+
+Expected<void> CellStore::Write(const Cell& cell, const CellResult& result) const {
+  return WriteFile(PathOf(cell.id), CellToJson(cell, result).dump(1) + "\n");
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,36 @@
+// What gates leave behind: a table, JSON, JUnit XML, and Markdown for a pull request
+// (docs/gates.md).
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "eval/gate_run.h"
+
+namespace tsdfpp {
+
+inline constexpr int kGatesSchema = 1;
+
+// A line a control, gate and sabotage, and what it comes to; `colour` marks verdicts for a
+// terminal.
+std::string GateTable(const GateRun& run, bool colour);
+
+nlohmann::json GateJson(const GateRun& run);
+
+// A suite of test cases, one a control, gate and sabotage: an inconclusive or invalid gate is an
+// error, a failed one a failure.
+std::string GateJUnit(const GateRun& run);
+
+// A table of the gates with the change against the reference. `explanations` are lines of Markdown
+// by gate, put below.
+std::string GateMarkdown(const GateRun& run,
+                         const std::map<std::string, std::string>& explanations);
+
+// gates.json, gates.junit.xml and gates.md below `out`. Errors: kEnvironment.
+Expected<void> WriteGateReports(const GateRun& run,
+                                const std::map<std::string, std::string>& explanations,
+                                const std::filesystem::path& out);
+
+}  // namespace tsdfpp

@@ -1,0 +1,62 @@
+#include "eval/record_images.h"
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "eval/pictures.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr int kWebpQuality = 82;
+constexpr int kWebpLossless = 101;  // what OpenCV takes above 100
+
+}  // namespace
+
+cv::Mat Smaller(const cv::Mat& image, double width, int interpolation) {
+  cv::Mat small;
+  const double scale = std::min(1.0, width / image.cols);
+  cv::resize(image, small, {}, scale, scale, interpolation);
+  return small;
+}
+
+cv::Mat DrawDepth(const cv::Mat& depth, float nearest_m, float farthest_m) {
+  cv::Mat grey;
+  depth.convertTo(grey, CV_8U, -255.0 / (farthest_m - nearest_m),
+                  255.0 * farthest_m / (farthest_m - nearest_m));
+  cv::Mat bgr;
+  cv::applyColorMap(grey, bgr, cv::COLORMAP_TURBO);
+  cv::Mat rgb;
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      if (!IsValidDepth(depth.at<float>(v, u))) rgb.at<cv::Vec3b>(v, u) = {0, 0, 0};
+    }
+  }
+  return rgb;
+}
+
+cv::Mat DrawMask(const cv::Mat& mask) {
+  cv::Mat rgb(mask.size(), CV_8UC3);
+  for (int v = 0; v < mask.rows; ++v) {
+    for (int u = 0; u < mask.cols; ++u) {
+      const InstanceId id = mask.at<InstanceId>(v, u);
+      const Colour colour = id == kNoInstance ? Colour{0, 0, 0} : ObjectColour(id);
+      rgb.at<cv::Vec3b>(v, u) = {colour[0], colour[1], colour[2]};
+    }
+  }
+  return rgb;
+}
+
+std::string WebpBytes(const cv::Mat& rgb, bool lossless) {
+  cv::Mat bgr;
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".webp", bgr, bytes,
+               {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality});
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace tsdfpp

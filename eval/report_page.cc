@@ -1,0 +1,210 @@
+#include "eval/report_page.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/files.h"
+#include "eval/base64.h"
+#include "eval/recording.h"
+#include "sequence/sequence_json.h"
+#include "viewer/report_template.h"
+
+namespace tsdfpp {
+namespace {
+
+using nlohmann::json;
+
+struct Comparison {
+  std::filesystem::path folder;
+  json summary;
+  std::string csv;
+  std::optional<Recording> recording;
+  json pictures = json::array();
+  json files = json::array();
+};
+
+// A name for people: the folder's own, even where it is given as "." or with a slash at its end.
+std::string NameOf(const std::filesystem::path& folder) {
+  std::filesystem::path whole = std::filesystem::absolute(folder).lexically_normal();
+  if (whole.filename().empty()) whole = whole.parent_path();
+  return whole.filename().string();
+}
+
+Expected<json> ReadJson(const std::filesystem::path& path) {
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  json parsed = json::parse(text, nullptr, false);
+  if (!parsed.is_object()) return DataError("{} is no JSON object", path.string());
+  return parsed;
+}
+
+// What the page reads of a summary without asking whether it is there.
+Expected<void> CheckSummary(const json& summary, const std::filesystem::path& path) {
+  if (summary.value("schema", json()) != 1) {
+    return DataError("{}: schema is {}, expected 1", path.string(),
+                     summary.value("schema", json()).dump());
+  }
+  for (const char* name : {"sequence", "command", "version", "generator"}) {
+    if (!summary.contains(name) || !summary[name].is_string()) {
+      return DataError("{}: '{}' is missing or no text", path.string(), name);
+    }
+  }
+  for (const char* name : {"first_frame", "last_frame", "every", "cores", "read_s", "total_s"}) {
+    if (!summary.contains(name) || !summary[name].is_number()) {
+      return DataError("{}: '{}' is missing or no number", path.string(), name);
+    }
+  }
+  if (!summary.contains("runs") || !summary["runs"].is_array() || summary["runs"].empty()) {
+    return DataError("{}: 'runs' is missing or names no map", path.string());
+  }
+  for (const json& run : summary["runs"]) {
+    for (const char* name : {"title", "folder", "method", "profile", "poses"}) {
+      if (!run.is_object() || !run.contains(name) || !run[name].is_string()) {
+        return DataError("{}: a map's '{}' is missing or no text", path.string(), name);
+      }
+    }
+  }
+  return {};
+}
+
+Expected<void> AddPictures(Comparison& comparison) {
+  std::set<std::string> names;
+  std::error_code failure;
+  for (const auto& entry : std::filesystem::directory_iterator(comparison.folder, failure)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.ends_with(".png")) continue;
+    // With a recording the page makes the figure itself, sharper and for each frame.
+    if (name.starts_with("table-") || (name.starts_with("figure-") && !comparison.recording)) {
+      names.insert(name);
+    }
+  }
+  for (const std::string& name : names) {
+    TSDFPP_ASSIGN(const std::string bytes, ReadFile(comparison.folder / name));
+    comparison.pictures.push_back(
+        {{"file", name},
+         {"caption", name.starts_with("table-")
+                         ? "Hidden and kept (blue), hidden and missing (red), visible (light), "
+                           "visible and missing (orange), never seen (grey)"
+                         : "Reconstructions over time and after the removal"},
+         {"data", "data:image/png;base64," + Base64(bytes)}});
+  }
+  return {};
+}
+
+Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
+  Comparison comparison;
+  comparison.folder = folder;
+  const std::filesystem::path path = folder / "summary.json";
+  if (!std::filesystem::exists(path)) {
+    return DataError("'{}' has no summary.json, expected a folder that tsdfpp compare wrote",
+                     folder.string());
+  }
+  TSDFPP_ASSIGN(comparison.summary, ReadJson(path));
+  TSDFPP_RETURN_IF_ERROR(CheckSummary(comparison.summary, path));
+  TSDFPP_ASSIGN(comparison.csv, ReadFile(folder / "frames.csv"));
+  if (!comparison.csv.starts_with("frame,method,profile,poses,")) {
+    return DataError("{} does not begin with the columns frame,method,profile,poses",
+                     (folder / "frames.csv").string());
+  }
+  TSDFPP_ASSIGN(comparison.recording, ReadRecording(folder));
+  TSDFPP_RETURN_IF_ERROR(AddPictures(comparison));
+  for (const char* name : {"summary.json", "frames.csv", "record/record.bin"}) {
+    const std::filesystem::path file = folder / name;
+    if (!std::filesystem::exists(file)) continue;
+    TSDFPP_ASSIGN(const std::string bytes, ReadFile(file));
+    comparison.files.push_back(
+        {{"name", name}, {"bytes", bytes.size()}, {"hash", HashText(bytes)}});
+  }
+  // The evaluations are in the CSV as far as the page shows them.
+  for (json& run : comparison.summary["runs"]) run.erase("evaluations");
+  return comparison;
+}
+
+// JSON that can stand inside <script>: no '<' can end it or begin a comment. Bytes that are no
+// UTF-8 become U+FFFD.
+std::string ScriptText(const json& value) {
+  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  std::string safe;
+  safe.reserve(text.size());
+  for (const char c : text) {
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
+  }
+  return safe;
+}
+
+std::string DataText(const std::vector<Comparison>& comparisons, const std::string& command) {
+  json reports = json::array();
+  std::string blocks;
+  for (std::size_t i = 0; i < comparisons.size(); ++i) {
+    const Comparison& comparison = comparisons[i];
+    json report{{"name", NameOf(comparison.folder)}, {"summary", comparison.summary},
+                {"frames_csv", comparison.csv},      {"pictures", comparison.pictures},
+                {"files", comparison.files},         {"record", nullptr}};
+    if (comparison.recording) {
+      report["record"] = comparison.recording->json;
+      blocks += fmt::format("<script type=\"text/plain\" id=\"report-bytes-{}\">{}</script>\n", i,
+                            Base64(comparison.recording->bytes));
+    }
+    reports.push_back(std::move(report));
+  }
+  const json data{{"schema", 1},
+                  {"version", TSDFPP_VERSION},
+                  {"command", command},
+                  {"reports", std::move(reports)}};
+  return "<script type=\"application/json\" id=\"report-data\">" + ScriptText(data) +
+         "</script>\n" + blocks;
+}
+
+}  // namespace
+
+Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& folders,
+                                    const std::string& command, std::size_t largest_bytes) {
+  const std::string_view page = ReportTemplate();
+  const std::size_t mark = page.find(kReportDataMark);
+  if (mark == std::string_view::npos) {
+    return EnvironmentError(
+        "this build has no report page, which needs Node.js: run scripts/setup.sh and build again");
+  }
+  std::vector<Comparison> comparisons;
+  for (const std::filesystem::path& folder : folders) {
+    TSDFPP_ASSIGN(Comparison comparison, ReadComparison(folder));
+    comparisons.push_back(std::move(comparison));
+  }
+  ReportPage made;
+  while (true) {
+    const std::string data = DataText(comparisons, command);
+    if (page.size() + data.size() <= largest_bytes) {
+      made.html = std::string(page.substr(0, mark)) + data +
+                  std::string(page.substr(mark + kReportDataMark.size()));
+      break;
+    }
+    // The longest recording gives up a key frame.
+    const auto longest =
+        std::max_element(comparisons.begin(), comparisons.end(), [](const auto& a, const auto& b) {
+          return (a.recording ? a.recording->KeyFrames().size() : 0) <
+                 (b.recording ? b.recording->KeyFrames().size() : 0);
+        });
+    if (!longest->recording || longest->recording->KeyFrames().size() <= 1) {
+      return DataError("the report would have {} bytes, expected at most {}",
+                       page.size() + data.size(), largest_bytes);
+    }
+    const nlohmann::json& examined = longest->summary["reveal_frame"];
+    const int frame = longest->recording->LeastKeyFrame(
+        examined.is_number_integer() ? std::optional(examined.get<int>()) : std::nullopt);
+    // The maps stand side by side at one frame, so it goes everywhere.
+    for (Comparison& comparison : comparisons) {
+      if (comparison.recording && comparison.recording->KeyFrames().size() > 1) {
+        comparison.recording->DropKeyFrame(frame);
+      }
+    }
+    made.remarks.push_back(fmt::format("key frame {} is left out to stay below {} MB", frame,
+                                       largest_bytes / 1'000'000));
+  }
+  return made;
+}
+
+}  // namespace tsdfpp

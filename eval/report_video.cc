@@ -1,0 +1,221 @@
+#include "eval/report_video.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "core/files.h"
+#include "eval/recording.h"
+#include "eval/report_record.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr int kRate_hz = 30;
+constexpr int kCellWidth = 416;
+constexpr int kGap = 8;
+constexpr int kTitle = 26;
+constexpr int kColumns = 3;
+constexpr int kFade = 8;                 // output frames from one still to the next, at most
+constexpr double kBody_s = 12;           // the growing maps, at least this long
+constexpr int kMostHold = 45;            // output frames a still
+constexpr int kReveal = 45;              // output frames of the removal
+constexpr int kLast = 90;                // and of what it leaves
+const cv::Scalar kPaper(248, 250, 251);  // blue, green, red, as all images here
+const cv::Scalar kInk(31, 29, 29);
+
+struct Panel {
+  std::string title;
+  std::string still;  // StillName's first part
+};
+
+void Write(cv::Mat& image, const std::string& text, cv::Point at, double size, int thickness = 1) {
+  cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, size, kInk, thickness, cv::LINE_AA);
+}
+
+// A file that goes away unless it was renamed.
+struct Temporary {
+  std::filesystem::path path;
+  ~Temporary() {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+  }
+};
+
+class Film {
+ public:
+  Film(std::vector<Panel> panels, cv::Size cell) : panels_(std::move(panels)), cell_(cell) {
+    const int rows = (static_cast<int>(panels_.size()) + kColumns - 1) / kColumns;
+    // H.264 takes even sizes.
+    size_ = {kGap + kColumns * (cell_.width + kGap), kGap + rows * (kTitle + cell_.height + kGap)};
+    size_.width += size_.width % 2;
+    size_.height += size_.height % 2;
+  }
+
+  cv::Size size() const { return size_; }
+
+  // An image a panel; an empty one leaves its place free.
+  cv::Mat Compose(const std::vector<cv::Mat>& images) const {
+    cv::Mat page(size_, CV_8UC3, kPaper);
+    for (std::size_t i = 0; i < panels_.size(); ++i) {
+      const cv::Point corner = CornerOf(i);
+      Write(page, panels_[i].title, corner + cv::Point(0, kTitle - 9), 0.5, 1);
+      if (images[i].empty()) continue;
+      cv::Mat small;
+      cv::resize(images[i], small, cell_, 0, 0, cv::INTER_AREA);
+      small.copyTo(page(cv::Rect(corner + cv::Point(0, kTitle), cell_)));
+    }
+    return page;
+  }
+
+  // Lines of text in the free place after the panels of the camera.
+  void Say(cv::Mat& page, std::size_t place, const std::vector<std::string>& lines) const {
+    cv::Point at = CornerOf(place) + cv::Point(12, kTitle + 34);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      Write(page, lines[i], at, i == 0 ? 0.8 : 0.55, i == 0 ? 2 : 1);
+      at.y += i == 0 ? 38 : 26;
+    }
+  }
+
+ private:
+  cv::Point CornerOf(std::size_t i) const {
+    const int column = static_cast<int>(i) % kColumns;
+    const int row = static_cast<int>(i) / kColumns;
+    return {kGap + column * (cell_.width + kGap), kGap + row * (kTitle + cell_.height + kGap)};
+  }
+
+  std::vector<Panel> panels_;
+  cv::Size cell_;
+  cv::Size size_;
+};
+
+Expected<cv::Mat> ReadStill(const std::filesystem::path& path) {
+  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
+  const std::vector<std::uint8_t> encoded(bytes.begin(), bytes.end());
+  cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
+  if (image.empty()) return DataError("{} is no image", path.string());
+  return image;
+}
+
+cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
+  cv::Mat mixed;
+  cv::addWeighted(from, 1 - share, to, share, 0, mixed);
+  return mixed;
+}
+
+// The maps after the removal, as the recording's last key frame that has them shows them.
+Expected<std::vector<cv::Mat>> AfterRemoval(const Recording& recording,
+                                            const std::vector<cv::Mat>& last) {
+  std::vector<cv::Mat> images = last;
+  const nlohmann::json& runs = recording.json["runs"];
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const nlohmann::json& keys = runs[r]["key_frames"];
+    if (keys.empty() || !keys.back().contains("picture_after")) continue;
+    const nlohmann::json& place = keys.back()["picture_after"];
+    const auto start = recording.bytes.begin() + place[0].get<std::ptrdiff_t>();
+    const std::vector<std::uint8_t> encoded(start, start + place[1].get<std::ptrdiff_t>());
+    cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
+    if (image.empty()) return DataError("a picture after the removal is no image");
+    images[kColumns + r] = image;
+  }
+  return images;
+}
+
+std::string TitleOf(const nlohmann::json& run) {
+  std::string title = run["folder"].get<std::string>();
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
+
+}  // namespace
+
+Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
+                                       const std::filesystem::path& file) {
+  TSDFPP_ASSIGN(const std::optional<Recording> recording, ReadRecording(run));
+  if (!recording || !recording->json.contains("stills") || !recording->json["stills"].is_array() ||
+      recording->json["stills"].empty()) {
+    return DataError("'{}' has no recording to film, expected what tsdfpp compare --record writes",
+                     run.string());
+  }
+  std::vector<int> stills;
+  for (const nlohmann::json& still : recording->json["stills"]) {
+    if (!still.is_number_integer()) {
+      return DataError("'{}': a still is {}, expected a frame's number", run.string(),
+                       still.dump());
+    }
+    stills.push_back(still.get<int>());
+  }
+  std::vector<Panel> panels{{"camera", "colour"}, {"objects", "mask"}, {"", ""}};
+  for (const nlohmann::json& each : recording->json["runs"]) {
+    panels.push_back({TitleOf(each), each["folder"].get<std::string>()});
+  }
+  const auto read = [&](int frame) -> Expected<std::vector<cv::Mat>> {
+    std::vector<cv::Mat> images;
+    for (const Panel& panel : panels) {
+      images.emplace_back();
+      if (panel.still.empty()) continue;
+      TSDFPP_ASSIGN(images.back(),
+                    ReadStill(run / "record" / "stills" / StillName(panel.still, frame)));
+    }
+    return images;
+  };
+  TSDFPP_ASSIGN(std::vector<cv::Mat> images, read(stills.front()));
+  const Film film(panels, {kCellWidth, kCellWidth * images[0].rows / images[0].cols});
+
+  // OpenCV names the format by the file's end, so the temporary file has it as well.
+  std::error_code failure;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failure);
+  const Temporary part{file.parent_path() /
+                       fmt::format(".{}.{}.mp4", file.filename().string(), getpid())};
+  cv::VideoWriter writer(part.path.string(), cv::CAP_FFMPEG,
+                         cv::VideoWriter::fourcc('a', 'v', 'c', '1'), kRate_hz, film.size());
+  if (!writer.isOpened()) {
+    return EnvironmentError(
+        "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",
+        file.string());
+  }
+  ReportVideo video{0, film.size().width, film.size().height, 0};
+  const auto show = [&](const cv::Mat& page) {
+    writer.write(page);
+    ++video.frames;
+  };
+  const std::string sequence = recording->json.value("sequence", "");
+  const int hold = std::clamp(
+      static_cast<int>(kBody_s * kRate_hz / static_cast<double>(stills.size())), 2, kMostHold);
+  const int fade = std::min(kFade, hold / 2);
+  cv::Mat before;
+  for (const int frame : stills) {
+    TSDFPP_ASSIGN(images, read(frame));
+    cv::Mat page = film.Compose(images);
+    film.Say(page, 2, {sequence, fmt::format("frame {}", frame)});
+    for (int i = 0; i < hold; ++i) {
+      show(!before.empty() && i < fade ? Between(before, page, (i + 1.0) / fade) : page);
+    }
+    before = page;
+  }
+  std::string removed;
+  for (const nlohmann::json& object : recording->json["objects"]) {
+    if (!object.value("removed", false)) continue;
+    removed += (removed.empty() ? "" : ", ") + object.value("name", "");
+  }
+  if (!removed.empty()) {
+    TSDFPP_ASSIGN(const std::vector<cv::Mat> after, AfterRemoval(*recording, images));
+    cv::Mat page = film.Compose(after);
+    film.Say(page, 2,
+             {sequence, fmt::format("frame {}", stills.back()), "taken out of the maps:", removed});
+    for (int i = 0; i < kReveal; ++i) show(Between(before, page, (i + 1.0) / kReveal));
+    for (int i = 0; i < kLast; ++i) show(page);
+  }
+  writer.release();
+  std::filesystem::rename(part.path, file, failure);
+  if (failure) {
+    return EnvironmentError("cannot write '{}': {}", file.string(), failure.message());
+  }
+  video.seconds = static_cast<double>(video.frames) / kRate_hz;
+  return video;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,172 @@
+// `tsdfpp gate` as its users call it, on a few small frames.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/files.h"
+#include "tests/cli/run_command.h"
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+using test::RunTsdfpp;
+
+constexpr const char* kExperiment = R"(name = "tiny"
+question = "Does the command work?"
+metrics = ["visible_completion"]
+replicates = ["seed"]
+[frames]
+scale = 0.25
+stride = 8
+[[grid]]
+scene = "SCENES/mini.toml"
+seed = 1
+method = ["tsdf", "tsdf++"]
+)";
+
+constexpr const char* kGates = R"([[experiment]]
+name = "tiny"
+file = "tiny.toml"
+profiles = ["quick"]
+[[control]]
+name = "agree"
+experiment = "tiny"
+metric = "table_visible_completion"
+methods = ["tsdf", "tsdf++"]
+spread = 0.5
+min = 0.1
+why = "the same frames"
+[[gate]]
+name = "completion"
+experiment = "tiny"
+metric = "movers_completion"
+where = { method = "tsdf++" }
+min = 0.1
+confidence = 1
+why = "it is seen"
+[[gate]]
+name = "as-before"
+experiment = "tiny"
+metric = "movers_completion"
+where = { method = "tsdf++" }
+tolerance = 0.001
+confidence = 1
+why = "the same program gives the same bytes"
+[[sabotage]]
+name = "labels-permuted"
+caught_by = ["as-before"]
+)";
+
+class GateCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string experiment = kExperiment;
+    experiment.replace(experiment.find("SCENES"), 6, std::string(TSDFPP_SOURCE_DIR) + "/scenes");
+    Write("tiny.toml", experiment);
+    Write("gates.toml", kGates);
+  }
+  void Write(const std::string& name, const std::string& text) const {
+    ASSERT_TRUE(WriteFile(folder_.path() / name, text).has_value());
+  }
+  void Replace(const std::string& old, const std::string& text) const {
+    std::string gates = kGates;
+    ASSERT_NE(gates.find(old), std::string::npos);
+    Write("gates.toml", gates.replace(gates.find(old), old.size(), text));
+  }
+  test::CommandOutput Gate(std::vector<std::string> options) const {
+    options.insert(options.begin(), {"gate", (folder_.path() / "gates.toml").string(), "--out",
+                                     (folder_.path() / "out").string()});
+    return RunTsdfpp(options, folder_.path());
+  }
+  std::string File(const std::string& name) const {
+    return ReadFile(folder_.path() / name).value_or("");
+  }
+  test::TempFolder folder_;
+};
+
+TEST_F(GateCommand, FromTheFirstReferencesToAFailure) {
+  // Without references nothing can be said of the gate that needs them.
+  const auto first = Gate({});
+  EXPECT_EQ(first.exit_code, 4) << first.out << first.err;
+  EXPECT_NE(first.out.find("there is no reference"), std::string::npos) << first.out;
+
+  EXPECT_EQ(Gate({"--update"}).exit_code, 2);
+  EXPECT_EQ(File("gates-references.json"), "");
+  const auto update = Gate({"--update", "--reason", "the first ones"});
+  EXPECT_EQ(update.exit_code, 0) << update.err;
+  EXPECT_NE(update.err.find("as-before: new"), std::string::npos) << update.err;
+  const auto references = nlohmann::json::parse(File("gates-references.json"));
+  EXPECT_EQ(references["gates"]["as-before"]["reason"], "the first ones");
+
+  const auto good = Gate({"--sabotages", "--json"});
+  EXPECT_EQ(good.exit_code, 0) << good.out << good.err;
+  const auto json = nlohmann::json::parse(good.out);
+  EXPECT_EQ(json["controls"][0]["verdict"], "pass");
+  EXPECT_EQ(json["gates"][1]["verdict"], "pass");
+  EXPECT_EQ(json["gates"][1]["bytes"], "same");
+  EXPECT_EQ(json["gates"][1]["mean"], 0.0);
+  EXPECT_EQ(json["sabotages"][0]["caught"], true);
+  EXPECT_NE(File("out/gates.junit.xml").find("tests=\"4\" failures=\"0\" errors=\"0\""),
+            std::string::npos);
+
+  const auto broken = Gate({"--sabotage", "labels-permuted"});
+  EXPECT_EQ(broken.exit_code, 1) << broken.out;
+  EXPECT_EQ(broken.out.rfind("SABOTAGED: ", 0), 0U) << broken.out;
+  EXPECT_NE(File("out/gates.md").find("![picture](pictures/as-before.png)"), std::string::npos)
+      << File("out/gates.md");
+  EXPECT_GT(File("out/pictures/as-before.png").size(), 1000U);
+  EXPECT_EQ(File("gates-references.json"), references.dump(1) + "\n") << "a run changes none";
+
+  const auto explained = Gate({"--explain", "as-before", "--sabotage", "labels-permuted"});
+  EXPECT_EQ(explained.exit_code, 0);
+  EXPECT_NE(explained.out.find("object car"), std::string::npos) << explained.out;
+}
+
+TEST_F(GateCommand, AControlThatFailsMakesAllInvalid) {
+  Replace("spread = 0.5\nmin = 0.1", "spread = 0.5\nmin = 0.9999999");
+  const auto output = Gate({});
+  EXPECT_EQ(output.exit_code, 4) << output.out;
+  EXPECT_NE(output.out.find("a control failed"), std::string::npos) << output.out;
+  EXPECT_EQ(Gate({"--update", "--reason", "no"}).exit_code, 4);
+  EXPECT_EQ(File("gates-references.json"), "");
+}
+
+TEST_F(GateCommand, WrongFilesAndOptionsGetASentence) {
+  const std::string folder = folder_.path().string();
+  const auto sentence = [&](const test::CommandOutput& output) {
+    EXPECT_EQ(output.exit_code, 2) << output.err;
+    EXPECT_EQ(output.out, "");
+    return output.err;
+  };
+  Replace("metric = \"movers_completion\"", "metric = \"movers\"");
+  EXPECT_EQ(sentence(Gate({})).rfind("tsdfpp: " + folder +
+                                         "/gates.toml:16: 'gate.metric' is "
+                                         "'movers', expected one of",
+                                     0),
+            0U);
+  Replace("file = \"tiny.toml\"", "file = \"huge.toml\"");
+  EXPECT_EQ(sentence(Gate({})), "tsdfpp: " + folder +
+                                    "/gates.toml:3: 'experiment.file' is "
+                                    "'huge.toml', but there is no file " +
+                                    folder + "/huge.toml\n");
+  Replace("min = 0.1\nconfidence", "min = 2\nconfidence");
+  EXPECT_NE(sentence(Gate({})).find("gates.toml:18: 'gate.min' is 2, but"), std::string::npos);
+  Replace("name = \"as-before\"", "name = \"completion\"");
+  EXPECT_EQ(sentence(Gate({})), "tsdfpp: " + folder +
+                                    "/gates.toml:22: 'gate.name' is "
+                                    "'completion', a second time\n");
+  Write("gates.toml", kGates);
+  EXPECT_NE(sentence(Gate({"--sabotage", "all"})).find("--sabotage is 'all', expected one of none"),
+            std::string::npos);
+  EXPECT_NE(sentence(Gate({"--explain", "nothing"})).find("--explain 'nothing' is no gate of"),
+            std::string::npos);
+  EXPECT_NE(sentence(Gate({"--profile", "full"})).find("no gate is in profile 'full'"),
+            std::string::npos);
+  EXPECT_NE(sentence(Gate({"--reason", "x"})).find("--reason goes with --update alone"),
+            std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out"));
+}
+
+}  // namespace
+}  // namespace tsdfpp

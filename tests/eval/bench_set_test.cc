@@ -1,0 +1,175 @@
+// The frozen benchmark is what it was, and a leaderboard takes sound results alone.
+#include "eval/bench_set.h"
+
+#include <gtest/gtest.h>
+
+#include "core/files.h"
+#include "tests/cli/run_command.h"
+#include "tests/core/temp_folder.h"
+#include "tests/eval/tiny_scene.h"
+
+namespace tsdfpp {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kSets = TSDFPP_SOURCE_DIR "/eval/bench-sets";
+
+// A set of two tiny scenes, frozen.
+class SmallSet : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(WriteFile(folder_ / "sets/s/a.toml", test::TinyScene(4)).has_value());
+    ASSERT_TRUE(WriteFile(folder_ / "sets/s/b.toml", test::TinyScene(5)).has_value());
+    Write({{"a", "a.toml", "?", "?"}, {"b", "b.toml", "?", "?"}});
+    auto set = BenchSet::Load(folder_ / "sets", "s");
+    ASSERT_TRUE(set.has_value()) << set.error().message;
+    std::vector<BenchSequence> hashed;
+    for (const BenchSequence& sequence : set->sequences) {
+      const auto now = HashSequence(*set, sequence);
+      ASSERT_TRUE(now.has_value()) << now.error().message;
+      hashed.push_back(*now);
+    }
+    Write(hashed);
+    set_ = *BenchSet::Load(folder_ / "sets", "s");
+  }
+  void Write(const std::vector<BenchSequence>& sequences) {
+    std::string text =
+        "name = \"s\"\nscale = 1\nvoxel_m = 0.02\ntrunc_front = 10\ntrunc_back = 3\n"
+        "metrics = [\"visible_completion\", \"ghost_area_cm2\"]\n";
+    for (const BenchSequence& s : sequences) {
+      text += fmt::format(
+          "[[sequence]]\nname = \"{}\"\nscene = \"{}\"\nscene_hash = \"{}\"\ntruth_hash = \"{}\"\n",
+          s.name, s.scene, s.scene_hash, s.truth_hash);
+    }
+    ASSERT_TRUE(WriteFile(folder_ / "sets/s/set.toml", text).has_value());
+  }
+  json Result(const std::string& method, double a, double b) const {
+    const auto entry = [](const char* sequence, double score) {
+      return json{{"sequence", sequence},
+                  {"scores",
+                   {{"visible_completion", score},
+                    {"ghost_area_cm2", {{"value", nullptr}, {"why", "not asked"}}}}}};
+    };
+    return {{"schema", 1},
+            {"kind", "tsdfpp bench result"},
+            {"bench_set", "s"},
+            {"bench_hash", set_.hash},
+            {"method", {{"name", method}, {"version", "1"}, {"commit", "c"}}},
+            {"hardware", {{"cpu", "x"}, {"cores", 2}, {"memory_gb", 8}, {"gpu", "none used"}}},
+            {"entries", {entry("a", a), entry("b", b)}}};
+  }
+  test::TempFolder folder_;
+  BenchSet set_;
+};
+
+TEST(BenchSetV1, IsAsFrozen) {
+  const auto set = BenchSet::Load(kSets, "v1");
+  ASSERT_TRUE(set.has_value()) << set.error().message;
+  // Changed? Then it is another benchmark: make a v2.
+  EXPECT_EQ(set->hash, "6aa9378dd63e2bff");
+  EXPECT_EQ(set->sequences.size(), 13U);
+  const auto frozen = CheckFrozen(*set);
+  EXPECT_TRUE(frozen.has_value()) << frozen.error().message;
+}
+
+TEST_F(SmallSet, WhatIsNotAsFrozenIsNamed) {
+  EXPECT_TRUE(CheckFrozen(set_).has_value());
+  // The same text with a space in a comment is the same scene; a car that drives otherwise is not.
+  ASSERT_TRUE(WriteFile(folder_ / "sets/s/b.toml", "# again\n" + test::TinyScene(5)).has_value());
+  EXPECT_TRUE(CheckFrozen(set_).has_value());
+  std::string other = test::TinyScene(5);
+  other.replace(other.find("x = [0.02, 0.18]"), 16, "x = [0.02, 0.19]");
+  ASSERT_TRUE(WriteFile(folder_ / "sets/s/b.toml", other).has_value());
+  const auto checked = CheckFrozen(set_);
+  ASSERT_FALSE(checked.has_value());
+  EXPECT_EQ(checked.error().kind, ErrorKind::kData);
+  EXPECT_NE(checked.error().message.find("sequence b"), std::string::npos);
+  const auto none = BenchSet::Load(folder_ / "sets", "v9");
+  ASSERT_FALSE(none.has_value());
+  EXPECT_NE(none.error().message.find("expected one of: s"), std::string::npos);
+}
+
+TEST_F(SmallSet, TheExperimentHasItsSettings) {
+  const auto config = ExperimentOf(set_, {"tsdf", "anchored"});
+  ASSERT_TRUE(config.has_value());
+  const auto cells = CellsOf(*config);
+  ASSERT_EQ(cells.size(), 4U);
+  EXPECT_EQ(cells[1].settings.method, "tsdf++/anchored");
+  EXPECT_EQ(cells[1].settings.voxel_m, 0.02);
+  EXPECT_EQ(cells[1].settings.trunc_back, 3);
+  EXPECT_FALSE(ExperimentOf(set_, {"kinfu"}).has_value());
+  EXPECT_FALSE(ExperimentOf(set_, {}).has_value());
+}
+
+TEST_F(SmallSet, ALeaderboardIsBestFirst) {
+  ASSERT_TRUE(WriteFile(folder_ / "r/1.json", Result("good", 0.9, 0.7).dump()).has_value());
+  ASSERT_TRUE(WriteFile(folder_ / "r/2.json", Result("best", 1, 0.8).dump()).has_value());
+  const auto page = Leaderboard(set_, folder_ / "r");
+  ASSERT_TRUE(page.has_value()) << page.error().message;
+  const std::size_t best = page->find("| best | 0.900 [0.800, 1.000] | - |");
+  const std::size_t good = page->find("| good | 0.800 [0.700, 0.900] | - |");
+  ASSERT_NE(best, std::string::npos) << *page;
+  ASSERT_NE(good, std::string::npos) << *page;
+  EXPECT_LT(best, good);
+  EXPECT_NE(page->find("| best | 1.000 | 0.800 |"), std::string::npos) << *page;
+}
+
+TEST_F(SmallSet, OurMethodsRunOnItAndEnterThePage) {
+  const std::vector<std::string> of_set{"bench-set", "s", "--sets", folder_ / "sets"};
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), of_set.begin(), of_set.end());
+    return test::RunTsdfpp(more, folder_.path());
+  };
+  const auto ran = run({"--run", "tsdf,anchored", "--commit", "abc", "--out", folder_ / "r"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const auto result = ReadBenchResult(set_, folder_ / "r/tsdf++-anchored.json");
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  EXPECT_EQ(result->commit, "abc");
+  EXPECT_GT(*result->scores.at("b").at("visible_completion").value, 0.5);
+  const auto page = run({"--leaderboard", folder_ / "r", "--out", folder_ / "page.md"});
+  ASSERT_EQ(page.exit_code, 0) << page.err;
+  EXPECT_NE(ReadFile(folder_ / "page.md")->find("| tsdf++/anchored | "), std::string::npos);
+  EXPECT_EQ(run({}).exit_code, 0);
+  EXPECT_EQ(run({"--run", "kinfu", "--out", folder_ / "x"}).exit_code, 2);
+}
+
+TEST_F(SmallSet, AnUnsoundResultIsRefusedInASentence) {
+  const auto refused = [&](const json& result, const std::string& sentence) {
+    EXPECT_TRUE(WriteFile(folder_ / "r/1.json", result.dump()).has_value());
+    const auto page = Leaderboard(set_, folder_ / "r");
+    ASSERT_FALSE(page.has_value()) << sentence;
+    EXPECT_EQ(page.error().kind, ErrorKind::kData);
+    EXPECT_NE(page.error().message.find(sentence), std::string::npos) << page.error().message;
+    EXPECT_NE(page.error().message.find("1.json"), std::string::npos);
+  };
+  json result = Result("m", 1, 1);
+  result["schema"] = 2;
+  refused(result, "no benchmark result of schema 1");
+  result = Result("m", 1, 1);
+  result["bench_hash"] = "0";
+  refused(result, "expected s with");
+  result = Result("m", 1, 1);
+  result["entries"].erase(1);
+  refused(result, "sequence b is missing");
+  result = Result("m", 1, 1);
+  result["entries"][1]["sequence"] = "a";
+  refused(result, "is there twice");
+  result = Result("m", 1, 1);
+  result["entries"][0]["scores"].erase("ghost_area_cm2");
+  refused(result, "metric ghost_area_cm2 of sequence a is missing");
+  result = Result("m", 1, 1);
+  result["entries"][0]["scores"]["mine"] = 1;
+  refused(result, "has 3 metrics, the benchmark 2");
+  result = Result("m", 1, 1);
+  result["entries"][0]["scores"]["visible_completion"] = nullptr;
+  refused(result, "a field is missing or wrong");
+  result = Result("m", 1, 1);
+  result["hardware"].erase("cpu");
+  refused(result, "a field is missing or wrong");
+  refused(json::array(), "is not JSON");
+  EXPECT_FALSE(Leaderboard(set_, folder_ / "none").has_value());
+}
+
+}  // namespace
+}  // namespace tsdfpp

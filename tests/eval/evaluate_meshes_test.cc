@@ -1,0 +1,575 @@
+// Files of any mapper against the truth: closed forms on a wall with two boxes, every file format
+// and layout, everything that can be wrong with a mesh, and the same numbers as `compare`.
+#include "eval/evaluate_meshes.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/files.h"
+#include "core/gltf.h"
+#include "core/ply.h"
+#include "core/pose_text.h"
+#include "eval/compare.h"
+#include "eval/open_source.h"
+#include "eval/surface_file.h"
+#include "metrics/mesh_tools.h"
+#include "tests/core/temp_folder.h"
+#include "tests/sequence/box_source.h"
+
+namespace tsdfpp {
+namespace {
+
+using test::BoxSource;
+using test::TempFolder;
+namespace fs = std::filesystem;
+
+constexpr int kLast = 5;
+constexpr InstanceId kLeft = 3;
+constexpr InstanceId kRight = 8;
+// Single precision at 3 m, twice: the file's rounding and the query's.
+constexpr double kRounding_m = 2e-6;
+
+// The true surface of each object in the world after frame `kLast`, cut finely enough that a box of
+// faces selects them well.
+std::map<InstanceId, TriangleMesh> TruthMeshes(BoxSource& source) {
+  const auto frame = source.Read(kLast);
+  const auto models = source.Truth();
+  std::map<InstanceId, TriangleMesh> meshes;
+  for (const TrueModel& model : *models) {
+    TriangleMesh mesh = model.mesh_O;
+    if (model.info.id != kBackground) {
+      for (Eigen::Vector3f& vertex : mesh.vertices) {
+        vertex = (frame->T_WO.at(model.info.id) * vertex.cast<double>()).cast<float>();
+      }
+    }
+    meshes[model.info.id] = mesh;
+  }
+  return meshes;
+}
+
+TriangleMesh Moved(TriangleMesh mesh, const Eigen::Vector3f& by) {
+  for (Eigen::Vector3f& vertex : mesh.vertices) vertex += by;
+  return mesh;
+}
+
+TriangleMesh SceneOf(const std::map<InstanceId, TriangleMesh>& meshes, bool labelled) {
+  TriangleMesh scene;
+  for (const auto& [id, mesh] : meshes) {
+    TriangleMesh one = mesh;
+    if (labelled) one.face_ids.assign(one.triangles.size(), id);
+    AppendMesh(one, scene);
+  }
+  return scene;
+}
+
+void Put(const fs::path& path, const TriangleMesh& mesh) {
+  const auto written = WritePly(path, mesh);
+  ASSERT_TRUE(written.has_value()) << written.error().message;
+}
+
+EvaluateConfig At(const fs::path& folder, std::vector<int> frames = {kLast}) {
+  EvaluateConfig config;
+  config.meshes = folder;
+  config.frames = std::move(frames);
+  config.truth.sampling.fine_per_cm2 = 1;
+  config.truth.sampling.coarse_per_cm2 = 0.05;
+  return config;
+}
+
+EvaluateResult Evaluated(const EvaluateConfig& config) {
+  BoxSource source;
+  auto result = RunEvaluate(source, config, {});
+  if (!result) {
+    ADD_FAILURE() << result.error().message;
+    return {};
+  }
+  return std::move(*result);
+}
+
+Error ErrorOf(const EvaluateConfig& config) {
+  BoxSource source;
+  const auto result = RunEvaluate(source, config, {});
+  EXPECT_FALSE(result.has_value());
+  return result ? Error{} : result.error();
+}
+
+// All of it but times and how it was read.
+nlohmann::json Scores(const EvaluatedFrame& frame) {
+  nlohmann::json json = ToJson(frame.evaluation);
+  json.erase("mesh_s");
+  json.erase("evaluate_s");
+  return json;
+}
+
+const ObjectScores& Of(const EvaluateResult& result, InstanceId id) {
+  for (const ObjectScores& scores : result.frames.back().evaluation.objects) {
+    if (scores.info.id == id) return scores;
+  }
+  ADD_FAILURE() << "no object " << id;
+  return result.frames.back().evaluation.objects.front();
+}
+
+bool Says(const std::vector<std::string>& remarks, const std::string& words) {
+  return std::any_of(remarks.begin(), remarks.end(), [&](const std::string& remark) {
+    return remark.find(words) != std::string::npos;
+  });
+}
+
+// The three objects under their own names.
+void PutNamed(const fs::path& folder, const std::map<InstanceId, TriangleMesh>& meshes) {
+  Put(folder / "background-0.ply", meshes.at(kBackground));
+  Put(folder / "left-3.ply", meshes.at(kLeft));
+  Put(folder / "right-8.ply", meshes.at(kRight));
+}
+
+TEST(EvaluateMeshes, TheTruthScoresFull) {
+  const TempFolder folder;
+  BoxSource source;
+  PutNamed(folder / "m", TruthMeshes(source));
+  const EvaluateResult result = Evaluated(At(folder / "m"));
+  ASSERT_EQ(result.frames.size(), 1U);
+  EXPECT_TRUE(result.frames[0].remarks.empty()) << result.frames[0].remarks.front();
+  ASSERT_EQ(result.frames[0].matches.size(), 3U);
+  for (const PartMatch& match : result.frames[0].matches) {
+    EXPECT_EQ(match.how, "name") << match.part.source;
+    EXPECT_EQ(match.object, match.part.id);
+  }
+  for (const InstanceId id : {kBackground, kLeft, kRight}) {
+    const ObjectScores& scores = Of(result, id);
+    EXPECT_EQ(scores.preserved.completion.value, 1.0) << id;
+    EXPECT_EQ(scores.label_purity.value, 1.0) << id;
+    EXPECT_LT(*scores.accuracy.distance.mean_m.value, kRounding_m) << id;
+  }
+  EXPECT_EQ(result.frames[0].evaluation.visible_completion.value, 1.0);
+  EXPECT_EQ(result.frames[0].evaluation.ghost_area_m2, 0);
+}
+
+TEST(EvaluateMeshes, AnOffsetIsMeasuredAsItIs) {
+  const TempFolder folder;
+  BoxSource source;
+  auto meshes = TruthMeshes(source);
+  constexpr float kOffset_m = 0.007F;  // between half a voxel and a voxel
+  meshes[kBackground] = Moved(meshes[kBackground], {0, 0, -kOffset_m});
+  PutNamed(folder / "m", meshes);
+  const EvaluateResult result = Evaluated(At(folder / "m"));
+  const ObjectScores& wall = Of(result, kBackground);
+  EXPECT_EQ(wall.recall[0].value, 0.0);
+  EXPECT_EQ(wall.recall[1].value, 1.0);
+  EXPECT_NEAR(*wall.accuracy.distance.mean_m.value, kOffset_m, kRounding_m);
+  EXPECT_NEAR(*wall.completion.mean_m.value, kOffset_m, kRounding_m);
+  EXPECT_EQ(Of(result, kLeft).recall[0].value, 1.0);
+}
+
+TEST(EvaluateMeshes, HalfOfAnObjectIsHalfSeen) {
+  const TempFolder folder;
+  BoxSource source;
+  auto meshes = TruthMeshes(source);
+  // The wall's left half, world x < 0.
+  meshes[kBackground].vertices = {{-3, -3, 1.5F}, {0, -3, 1.5F}, {0, 3, 1.5F}, {-3, 3, 1.5F}};
+  PutNamed(folder / "m", meshes);
+  const EvaluateResult result = Evaluated(At(folder / "m"));
+  // The share of what was seen is counted independently, on the tracker's own samples.
+  auto truth = SceneTruth::Create(source, result.config.truth);
+  ASSERT_TRUE(truth.has_value());
+  for (int i = 0; i <= kLast; ++i) ASSERT_TRUE(truth->Observe(*source.Read(i)).has_value());
+  const SeenTracker& wall = truth->trackers().front();
+  int seen = 0;
+  int in_half = 0;
+  for (std::size_t i = 0; i < wall.samples_O().size(); ++i) {
+    if (!wall.Seen(i)) continue;
+    ++seen;
+    // A voxel beyond its edge counts as there.
+    if (wall.samples_O().points[i].x() <= 0.01F) ++in_half;
+  }
+  ASSERT_GT(in_half, 0);
+  ASSERT_LT(in_half, seen);
+  EXPECT_NEAR(*Of(result, kBackground).preserved.completion.value,
+              static_cast<double>(in_half) / seen, 1e-6);
+}
+
+TEST(EvaluateMeshes, EveryFormatAndUnitGivesTheSameScores) {
+  const TempFolder folder;
+  BoxSource source;
+  const auto meshes = TruthMeshes(source);
+  PutNamed(folder / "ply", meshes);
+  const nlohmann::json expected = Scores(Evaluated(At(folder / "ply")).frames[0]);
+  fs::create_directories(folder / "obj");
+  fs::create_directories(folder / "stl");
+  const std::map<InstanceId, std::string> stems{
+      {kBackground, "background-0"}, {kLeft, "left-3"}, {kRight, "right-8"}};
+  std::vector<NamedMesh> nodes;
+  for (const auto& [id, mesh] : meshes) {
+    std::ofstream obj(folder / "obj" / (stems.at(id) + ".obj"));
+    obj.precision(9);
+    for (const Eigen::Vector3f& v : mesh.vertices) {
+      obj << "v " << 1000.0 * static_cast<double>(v.x()) << " "
+          << 1000.0 * static_cast<double>(v.y()) << " " << 1000.0 * static_cast<double>(v.z())
+          << "\n";
+    }
+    for (const auto& t : mesh.triangles) {
+      obj << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
+    }
+    std::ofstream stl(folder / "stl" / (stems.at(id) + ".stl"));
+    stl.precision(9);
+    stl << "solid s\n";
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      stl << "facet normal 0 0 0\nouter loop\n";
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3f& v = Corner(mesh, t, k);
+        stl << "vertex " << v.x() << " " << v.y() << " " << v.z() << "\n";
+      }
+      stl << "endloop\nendfacet\n";
+    }
+    stl << "endsolid s\n";
+    nodes.push_back({stems.at(id).substr(0, stems.at(id).rfind('-')), id, mesh});
+  }
+  ASSERT_TRUE(WriteGlb(folder / "glb/scene.glb", nodes).has_value());
+  Put(folder / "labels/scene.ply", SceneOf(meshes, true));
+  for (const char* form : {"obj", "stl", "glb", "labels"}) {
+    EvaluateConfig config = At(folder / form);
+    if (std::string(form) == "obj") {
+      config.scale = 0.001;
+      config.scale_is_given = true;
+    }
+    const EvaluateResult result = Evaluated(config);
+    ASSERT_EQ(result.frames.size(), 1U) << form;
+    const nlohmann::json scores = Scores(result.frames[0]);
+    // Shares are the same; distances to the rounding of text and of millimetres.
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (const char* share : {"completion", "visible_completion", "label_purity"}) {
+        EXPECT_EQ(scores["objects"][i][share], expected["objects"][i][share]) << form;
+      }
+      EXPECT_NEAR(scores["objects"][i]["accuracy"]["mean_m"].get<double>(),
+                  expected["objects"][i]["accuracy"]["mean_m"].get<double>(), kRounding_m)
+          << form;
+    }
+  }
+}
+
+TEST(EvaluateMeshes, PartsWithoutNamesAreMatchedByOverlap) {
+  const TempFolder folder;
+  BoxSource source;
+  const auto meshes = TruthMeshes(source);
+  PutNamed(folder / "named", meshes);
+  const EvaluateResult named = Evaluated(At(folder / "named"));
+  Put(folder / "m/a.ply", meshes.at(kRight));
+  Put(folder / "m/b.ply", meshes.at(kLeft));
+  Put(folder / "m/wall.ply", meshes.at(kBackground));
+  // A part that is on nothing is no object, and counts as a ghost alone.
+  Put(folder / "m/z.ply", Moved(meshes.at(kLeft), {0, 0, -0.5F}));
+  const EvaluateResult result = Evaluated(At(folder / "m"));
+  ASSERT_EQ(result.frames[0].matches.size(), 4U);
+  const std::vector<InstanceId> objects{kRight, kLeft, kBackground, kNoInstance};
+  for (std::size_t p = 0; p < 4; ++p) {
+    EXPECT_EQ(result.frames[0].matches[p].object, objects[p]);
+    EXPECT_EQ(result.frames[0].matches[p].how, p < 3 ? "overlap" : "nothing");
+  }
+  EXPECT_EQ(result.frames[0].matches[0].share.value, 1.0);
+  EXPECT_EQ(Of(result, kRight).preserved.completion.value, 1.0);
+  EXPECT_EQ(Of(result, kRight).accuracy.distance.mean_m.value,
+            Of(named, kRight).accuracy.distance.mean_m.value);
+  EXPECT_GT(result.frames[0].evaluation.ghost_area_m2, 0.01);
+  EXPECT_NE(EvaluateTable(result).find("a.ply is right (8) (by overlap"), std::string::npos)
+      << EvaluateTable(result);
+}
+
+TEST(EvaluateMeshes, SwappedNamesAreSaidAndCanBeOverruled) {
+  const TempFolder folder;
+  BoxSource source;
+  auto meshes = TruthMeshes(source);
+  std::swap(meshes[kLeft], meshes[kRight]);
+  PutNamed(folder / "m", meshes);
+  EvaluateConfig config = At(folder / "m");
+  const EvaluateResult swapped = Evaluated(config);
+  EXPECT_EQ(Of(swapped, kLeft).preserved.completion.value, 0.0);
+  EXPECT_TRUE(Says(swapped.frames[0].remarks, "left-3.ply counts as left (3), but 100 % of it"));
+  EXPECT_TRUE(Says(swapped.frames[0].remarks, "--match overlap"));
+  config.match = MatchMode::kOverlap;
+  const EvaluateResult overruled = Evaluated(config);
+  EXPECT_EQ(Of(overruled, kLeft).preserved.completion.value, 1.0);
+  EXPECT_TRUE(overruled.frames[0].remarks.empty());
+}
+
+TEST(EvaluateMeshes, WithoutLabelsEveryScoreTakesFacesOfAnyLabel) {
+  const TempFolder folder;
+  BoxSource source;
+  const auto meshes = TruthMeshes(source);
+  Put(folder / "m/mesh.ply", SceneOf(meshes, false));
+  EvaluateConfig config = At(folder / "m");
+  config.removed = {kRight};
+  const EvaluateResult result = Evaluated(config);
+  const Evaluation& evaluation = result.frames[0].evaluation;
+  EXPECT_FALSE(evaluation.labelled);
+  EXPECT_TRUE(result.frames[0].matches.empty());
+  EXPECT_TRUE(Says(result.frames[0].remarks, "tells no objects apart"));
+  for (const InstanceId id : {kBackground, kLeft, kRight}) {
+    EXPECT_EQ(Of(result, id).preserved.completion.value, 1.0) << id;
+    EXPECT_LT(*Of(result, id).accuracy.distance.mean_m.value, kRounding_m) << id;
+    EXPECT_FALSE(Of(result, id).label_purity.value.has_value());
+    EXPECT_EQ(Of(result, id).label_purity.why_not, "the mesh has no labels");
+  }
+  EXPECT_FALSE(evaluation.revealed_ghost_area_m2.value.has_value());
+  EXPECT_EQ(evaluation.sanity.all.value, 1.0);
+  EXPECT_NE(EvaluateTable(result).find("(any label)"), std::string::npos);
+
+  // Without the boxes the wall is as good as before, and the boxes are lost.
+  Put(folder / "wall/mesh.ply", meshes.at(kBackground));
+  const EvaluateResult wall = Evaluated(At(folder / "wall"));
+  EXPECT_EQ(Of(wall, kBackground).preserved.completion.value, 1.0);
+  EXPECT_EQ(Of(wall, kLeft).preserved.completion.value, 0.0);
+}
+
+TEST(EvaluateMeshes, RemovalDropsFacesUnlessTheMapperRemoved) {
+  const TempFolder folder;
+  BoxSource source;
+  auto meshes = TruthMeshes(source);
+  // A ghost of the right box, named after it: the removal takes it away.
+  TriangleMesh with_ghost = meshes.at(kRight);
+  AppendMesh(Moved(meshes.at(kRight), {0, 0, -0.4F}), with_ghost);
+  auto haunted = meshes;
+  haunted[kRight] = with_ghost;
+  Put(folder / "m/scene.ply", SceneOf(haunted, true));
+  EvaluateConfig config = At(folder / "m");
+  config.removed = {kRight};
+  const EvaluateResult dropped = Evaluated(config);
+  EXPECT_GT(dropped.frames[0].evaluation.ghost_area_m2, 0.01);
+  EXPECT_EQ(dropped.frames[0].evaluation.revealed_ghost_area_m2.value, 0.0);
+  const Measured kept = Of(dropped, kBackground).preserved.preservation_behind_other;
+  EXPECT_EQ(kept.value, 1.0) << kept.why_not;
+
+  // What the mapper itself has left after its removal counts in place of that: here no wall.
+  Put(folder / "m/scene-without-8.ply", SceneOf({{kLeft, meshes.at(kLeft)}}, true));
+  const EvaluateResult removed = Evaluated(config);
+  EXPECT_EQ(Of(removed, kBackground).preserved.preservation_behind_other.value, 0.0);
+  EXPECT_EQ(Of(removed, kLeft).preserved.completion.value, 1.0);
+  EXPECT_EQ(removed.frames[0].evaluation.visible_completion.value, 1.0);
+}
+
+TEST(EvaluateMeshes, SeveralFramesNeedAFolderEach) {
+  const TempFolder folder;
+  BoxSource source;
+  PutNamed(folder / "m/000005", TruthMeshes(source));
+  EXPECT_EQ(Evaluated(At(folder / "m")).frames.size(), 1U);
+  const Error missing = ErrorOf(At(folder / "m", {4, 5}));
+  EXPECT_EQ(missing.kind, ErrorKind::kData);
+  EXPECT_NE(missing.message.find("holds nothing for frame 4, expected a subfolder 000004"),
+            std::string::npos)
+      << missing.message;
+  PutNamed(folder / "m/frame-4", TruthMeshes(source));
+  const EvaluateResult both = Evaluated(At(folder / "m", {5, 4}));
+  ASSERT_EQ(both.frames.size(), 2U);
+  EXPECT_EQ(both.frames[0].evaluation.frame, 4);
+  EXPECT_EQ(both.frames[1].evaluation.frame, 5);
+}
+
+struct Bad {
+  std::string name;
+  std::function<void(TriangleMesh&)> spoil;
+  std::string sentence;  // of the error
+};
+
+TEST(EvaluateMeshes, WhatCannotBeScoredIsRefusedWithASentence) {
+  BoxSource source;
+  const TriangleMesh good = SceneOf(TruthMeshes(source), true);
+  const std::vector<Bad> all{
+      {"millimetres",
+       [](TriangleMesh& mesh) {
+         for (Eigen::Vector3f& vertex : mesh.vertices) vertex *= 1000;
+       },
+       "is it in another unit? Give its scale (--scale 0.001 would fit"},
+      {"empty", [](TriangleMesh& mesh) { mesh = {}; }, "has no faces, expected a mesh"},
+      {"points", [](TriangleMesh& mesh) { mesh.triangles.clear(), mesh.face_ids.clear(); },
+       "has no faces, expected a mesh"},
+      {"nan", [](TriangleMesh& mesh) { mesh.vertices[3].y() = NAN; },
+       "a vertex has no finite x, y, z"},
+      {"infinite", [](TriangleMesh& mesh) { mesh.vertices[0].x() = INFINITY; },
+       "a vertex has no finite x, y, z"},
+      {"flat",
+       [](TriangleMesh& mesh) {
+         for (auto& t : mesh.triangles) t[2] = t[1];
+       },
+       "none of them has an area"},
+  };
+  for (const Bad& bad : all) {
+    const TempFolder folder;
+    TriangleMesh mesh = good;
+    bad.spoil(mesh);
+    Put(folder / "m/scene.ply", mesh);
+    const Error error = ErrorOf(At(folder / "m"));
+    EXPECT_EQ(error.kind, ErrorKind::kData) << bad.name;
+    EXPECT_NE(error.message.find(bad.sentence), std::string::npos) << error.message;
+    EXPECT_NE(error.message.find("scene.ply"), std::string::npos) << error.message;
+  }
+}
+
+TEST(EvaluateMeshes, HalfAFileIsRefused) {
+  const TempFolder folder;
+  BoxSource source;
+  Put(folder / "m/scene.ply", SceneOf(TruthMeshes(source), true));
+  const auto bytes = ReadFile(folder / "m/scene.ply");
+  ASSERT_TRUE(WriteFile(folder / "m/scene.ply", bytes->substr(0, bytes->size() / 2)).has_value());
+  const Error error = ErrorOf(At(folder / "m"));
+  EXPECT_EQ(error.kind, ErrorKind::kData);
+  EXPECT_NE(error.message.find("the file ends"), std::string::npos) << error.message;
+}
+
+TEST(EvaluateMeshes, AnotherFrameScoresNothingAndSaysSo) {
+  const TempFolder folder;
+  BoxSource source;
+  Put(folder / "m/scene.ply", Moved(SceneOf(TruthMeshes(source), true), {0, 0, 5}));
+  const EvaluateResult result = Evaluated(At(folder / "m"));
+  EXPECT_EQ(Of(result, kBackground).preserved.completion.value, 0.0);
+  EXPECT_TRUE(Says(result.frames[0].remarks,
+                   "no part of it is within 0.02 m of a true surface, the nearest is"));
+  EXPECT_TRUE(Says(result.frames[0].remarks, "world frame"));
+}
+
+TEST(EvaluateMeshes, FlippedFacesAreSaid) {
+  const TempFolder folder;
+  BoxSource source;
+  TriangleMesh mesh = SceneOf(TruthMeshes(source), true);
+  for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+  Put(folder / "m/scene.ply", mesh);
+  const EvaluateResult result = Evaluated(At(folder / "m"));
+  EXPECT_EQ(Of(result, kLeft).preserved.completion.value, 0.0);
+  EXPECT_TRUE(Says(result.frames[0].remarks, "faces the other way"));
+}
+
+TEST(EvaluateMeshes, AnObjectThatIsMissingIsNamed) {
+  const TempFolder folder;
+  BoxSource source;
+  auto meshes = TruthMeshes(source);
+  meshes.erase(kRight);
+  Put(folder / "m/scene.ply", SceneOf(meshes, true));
+  EXPECT_TRUE(Says(Evaluated(At(folder / "m")).frames[0].remarks, "nothing of it is right (8)"));
+}
+
+TEST(EvaluateMeshes, TrajectoriesAreAnchoredOnce) {
+  const TempFolder folder;
+  BoxSource source;
+  PutNamed(folder / "m", TruthMeshes(source));
+  std::string right;
+  std::string camera;
+  constexpr double kShift_m = 0.03;
+  for (int i = 0; i <= kLast; ++i) {
+    const auto frame = source.Read(i);
+    // An object's frame is the mapper's choice: turned and moved, it is the same trajectory.
+    Pose own = Pose::Identity();
+    own.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitX()).matrix();
+    own.translation() = Eigen::Vector3d(0.1, 0.2, 0.3);
+    right += fmt::format("{} {}\n", i, PoseToText(frame->T_WO.at(kRight) * own));
+    Pose moved = frame->T_WC;
+    moved.translation().x() += kShift_m;
+    camera += fmt::format("{} {}\n", i, PoseToText(moved));
+  }
+  ASSERT_TRUE(WriteFile(folder / "t/right-8.txt", right).has_value());
+  EvaluateConfig config = At(folder / "m");
+  config.trajectories = folder / "t";
+  EvaluateResult result = Evaluated(config);
+  ASSERT_TRUE(result.trajectories.has_value());
+  ASSERT_TRUE(result.trajectories->objects.contains(kRight));
+  EXPECT_EQ(result.trajectories->objects.at(kRight).frames, 6U);
+  // Nine decimals of text.
+  EXPECT_LT(*result.trajectories->objects.at(kRight).ate_rmse_m.value, 1e-8);
+  EXPECT_FALSE(result.trajectories->camera_m.has_value());
+
+  ASSERT_TRUE(WriteFile(folder / "t/camera.txt", camera).has_value());
+  result = Evaluated(config);
+  EXPECT_NEAR(result.trajectories->camera_m->rmse, kShift_m, 1e-8);
+  EXPECT_NEAR(result.trajectories->camera_deg->rmse, 0, 1e-6);
+
+  ASSERT_TRUE(WriteFile(folder / "t/poses-8.txt", right).has_value());
+  EXPECT_NE(ErrorOf(config).message.find("is of object 8, as is"), std::string::npos);
+}
+
+TEST(EvaluateMeshes, MasksAreComparedUnderTheirOwnIds) {
+  const TempFolder folder;
+  BoxSource source;
+  PutNamed(folder / "m", TruthMeshes(source));
+  fs::create_directories(folder / "own");
+  fs::create_directories(folder / "others");
+  for (int i = 2; i <= kLast; ++i) {
+    const auto frame = source.Read(i);
+    cv::imwrite(folder / "own" / fmt::format("Mask{:04d}.png", i), frame->mask);
+    cv::Mat swapped = frame->mask.clone();  // 3 is called 8, and 8 is called 5
+    swapped.setTo(8, frame->mask == 3);
+    swapped.setTo(5, frame->mask == 8);
+    cv::imwrite(folder / "others" / fmt::format("{}.png", i), swapped);
+  }
+  EvaluateConfig config = At(folder / "m");
+  config.masks = folder / "own";
+  EvaluateResult result = Evaluated(config);
+  ASSERT_TRUE(result.masks.has_value());
+  EXPECT_EQ(result.masks->images, 4);
+  EXPECT_EQ(result.masks->mean_iou.value, 1.0);
+  EXPECT_EQ(result.masks->quality.pq.value, 1.0);
+  config.masks = folder / "others";
+  result = Evaluated(config);
+  EXPECT_EQ(result.masks->iou.at(kLeft).value, 0.0);
+  EXPECT_EQ(result.masks->quality.pq.value, 1.0);  // segments are right, only their ids are not
+  config.match = MatchMode::kOverlap;
+  result = Evaluated(config);
+  EXPECT_EQ(result.masks->mean_iou.value, 1.0);
+  EXPECT_EQ(result.masks->object_of.at(8), kLeft);
+}
+
+TEST(EvaluateMeshes, WhatIsTypedWronglyIsSaid) {
+  const TempFolder folder;
+  BoxSource source;
+  PutNamed(folder / "m", TruthMeshes(source));
+  EvaluateConfig config = At(folder / "m", {6});
+  EXPECT_EQ(ErrorOf(config).message, "--at 6 is out of range: boxes has frames 0 to 5");
+  config.frames = {5, 5};
+  EXPECT_EQ(ErrorOf(config).message, "--at names frame 5 twice");
+  config.frames = {5};
+  config.removed = {kBackground};
+  EXPECT_NE(ErrorOf(config).message.find("cannot be removed"), std::string::npos);
+  config.removed = {};
+  config.meshes = folder / "nowhere";
+  EXPECT_NE(ErrorOf(config).message.find("nowhere: no such folder"), std::string::npos);
+  fs::create_directories(folder / "nothing");
+  config.meshes = folder / "nothing";
+  EXPECT_NE(ErrorOf(config).message.find("holds no mesh of frame 5"), std::string::npos);
+  config.meshes = folder / "m";
+  Put(folder / "m/scene-without-car.ply", SceneOf(TruthMeshes(source), true));
+  EXPECT_NE(ErrorOf(config).message.find("expected ids between dashes"), std::string::npos);
+}
+
+// The key: what `compare` says of its own meshes is what the files say.
+TEST(EvaluateMeshes, OurOwnMeshesScoreAsInTheComparison) {
+  const TempFolder folder;
+  auto source = OpenSource(TSDFPP_SOURCE_DIR "/scenes/mini.toml");
+  ASSERT_TRUE(source.has_value()) << source.error().message;
+  CompareConfig compare;
+  compare.methods = {Method::kTsdf, Method::kTsdfpp};
+  compare.profiles = {"close"};
+  compare.every = 8;
+  compare.until = "16";
+  compare.keep_meshes = true;
+  const auto compared = RunCompare(**source, compare, folder / "out", "the command", {});
+  ASSERT_TRUE(compared.has_value()) << compared.error().message;
+  for (const auto& run : compared->runs) {
+    EvaluateConfig config;
+    config.meshes = folder / "out" / run->FolderName() / "frames";
+    config.trajectories = folder / "out" / run->FolderName() / "trajectories";
+    config.frames = {8, 16};
+    config.removed = compared->movers;
+    const auto result = RunEvaluate(**source, config, {});
+    ASSERT_TRUE(result.has_value()) << result.error().message;
+    ASSERT_EQ(result->frames.size(), run->evaluations.size());
+    for (std::size_t i = 0; i < result->frames.size(); ++i) {
+      nlohmann::json expected = ToJson(run->evaluations[i]);
+      expected.erase("mesh_s");
+      expected.erase("evaluate_s");
+      EXPECT_EQ(Scores(result->frames[i]).dump(1), expected.dump(1)) << run->Title();
+    }
+    const auto& car = result->trajectories->objects.at(1);
+    EXPECT_EQ(car.frames, 16U);
+    EXPECT_LT(*car.ate_rmse_m.value, 1e-8);  // given poses
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp

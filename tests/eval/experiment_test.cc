@@ -1,0 +1,303 @@
+// Experiment files are read strictly, and say the cells that they stand for.
+#include "eval/experiment.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "eval/cell.h"
+#include "eval/sweep_statistics.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr const char* kGood = R"(name = "good"
+question = "Is it read?"
+metrics = ["table_preservation_behind_other"]
+[[grid]]
+scene = "mini.toml"
+method = ["tsdf", "anchored"]
+)";
+
+Expected<ExperimentConfig> Parse(const std::string& text) {
+  return ExperimentConfig::Parse(text, "folder/e.toml");
+}
+
+std::string Replaced(std::string text, const std::string& what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), by);
+}
+
+TEST(Experiment, ReadsWhatItSays) {
+  const auto config = Parse(kGood);
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto cells = CellsOf(*config);
+  ASSERT_EQ(cells.size(), 2U);
+  EXPECT_EQ(cells[0].settings.method, "tsdf");
+  EXPECT_EQ(cells[1].settings.method, "tsdf++/anchored");
+  EXPECT_EQ(cells[1].settings.scene, "mini.toml");
+  EXPECT_EQ(cells[1].grid, "1");
+}
+
+TEST(Experiment, FaultsGetOneSentenceWithFileLineAndKey) {
+  struct Case {
+    std::string text;
+    std::string sentence;
+  };
+  const std::string good = kGood;
+  const std::vector<Case> cases{
+      {Replaced(good, "question", "qestion"), "'question' is missing"},
+      {good + "voxel = 0.01\n", "e.toml:7: 'grid.voxel' is not a known key here"},
+      {Replaced(good, "table_preservation_behind_other", "kept"),
+       "e.toml:3: 'metrics' holds 'kept', expected one of table_preservation_behind_other"},
+      {good + "voxel_m = 0\n", "'grid.voxel_m' holds 0, expected a number from 0.0005 to 1"},
+      {good + "voxel_m = [0.01, \"b\"]\n", "'grid.voxel_m' holds a string"},
+      {good + "voxel_m = []\n", "'grid.voxel_m' is empty"},
+      {good + "voxel_m = [0.01, 0.01]\n", "'grid.voxel_m' holds 0.01 twice"},
+      {good + "speed = 1.5\n", "'grid.speed' holds 1.5, expected a whole number from 1"},
+      {good + "noise = -1\n", "'grid.noise' holds -1, expected a number from 0"},
+      {good + "seed = -1\n", "'grid.seed' holds -1, expected a whole number from 0"},
+      {good + "layers = 9\n", "'grid.layers' holds 9, expected a whole number from 1 to 8"},
+      {good + "sensor = \"kinetc\"\n", "sensor preset 'kinetc' does not exist"},
+      {good + "profile = \"near\"\n", "profile 'near' is unknown"},
+      {good + "poses = \"slam\"\n", "pose source 'slam' is unknown"},
+      {Replaced(good, "\"anchored\"", "\"kinfu\""), "method 'kinfu' is unknown"},
+      {Replaced(good, "\"tsdf\"", "\"anchored\""), "holds tsdf++/anchored twice"},
+      {Replaced(good, "\"tsdf\"", "\"tsdf++\""), "'baseline' is tsdf, which is not among"},
+      {Replaced(good, "scene = \"mini.toml\"\n", ""), "'grid' '1' has no scene"},
+      {Replaced(good, "\"good\"", "\"a/b\""), "'name' is 'a/b', expected letters"},
+      {Replaced(good, "[[grid]]", "[frames]\nscale = 0\n[[grid]]"), "'frames.scale' is 0"},
+      {Replaced(good, "[[grid]]", "[frames]\nuntil = \"now\"\n[[grid]]"),
+       "'frames.until' is 'now'"},
+      {Replaced(good, "[[grid]]", "[frames]\nuntil = 0\n[[grid]]"), "'frames.until' is 0"},
+      {Replaced(good, "[[grid]]", "[statistics]\nconfidence = 95\n[[grid]]"),
+       "'statistics.confidence' is 95"},
+      {Replaced(good, "[[grid]]", "[plot]\nx = \"voxels\"\n[[grid]]"), "'plot.x' is 'voxels'"},
+      {Replaced(good, "[[grid]]", "replicates = [\"method\"]\n[[grid]]"),
+       "'replicates' holds 'method'"},
+      {good + "[[grid]]\nname = \"1\"\n", "'grid.name' is '1', a second time"},
+      {good + "oops", "not valid TOML"},
+  };
+  for (const Case& c : cases) {
+    const auto config = Parse(c.text);
+    ASSERT_FALSE(config.has_value()) << c.sentence;
+    EXPECT_EQ(config.error().kind, ErrorKind::kUsage);
+    EXPECT_NE(config.error().message.find(c.sentence), std::string::npos)
+        << config.error().message << "\nexpected: " << c.sentence;
+    EXPECT_TRUE(config.error().message.starts_with("folder/e.toml")) << config.error().message;
+  }
+}
+
+// Each file of eval/experiments is read, and each of its cells fits its scene.
+TEST(Experiment, TheReadyOnesFitTheirScenes) {
+  int experiments = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(TSDFPP_SOURCE_DIR "/eval/experiments")) {
+    if (entry.path().filename() == "crowd.toml") continue;  // a scene
+    const auto config = ExperimentConfig::Load(entry.path());
+    ASSERT_TRUE(config.has_value()) << config.error().message;
+    EXPECT_EQ(config->name, entry.path().stem());
+    EXPECT_TRUE(config->plot.has_value() || config->name == "scenes") << config->name;
+    VariantMaker maker(entry.path().parent_path(), config->frames);
+    for (const PlannedCell& cell : CellsOf(*config)) {
+      // Scenes of other seeds take long to draw and say no more.
+      if (cell.settings.seed != 1) continue;
+      const auto variant = maker.Make(cell.settings);
+      ASSERT_TRUE(variant.has_value()) << config->name << ": " << variant.error().message;
+    }
+    ++experiments;
+  }
+  EXPECT_GE(experiments, 11);
+}
+
+TEST(Experiment, CellsAreAllCombinationsGridByGrid) {
+  const auto config = Parse(R"(name = "e"
+question = "?"
+metrics = ["fuse_ms"]
+[common]
+seed = [3, 4]
+voxel_m = 0.02
+[[grid]]
+scene = ["a.toml", "b.toml"]
+method = ["tsdf", "tsdf++"]
+voxel_m = [0.01, 0.02, 0.03]
+[[grid]]
+name = "alone"
+scene = "a.toml"
+method = "open3d"
+)");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto cells = CellsOf(*config);
+  ASSERT_EQ(cells.size(), 2U * 2U * 2U * 3U + 2U);
+  std::set<std::string> different;
+  for (const PlannedCell& cell : cells) {
+    different.insert(cell.grid + SettingsJson(cell.settings).dump());
+  }
+  EXPECT_EQ(different.size(), cells.size());
+  EXPECT_EQ(cells.front().settings.voxel_m, 0.01);
+  EXPECT_EQ(cells[1].settings.voxel_m, 0.02);
+  EXPECT_EQ(cells.back().settings.seed, 4U);
+  EXPECT_EQ(cells.back().settings.voxel_m, 0.02);
+  EXPECT_TRUE(cells.back().settings.is_open3d());
+}
+
+TEST(Experiment, SettingsComeBackFromJson) {
+  CellSettings settings;
+  settings.scene = "a.toml";
+  settings.seed = 77;
+  settings.sensor = "kinect";
+  settings.noise = 0;
+  settings.layers = 3;
+  settings.trunc_back = 5;
+  settings.resampling = "observed";
+  const auto back = SettingsFromJson(SettingsJson(settings));
+  ASSERT_TRUE(back.has_value()) << back.error().message;
+  EXPECT_EQ(SettingsJson(*back), SettingsJson(settings));
+  nlohmann::json broken = SettingsJson(settings);
+  broken["voxel_m"] = 7;
+  EXPECT_FALSE(SettingsFromJson(broken).has_value());
+  broken.erase("voxel_m");
+  EXPECT_FALSE(SettingsFromJson(broken).has_value());
+}
+
+// What makes no difference to a method makes no cell; what does, does.
+TEST(Experiment, TheKeyOfAMapIsWhatItDependsOn) {
+  const auto key = [](const std::string& method, const auto& change) {
+    CellSettings settings;
+    settings.method = method;
+    change(settings);
+    return MapKey(settings);
+  };
+  const auto nothing = [](CellSettings&) {};
+  const auto layers = [](int k) { return [k](CellSettings& s) { s.layers = k; }; };
+  EXPECT_EQ(key("tsdf", nothing), key("tsdf", layers(4)));
+  EXPECT_EQ(key("tsdf++", nothing), key("tsdf++", layers(2)));
+  EXPECT_NE(key("tsdf++", nothing), key("tsdf++", layers(4)));
+  EXPECT_EQ(key("tsdf++/anchored", nothing), key("tsdf++/anchored", layers(4)));
+  const auto back = [](CellSettings& s) { s.trunc_back = 10; };
+  const auto paper = [](CellSettings& s) { s.profile = "paper"; };
+  EXPECT_EQ(key("tsdf", back), key("tsdf", paper));
+  EXPECT_NE(key("tsdf", back), key("tsdf", nothing));
+  EXPECT_EQ(key("open3d", paper), key("open3d", nothing));
+  const auto observed = [](CellSettings& s) { s.resampling = "observed"; };
+  EXPECT_EQ(key("tsdf++/anchored", observed), key("tsdf++/anchored", nothing));
+  EXPECT_NE(key("tsdf++", observed), key("tsdf++", nothing));
+  const auto icp = [](CellSettings& s) { s.poses = "icp"; };
+  EXPECT_NE(key("tsdf", icp), key("tsdf", nothing));
+  const auto voxel = [](CellSettings& s) { s.voxel_m = 0.02; };
+  for (const char* method : {"tsdf", "tsdf++", "tsdf++/anchored", "volumes", "open3d"}) {
+    EXPECT_NE(key(method, voxel), key(method, nothing)) << method;
+  }
+}
+
+// A cell's id changes with program, renderer, frames and map, and with nothing else.
+TEST(Experiment, ACellIsNamedAfterAllThatDeterminesIt) {
+  SequenceVariant variant;
+  variant.scene_text = "scene";
+  variant.frames = {2, 4, 6};
+  variant.evaluated = {6};
+  variant.examined = 6;
+  const CellSettings settings;
+  const Cell cell = MakeCell(settings, variant, "p", "r");
+  std::set<std::string> ids{cell.id};
+  const auto expect_new = [&](const Cell& other, const char* what) {
+    EXPECT_TRUE(ids.insert(other.id).second) << what;
+  };
+  expect_new(MakeCell(settings, variant, "q", "r"), "program");
+  expect_new(MakeCell(settings, variant, "p", "s"), "renderer");
+  SequenceVariant other = variant;
+  other.scene_text = "scene two";
+  expect_new(MakeCell(settings, other, "p", "r"), "scene");
+  other = variant;
+  other.frames = {2, 6};
+  expect_new(MakeCell(settings, other, "p", "r"), "frames");
+  other = variant;
+  other.evaluated = {4, 6};
+  expect_new(MakeCell(settings, other, "p", "r"), "evaluations");
+  other = variant;
+  other.fuse_until = 4;
+  expect_new(MakeCell(settings, other, "p", "r"), "fuse_until");
+  other = variant;
+  other.object_error = 1;
+  expect_new(MakeCell(settings, other, "p", "r"), "object_error");
+  CellSettings coarse;
+  coarse.voxel_m = 0.02;
+  const Cell on_same_frames = MakeCell(coarse, variant, "p", "r");
+  expect_new(on_same_frames, "voxel size");
+  EXPECT_EQ(on_same_frames.sequence, cell.sequence);
+  CellSettings renamed;
+  renamed.scene = "another name of the same scene";
+  EXPECT_EQ(MakeCell(renamed, variant, "p", "r").id, cell.id);
+}
+
+TEST(Experiment, ACellComesBackFromItsFile) {
+  SequenceVariant variant;
+  variant.scene_text = "scene";
+  const Cell cell = MakeCell({}, variant, "p", "r");
+  CellResult result;
+  for (std::size_t m = 0; m < SweepMetrics().size(); ++m) {
+    result.examined.push_back(m % 3 == 0 ? Measured::Undefined("why " + SweepMetrics()[m].name)
+                                         : Measured::Of(0.1 * static_cast<double>(m) / 3));
+  }
+  result.frames.push_back({4, true, result.examined, "abc"});
+  result.frames.back().values.resize(EvaluationMetricCount());
+  result.removed = {1, 7};
+  result.image_digests = {{2, "x"}, {4, "y"}};
+  const std::string text = CellToJson(cell, result).dump();
+  const auto back = CellFromJson(text, cell);
+  ASSERT_TRUE(back.has_value()) << back.error().message;
+  EXPECT_EQ(CellToJson(cell, *back).dump(), text);
+  // Not of another key, not half of it.
+  EXPECT_FALSE(CellFromJson(text, MakeCell({}, variant, "q", "r")).has_value());
+  EXPECT_FALSE(CellFromJson(text.substr(0, text.size() / 2), cell).has_value());
+  EXPECT_FALSE(CellFromJson("{}", cell).has_value());
+}
+
+// Two methods on three seeds, one value of one method undefined: means over what is there, pairs
+// where both are; checked by hand.
+TEST(Experiment, ComparesPairByPair) {
+  SweepResult result;
+  auto config = Parse(kGood);
+  ASSERT_TRUE(config.has_value());
+  result.config = *config;
+  const SequenceVariant variant;
+  const auto add = [&](const char* method, std::uint64_t seed, std::optional<double> value) {
+    CellSettings settings;
+    settings.scene = "mini.toml";
+    settings.method = method;
+    settings.seed = seed;
+    CellResult cell;
+    cell.examined.assign(SweepMetrics().size(), Measured::Undefined("not asked"));
+    cell.examined[0] = value ? Measured::Of(*value) : Measured::Undefined("nothing hidden");
+    result.entries.push_back({"1", MakeCell(settings, variant, "p", "r"), cell});
+  };
+  add("tsdf", 1, 0.5);
+  add("tsdf", 2, 0.6);
+  add("tsdf", 3, 0.1);
+  add("tsdf++", 1, 0.9);
+  add("tsdf++", 2, 0.8);
+  add("tsdf++", 3, std::nullopt);
+  const auto conditions = ConditionsOf(result);
+  ASSERT_EQ(conditions.size(), 1U);
+  const Condition& condition = conditions.front();
+  EXPECT_EQ(condition.replicates, 3U);
+  const std::string metric = SweepMetrics()[0].name;
+  EXPECT_NEAR(*condition.means.at({"tsdf", metric}).mean.value, 0.4, 1e-12);
+  EXPECT_NEAR(*condition.means.at({"tsdf++", metric}).mean.value, 0.85, 1e-12);
+  EXPECT_EQ(condition.means.at({"tsdf++", metric}).count, 2U);
+  const PairedComparison& paired = condition.paired.at({"tsdf++", metric});
+  EXPECT_EQ(paired.pairs, 2U);
+  EXPECT_NEAR(*paired.mean_difference.value, 0.3, 1e-12);
+  EXPECT_EQ(*paired.superiority.value, 1.0);
+  // With two pairs the bootstrap sees 0.2, 0.3 and 0.4 alone.
+  ASSERT_TRUE(paired.interval.value.has_value());
+  EXPECT_NEAR(paired.interval.value->low, 0.2, 1e-12);
+  EXPECT_NEAR(paired.interval.value->high, 0.4, 1e-12);
+  EXPECT_FALSE(condition.paired.contains({"tsdf", metric}));
+  const std::string other = SweepMetrics()[1].name;
+  EXPECT_EQ(condition.means.at({"tsdf", other}).mean.why_not, "not asked");
+}
+
+}  // namespace
+}  // namespace tsdfpp

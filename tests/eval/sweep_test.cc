@@ -1,0 +1,304 @@
+// Experiments run by the command: what they say is what a comparison says, nothing runs twice, a
+// killed run goes on, and any frame can be made again.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "core/files.h"
+#include "eval/sequence_variant.h"
+#include "tests/cli/run_command.h"
+#include "tests/core/temp_folder.h"
+#include "tests/eval/tiny_scene.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::RunTsdfpp;
+
+constexpr int kFrames = 8;
+
+class Sweep : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(WriteFile(folder_ / "tiny.toml", test::TinyScene(kFrames) + R"(
+[experiment]
+reveal_frame = 7
+removed = ["car"]
+)")
+                    .has_value());
+  }
+  fs::path Experiment(const std::string& grid, const std::string& frames = "every = 2") {
+    const fs::path file = folder_ / "e.toml";
+    EXPECT_TRUE(WriteFile(file, fmt::format(R"(name = "e"
+question = "Does it run?"
+metrics = ["table_preservation_behind_other", "movers_completion"]
+[frames]
+{}
+[[grid]]
+scene = "tiny.toml"
+{}
+)",
+                                            frames, grid))
+                    .has_value());
+    return file;
+  }
+  json RunSweep(const fs::path& file, const std::string& out,
+                const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"sweep", file.string(), "--json", "--out", folder_ / out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto ran = RunTsdfpp(arguments, folder_.path());
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return json::parse(ran.out, nullptr, false);
+  }
+  std::string Bytes(const fs::path& file) {
+    const auto bytes = ReadFile(folder_ / file.string());
+    EXPECT_TRUE(bytes.has_value()) << file;
+    return bytes.value_or("");
+  }
+  // What a cell says but for times.
+  json Timeless(const fs::path& cell) {
+    json read = json::parse(Bytes(cell), nullptr, false);
+    read.erase("times");
+    for (const char* timed : {"move_ms", "fuse_ms", "mesh_ms"}) read["examined"].erase(timed);
+    for (const char* timed : {"mesh_s", "evaluate_s"}) read["evaluation"].erase(timed);
+    return read;
+  }
+  std::set<std::string> CellFiles(const std::string& out) {
+    std::set<std::string> files;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder_ / out / "cells", none)) {
+      files.insert(entry.path().filename().string());
+    }
+    return files;
+  }
+  test::TempFolder folder_;
+};
+
+TEST_F(Sweep, SaysWhatACompareSays) {
+  const json swept = RunSweep(
+      Experiment("method = [\"tsdf\", \"tsdf++\", \"tsdf++/anchored\"]\nvoxel_m = 0.02"), "out");
+  const auto compared =
+      RunTsdfpp({"compare", folder_ / "tiny.toml", "--out", folder_ / "compared", "--profiles",
+                 "close", "--voxel", "0.02", "--every", "1000", "--json"},
+                folder_.path());
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const json summary = json::parse(compared.out);
+  ASSERT_EQ(swept.at("cells").size(), 3U);
+  int met = 0;
+  for (const auto& [id, cell] : swept.at("cells").items()) {
+    for (const json& run : summary.at("runs")) {
+      if (run.at("method") != cell.at("settings").at("method")) continue;
+      ++met;
+      const json& table = run.at("examined").at("objects").at(0);
+      EXPECT_EQ(cell.at("examined").at("table_preservation_behind_other"),
+                table.at("preservation_behind_other"));
+      EXPECT_EQ(cell.at("examined").at("visible_completion"),
+                run.at("examined").at("visible_completion"));
+      EXPECT_EQ(cell.at("examined").at("ghost_area_cm2").get<double>(),
+                1e4 * run.at("examined").at("ghost_area_m2").get<double>());
+    }
+    EXPECT_TRUE(cell.at("examined").at("table_preservation_behind_other").is_number());
+  }
+  EXPECT_EQ(met, 3);
+}
+
+TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
+  const fs::path file =
+      Experiment("method = [\"tsdf\", \"tsdf++\", \"open3d\"]\nseed = [1, 2]\nvoxel_m = 0.02", "");
+  EXPECT_EQ(RunSweep(file, "one", {"--jobs", "1"}).at("run_now"), 6);
+  EXPECT_EQ(RunSweep(file, "two", {"--jobs", "2"}).at("run_now"), 6);
+  ASSERT_EQ(CellFiles("one").size(), 6U);
+  ASSERT_EQ(CellFiles("one"), CellFiles("two"));
+  for (const std::string& cell : CellFiles("one")) {
+    EXPECT_EQ(Timeless(fs::path("one/cells") / cell), Timeless(fs::path("two/cells") / cell));
+  }
+  // Nothing, then what is missing or damaged alone; the others' files stay as they are, times too.
+  const std::string csv = Bytes("one/results.csv");
+  EXPECT_EQ(RunSweep(file, "one").at("run_now"), 0);
+  EXPECT_EQ(Bytes("one/results.csv"), csv);
+  const std::string first = *CellFiles("one").begin();
+  const std::string last = *CellFiles("one").rbegin();
+  const std::string kept = Bytes(fs::path("one/cells") / last);
+  const json before = Timeless(fs::path("one/cells") / first);
+  ASSERT_TRUE(WriteFile(folder_ / "one" / "cells" / first, kept.substr(0, 40)).has_value());
+  EXPECT_EQ(RunSweep(file, "one").at("run_now"), 1);
+  EXPECT_EQ(Timeless(fs::path("one/cells") / first), before);
+  EXPECT_EQ(Bytes(fs::path("one/cells") / last), kept);
+  // A larger experiment adds what is new.
+  EXPECT_EQ(RunSweep(Experiment("method = [\"tsdf\", \"tsdf++\", \"open3d\"]\nseed = [1, 2]\n"
+                                "voxel_m = [0.02, 0.03]",
+                                ""),
+                     "one")
+                .at("run_now"),
+            6);
+}
+
+TEST_F(Sweep, AKilledRunLeavesNoHalfCellAndGoesOn) {
+  const fs::path file =
+      Experiment("method = [\"tsdf\", \"tsdf++\"]\nseed = [1, 2, 3]\nvoxel_m = 0.02", "");
+  for (const int signal : {SIGINT, SIGKILL}) {
+    const std::string out = fmt::format("out{}", signal);
+    const pid_t process = fork();
+    if (process == 0) {
+      const int nowhere = open("/dev/null", O_WRONLY);
+      dup2(nowhere, STDERR_FILENO);
+      dup2(nowhere, STDOUT_FILENO);
+      execl(TSDFPP_COMMAND, TSDFPP_COMMAND, "sweep", file.c_str(), "--jobs", "1", "--out",
+            (folder_ / out).c_str(), nullptr);
+      _exit(127);
+    }
+    // Until the first sequence's cells are there and the others are not.
+    while (CellFiles(out).size() < 2 && waitpid(process, nullptr, WNOHANG) == 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    kill(process, signal);
+    int status = 0;
+    waitpid(process, &status, 0);
+    EXPECT_TRUE(WIFSIGNALED(status));
+    EXPECT_EQ(WTERMSIG(status), signal);
+    int whole = 0;
+    for (const std::string& cell : CellFiles(out)) {
+      if (!cell.ends_with(".json")) continue;
+      EXPECT_FALSE(
+          json::parse(Bytes(fs::path(out) / "cells" / cell), nullptr, false).is_discarded());
+      ++whole;
+    }
+    EXPECT_GE(whole, 1);
+    EXPECT_FALSE(fs::exists(folder_ / out / "results.json"));
+    EXPECT_EQ(RunSweep(file, out).at("run_now"), 6 - whole);
+    EXPECT_EQ(CellFiles(out).size(), 6U);
+    for (const std::string& cell : CellFiles(out)) EXPECT_TRUE(cell.ends_with(".json")) << cell;
+  }
+}
+
+TEST_F(Sweep, WhatDoesNotFitASceneGetsASentence) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"noise = 2", "noise is 2, but sensor 'scene' has exact depth"},
+      {"objects = 3", "objects is 3, but the scene has 2"},
+      {"mask_faults = 5", "rate"},
+      {"sensor = \"masks_mild\"\nmask_faults = 1", "has mask faults of its own"},
+      {"sensor = \"pose_drift\"\ncamera_error = 1", "has pose errors of its own"},
+      {"speed = 100", "expected 2 or more"},
+      {"fuse_until = 8", "fuse_until is 8, but the last frame is 7"},
+  };
+  for (const auto& [grid, sentence] : cases) {
+    const auto ran = RunTsdfpp(
+        {"sweep", Experiment("method = \"tsdf\"\n" + grid).string(), "--out", folder_ / "out"},
+        folder_.path());
+    EXPECT_EQ(ran.exit_code, 2) << grid;
+    EXPECT_NE(ran.err.find(sentence), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("grid '1'"), std::string::npos) << ran.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  }
+}
+
+TEST_F(Sweep, AnyFrameCanBeMadeAgain) {
+  const json swept = RunSweep(
+      Experiment("method = [\"tsdf\", \"tsdf++\"]\nvoxel_m = 0.02\nsensor = \"nguyen2012\"\n"
+                 "object_error = 1"),
+      "out");
+  for (const auto& [id, cell] : swept.at("cells").items()) {
+    for (const int frame : {3, 6}) {  // evaluated; not evaluated
+      const auto replay = [&](const std::string& out) {
+        const auto ran =
+            RunTsdfpp({"replay", folder_ / "out", "--cell", id.substr(0, 12), "--frame",
+                       std::to_string(frame), "--out", folder_ / out, "--json"},
+                      folder_.path());
+        EXPECT_EQ(ran.exit_code, 0) << ran.err;
+        return json::parse(ran.out, nullptr, false);
+      };
+      const std::string name = fmt::format("{}-{}", id, frame);
+      const json first = replay(name);
+      const json again = replay(name + "-again");
+      EXPECT_EQ(first.at("compared_map_frame"), frame == 3 ? 3 : 5);
+      for (const json& file : first.at("files")) {
+        const std::string path = file.get<std::string>();
+        EXPECT_EQ(Bytes(fs::path(name) / path), Bytes(fs::path(name + "-again") / path)) << path;
+      }
+      const auto has = [&](const char* file) { return fs::exists(folder_ / name / file); };
+      for (const char* file : {"camera/colour.png", "camera/depth.exr", "camera/mask.png",
+                               "views/depth-1.exr", "slice.png", "scene.ply"}) {
+        EXPECT_TRUE(has(file)) << file;
+      }
+      const json noted = json::parse(Bytes(fs::path("out/cells") / (id + ".json")));
+      EXPECT_EQ(first.at("image_digest"), noted.at("images").at(std::to_string(frame)));
+    }
+  }
+  const std::string id = swept.at("cells").items().begin().key();
+  const auto wrong = [&](const std::string& cell, const char* frame) {
+    const auto ran = RunTsdfpp(
+        {"replay", folder_ / "out", "--cell", cell, "--frame", frame, "--out", folder_ / "none"},
+        folder_.path());
+    EXPECT_FALSE(fs::exists(folder_ / "none"));
+    return fmt::format("{} {}", ran.exit_code, ran.err);
+  };
+  EXPECT_TRUE(wrong("nocell", "3").starts_with("2 ")) << wrong("nocell", "3");
+  EXPECT_TRUE(wrong(id, "8").starts_with("2 ")) << wrong(id, "8");
+  // What is not what it was is said, and not written.
+  const fs::path file = folder_ / "out" / "cells" / (id + ".json");
+  json noted = json::parse(Bytes(fs::path("out/cells") / (id + ".json")));
+  noted["images"]["3"] = "0000000000000000";
+  ASSERT_TRUE(WriteFile(file, noted.dump()).has_value());
+  EXPECT_TRUE(wrong(id, "3").starts_with("4 ")) << wrong(id, "3");
+  EXPECT_NE(wrong(id, "3").find("are not what they were"), std::string::npos);
+}
+
+// Draws of object poses: of the stated size, each frame alone, the truth untouched; and blind
+// frames.
+TEST_F(Sweep, GivenPosesAreOffAndLateFramesAreBlind) {
+  CellSettings settings;
+  settings.scene = "tiny.toml";
+  settings.object_error = 2;
+  settings.fuse_until = 5;
+  VariantMaker maker(folder_.path(), FrameChoice{});
+  auto variant = maker.Make(settings);
+  ASSERT_TRUE(variant.has_value()) << variant.error().message;
+  auto source = VariantSource::Open(*variant);
+  ASSERT_TRUE(source.has_value()) << source.error().message;
+  double squares = 0;
+  int count = 0;
+  for (int index = 1; index <= 7; ++index) {
+    const auto both = source->Read(index);
+    ASSERT_TRUE(both.has_value());
+    for (const InstanceId id : {1, 2}) {
+      const Pose off = both->truth.T_WO.at(id).inverse() * both->frame.T_WO.at(id);
+      squares += off.translation().squaredNorm();
+      ++count;
+    }
+    EXPECT_EQ(cv::countNonZero(both->frame.depth) == 0, index > 5) << index;
+    EXPECT_EQ(cv::countNonZero(both->truth.depth) == 0, index > 5) << index;
+  }
+  // Fourteen draws of three axes of 2 mm: within a half of it.
+  const double sigma_m = std::sqrt(squares / (3 * count));
+  EXPECT_GT(sigma_m, 0.001);
+  EXPECT_LT(sigma_m, 0.003);
+}
+
+TEST_F(Sweep, FramesAreCountedFromTheExaminedOne) {
+  CellSettings settings;
+  settings.scene = "tiny.toml";
+  settings.speed = 2;
+  FrameChoice choice;
+  choice.every = 2;
+  choice.until = "end";
+  VariantMaker maker(folder_.path(), choice);
+  const auto variant = maker.Make(settings);
+  ASSERT_TRUE(variant.has_value()) << variant.error().message;
+  EXPECT_EQ(variant->frames, (std::vector<int>{1, 3, 5, 7}));
+  EXPECT_EQ(variant->evaluated, (std::vector<int>{3, 7}));
+  EXPECT_EQ(variant->examined, 7);
+}
+
+}  // namespace
+}  // namespace tsdfpp

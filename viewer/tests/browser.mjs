@@ -1,0 +1,392 @@
+// The report in a real, headless Chromium: node browser.mjs DEPENDENCIES TSDFPP CHROMIUM FOLDER
+// [--update]. Makes a small comparison in FOLDER, its reports, and uses them as a reader would.
+// --update writes the reference pictures in references/ anew.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { cpSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { dirname, join, resolve } from 'node:path';
+import { fileURLToPath, pathToFileURL } from 'node:url';
+import { compareImages } from './perceptual.mjs';
+
+const [dependencies, tsdfpp, chromiumPath, folder] = process.argv.slice(2);
+const update = process.argv.includes('--update');
+const { chromium } = createRequire(join(resolve(dependencies), 'node_modules', 'x.js'))('playwright-core');
+const references = join(dirname(fileURLToPath(import.meta.url)), 'references');
+const scenes = resolve(dirname(fileURLToPath(import.meta.url)), '../../scenes');
+const kSlow_ms = 240000;  // a loaded machine with a software renderer
+const kBad = '<img src=x onerror="window.pwned=1"></script><script>window.pwned=1</script>';
+
+function command(...parts) {
+  execFileSync(tsdfpp, parts, { stdio: ['ignore', 'ignore', 'inherit'] });
+}
+
+// A comparison of 16 frames, its report, one without a recording, and one whose every name is bad.
+function makeRuns() {
+  rmSync(folder, { recursive: true, force: true });
+  mkdirSync(folder, { recursive: true });
+  const run = join(folder, 'run');
+  command('compare', join(scenes, 'mini.toml'), '--out', run, '--until', '16', '--every', '8', '--profiles', 'paper',
+          '--methods', 'tsdf,tsdf++/anchored', '--record');
+  command('report', run);
+  const plain = join(folder, 'plain');
+  cpSync(run, plain, { recursive: true });
+  rmSync(join(plain, 'record'), { recursive: true });
+  command('report', plain);
+  const bad = join(folder, 'bad');
+  cpSync(run, bad, { recursive: true });
+  const edit = (name, change) => {
+    const value = JSON.parse(readFileSync(join(bad, name), 'utf8'));
+    change(value);
+    writeFileSync(join(bad, name), JSON.stringify(value));
+  };
+  edit('summary.json', (summary) => {
+    summary.sequence = kBad;
+    summary.command = kBad;
+    summary.runs.forEach((each) => {
+      each.title = `${each.title} ${kBad}`;
+      each.examined.objects.forEach((object) => { object.name = kBad; });
+      each.settings[kBad] = kBad;
+    });
+  });
+  edit('record/record.json', (record) => record.objects.forEach((object) => { object.name = kBad; }));
+  command('report', bad);
+  command('report', run, '--compare', plain, '--out', join(folder, 'both.html'));
+}
+
+const tests = [];
+const test = (name, body) => tests.push({ name, body });
+
+// A page that fails the test on any error, message of the console, or request to anywhere.
+async function open(browser, file, options = {}) {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 900 }, colorScheme: 'light', ...options });
+  page.setDefaultTimeout(kSlow_ms);
+  page.faults = [];
+  page.on('console', (message) => {
+    // A software renderer says that reading its pixels is slow.
+    if (['error', 'warning'].includes(message.type()) && !/GPU stall due to ReadPixels/.test(message.text())) {
+      page.faults.push(message.text());
+    }
+  });
+  page.on('pageerror', (error) => page.faults.push(error.message));
+  page.on('dialog', (dialog) => { page.faults.push(`dialog ${dialog.message()}`); dialog.dismiss(); });
+  page.on('request', (request) => {
+    if (!/^(file|data|blob):/.test(request.url())) page.faults.push(`request ${request.url()}`);
+  });
+  await page.goto(pathToFileURL(file).href);
+  await page.waitForFunction(() => window.report);
+  return page;
+}
+
+const report = (name) => join(folder, name, 'report.html');
+
+// The 3-D view, drawn, with nothing left to do.
+async function showView(page) {
+  await page.locator('#view').scrollIntoViewIfNeeded();
+  await page.waitForFunction(() => document.getElementById('view').view?.renderer);
+  await settled(page);
+}
+
+async function settled(page) {
+  await page.waitForFunction(() => {
+    const { view } = document.getElementById('view');
+    const ready = view.runs.every((run) => view.frames.get(run.key)?.get(view.frame)?.userData?.camera);
+    return ready && view.frame === window.report.state.get('frame');
+  });
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
+}
+
+// The canvas as a PNG, 320 pixels wide, drawn now.
+function snapshot(page) {
+  return page.evaluate(() => {
+    const { view } = document.getElementById('view');
+    view.render();
+    const from = view.renderer.domElement;
+    const to = document.createElement('canvas');
+    to.width = 320;
+    to.height = Math.round((320 * from.height) / from.width);
+    const context = to.getContext('2d');
+    context.fillStyle = '#f1efea';
+    context.fillRect(0, 0, to.width, to.height);
+    context.imageSmoothingQuality = 'high';
+    context.drawImage(from, 0, 0, to.width, to.height);
+    return to.toDataURL('image/png');
+  });
+}
+
+async function matchesReference(page, name) {
+  const picture = await snapshot(page);
+  const path = join(references, `${name}.png`);
+  if (update) {
+    mkdirSync(references, { recursive: true });
+    writeFileSync(path, Buffer.from(picture.split(',')[1], 'base64'));
+    return;
+  }
+  const reference = `data:image/png;base64,${readFileSync(path).toString('base64')}`;
+  const difference = await compareImages(page, picture, reference);
+  if (!difference.alike) writeFileSync(join(folder, `${name}-now.png`), Buffer.from(picture.split(',')[1], 'base64'));
+  assert.ok(difference.alike, `${name} differs from its reference: ${JSON.stringify(difference)}; see ${folder}`);
+}
+
+const set = (page, values) => page.evaluate((changes) => window.report.state.set(changes), values);
+
+test('loads quietly, says its verdict, asks for nothing', async (browser) => {
+  const page = await open(browser, report('run'));
+  assert.match(await page.locator('h1').textContent(), /can no longer see/);
+  assert.match(await page.locator('.verdict').textContent(), /tsdf\+\+\/anchored keeps \d+\.\d % of the hidden table/);
+  assert.equal(await page.locator('.card').count(), 3);
+  assert.equal(await page.locator('table.figure tbody tr').count(), 3);
+  const broken = await page.evaluate(async () => {
+    const images = [...document.images];
+    images.forEach((image) => { image.loading = 'eager'; });
+    await Promise.all(images.map((image) => image.decode().catch(() => {})));
+    return images.filter((image) => image.naturalWidth === 0).map((image) => image.alt);
+  });
+  assert.deepEqual(broken, []);
+  return page;
+});
+
+test('the view draws, and the pictures are those of the references', async (browser) => {
+  const page = await open(browser, report('run'));
+  await showView(page);
+  await matchesReference(page, 'view-in-place');
+  const before = await snapshot(page);
+  await set(page, { pull: 1 });
+  await settled(page);
+  await matchesReference(page, 'view-pulled-away');
+  const after = await snapshot(page);
+  // The comparison sees what matters here: a car that is gone, another colouring.
+  assert.ok(!(await compareImages(page, before, after)).alike, 'the comparison is blind');
+  await set(page, { colour: 'error' });
+  await settled(page);
+  assert.ok(!(await compareImages(page, after, await snapshot(page))).alike, 'colouring by error changes nothing');
+  await set(page, { colour: 'object', pull: 0, frame: 8 });
+  await settled(page);
+  await matchesReference(page, 'view-frame-8');
+  return page;
+});
+
+test('the slider moves the frame everywhere, by mouse and by keyboard', async (browser) => {
+  const page = await open(browser, report('run'));
+  await showView(page);
+  assert.equal(await page.locator('.frame-number').textContent(), 'frame 16');
+  const colour = page.locator('.images img').first();
+  const image = await colour.getAttribute('src');
+  await page.locator('#frame').focus();
+  await page.keyboard.press('ArrowLeft');
+  await settled(page);
+  assert.equal(await page.locator('.frame-number').textContent(), 'frame 8');
+  assert.notEqual(await colour.getAttribute('src'), image);
+  assert.equal(await page.evaluate(() => document.getElementById('view').view.frame), 8);
+  await page.locator('.play').click();
+  await page.waitForFunction(() => window.report.state.get('frame') === 16);
+  return page;
+});
+
+test('pulling the objects away shows what is remembered and what is lost', async (browser) => {
+  const page = await open(browser, report('run'));
+  await showView(page);
+  const shown = () => page.evaluate(() => {
+    const { view } = document.getElementById('view');
+    return view.runs.map((run) => Object.fromEntries(view.frames.get(run.key).get(view.frame).userData.chunks
+      .map((object) => [object.userData.chunk.layer, object.visible])));
+  });
+  for (const layers of await shown()) assert.ok(layers.mover && !layers.revealed && !layers.hole);
+  await page.locator('#pull').evaluate((slider) => { slider.value = '50'; slider.dispatchEvent(new Event('input')); });
+  const half = await shown();
+  assert.ok(half.some((layers) => layers.revealed), 'no map remembers anything');
+  assert.ok(half.some((layers) => layers.hole), 'no map lost anything');
+  await page.locator('#pull').evaluate((slider) => { slider.value = '100'; slider.dispatchEvent(new Event('input')); });
+  for (const layers of await shown()) assert.ok(!layers.mover && !layers.gone);
+  return page;
+});
+
+test('a click in the view says what is there, and so does Enter', async (browser) => {
+  const page = await open(browser, report('run'));
+  await showView(page);
+  await page.evaluate(() => {
+    const { view } = document.getElementById('view');
+    view.lookAsCamera(window.report.data.reports[0].recording, window.report.state.get('frame'));
+  });
+  await settled(page);
+  // Where the car is on the screen, by its own vertices.
+  const place = await page.evaluate(() => {
+    const { view } = document.getElementById('view');
+    const run = view.runs[1];
+    const car = view.frames.get(run.key).get(view.frame).userData.chunks.find((o) => o.userData.chunk.layer === 'mover');
+    car.geometry.computeBoundingSphere();
+    const at = car.geometry.boundingSphere.center.clone().project(view.camera);
+    const box = view.panels()[1].querySelector('.stage').getBoundingClientRect();
+    return { x: box.left + ((at.x + 1) / 2) * box.width, y: box.top + ((1 - at.y) / 2) * box.height };
+  });
+  await page.mouse.click(place.x, place.y);
+  const said = await page.locator('.picked').textContent();
+  assert.match(said, /anchored.*car \(id 1\).* mm from the true surface; .*; at -?\d/);
+  assert.equal(await page.locator('.mark:visible').count(), 2);
+  await page.locator('.panels').focus();
+  await page.keyboard.press('Enter');
+  assert.notEqual(await page.locator('.picked').textContent(), said);
+  const eye = () => page.evaluate(() => document.getElementById('view').view.camera.position.toArray());
+  const before = await eye();
+  await page.keyboard.press('ArrowRight');
+  assert.notDeepEqual(await eye(), before);
+  return page;
+});
+
+test('plots show values and a click on one jumps to the frame', async (browser) => {
+  const page = await open(browser, report('run'));
+  const chart = page.locator('[data-chart="Memory of the map"] .u-over');
+  await chart.scrollIntoViewIfNeeded();
+  const box = await chart.boundingBox();
+  await page.mouse.move(box.x + 0.3 * box.width, box.y + 0.5 * box.height);
+  await page.waitForFunction(() => /\d MB/.test(document.querySelector('[data-chart="Memory of the map"] .u-legend').textContent));
+  await page.mouse.click(box.x + 0.3 * box.width, box.y + 0.5 * box.height);
+  assert.equal(await page.evaluate(() => window.report.state.get('frame')), 8);
+  await page.mouse.click(box.x + 0.97 * box.width, box.y + 0.5 * box.height);
+  assert.equal(await page.evaluate(() => window.report.state.get('frame')), 16);
+  return page;
+});
+
+test('tables sort and leave as CSV', async (browser) => {
+  const page = await open(browser, report('run'));
+  const table = page.locator('[data-table="figures"]');
+  const column = async () => (await table.locator('tbody tr td:nth-child(2)').allTextContents()).map(Number);
+  await table.locator('thead button').nth(1).click();
+  const up = await column();
+  assert.deepEqual(up, [...up].sort((a, b) => a - b));
+  await table.locator('thead button').nth(1).click();
+  assert.deepEqual(await column(), [...up].reverse());
+  assert.equal(await table.locator('[aria-sort="descending"]').count(), 1);
+  const [download] = await Promise.all([page.waitForEvent('download'), table.locator('.save').click()]);
+  const path = join(folder, 'figures.csv');
+  await download.saveAs(path);
+  const lines = readFileSync(path, 'utf8').trim().split('\n');
+  assert.equal(lines.length, 3);
+  assert.match(lines[0], /^Map,Hidden table kept \(%\),/);
+  return page;
+});
+
+test('a malicious name does nothing but be shown', async (browser) => {
+  const page = await open(browser, report('bad'));
+  await showView(page);
+  await page.evaluate(() => scrollTo(0, document.body.scrollHeight));
+  await page.waitForTimeout(300);
+  assert.equal(await page.evaluate(() => window.pwned), undefined);
+  assert.ok((await page.locator('.kicker').textContent()).includes(kBad));
+  assert.ok((await page.locator('.legend').textContent()).includes(kBad));
+  assert.equal(await page.locator('img[src="x"]').count(), 0);
+  return page;
+});
+
+test('what gets in as markup is still refused by the policy', async (browser) => {
+  const page = await open(browser, report('run'));
+  await page.evaluate(() => {
+    const box = document.createElement('div');
+    box.innerHTML = '<img src="data:," onerror="window.pwned=1">';
+    document.body.append(box);
+  });
+  await page.waitForTimeout(300);
+  assert.equal(await page.evaluate(() => window.pwned), undefined);
+  page.faults = page.faults.filter((fault) => !/Content Security Policy/.test(fault));
+  return page;
+});
+
+test('two comparisons stand beside each other', async (browser) => {
+  const page = await open(browser, join(folder, 'both.html'));
+  assert.equal(await page.locator('[data-table="figures"] tbody tr').count(), 4);
+  const words = await page.locator('[data-table="compared"] tbody tr td:last-child').allTextContents();
+  assert.ok(words.length > 10 && words.every((word) => word === 'same'));
+  return page;
+});
+
+test('without a recording there are still pictures, plots and tables', async (browser) => {
+  const page = await open(browser, report('plain'));
+  assert.match(await page.locator('#view').textContent(), /without --record/);
+  assert.ok(await page.locator('#figure img').count() >= 1);
+  await page.locator('.u-over').first().waitFor();
+  return page;
+});
+
+test('a phone has no sideways scroll, in the dark, and its text can be read', async (browser) => {
+  const page = await open(browser, report('run'), { viewport: { width: 390, height: 844 }, colorScheme: 'dark', isMobile: true, hasTouch: true });
+  await showView(page);
+  const widths = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+  assert.ok(widths[0] <= widths[1], `the page is ${widths[0]} wide on a screen of ${widths[1]}`);
+  assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark');
+  return page;
+});
+
+for (const colorScheme of ['light', 'dark']) {
+  test(`text has the contrast of WCAG AA (4.5) in ${colorScheme}`, async (browser) => {
+    const page = await open(browser, report('run'), { colorScheme });
+    const poor = await page.evaluate(() => {
+      const channels = (text) => text.match(/[\d.]+/g).map(Number);
+      const light = ([r, g, b]) => [r, g, b].map((c) => c / 255)
+        .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
+        .reduce((sum, c, i) => sum + [0.2126, 0.7152, 0.0722][i] * c, 0);
+      const background = (element) => {
+        for (let each = element; each; each = each.parentElement) {
+          const colour = channels(getComputedStyle(each).backgroundColor);
+          if (colour.length === 3 || colour[3] > 0.99) return colour;
+        }
+        return [255, 255, 255];
+      };
+      const found = [];
+      for (const element of document.querySelectorAll('main *')) {
+        const text = [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+        if (!text || element.closest('.u-over')) continue;
+        const [a, b] = [light(channels(getComputedStyle(element).color)), light(background(element))].sort((x, y) => y - x);
+        if ((a + 0.05) / (b + 0.05) < 4.5) found.push(`${element.className || element.tagName}: ${element.textContent.slice(0, 30)}`);
+      }
+      return found;
+    });
+    assert.deepEqual(poor, []);
+    return page;
+  });
+}
+
+test('without WebGL the view is pictures', async (_, launch) => {
+  const browser = await launch(['--disable-3d-apis']);
+  const page = await open(browser, report('run'));
+  page.faults = [];  // Chromium itself says that there is no WebGL
+  await page.locator('#view .still img').first().waitFor();
+  assert.equal(await page.locator('#view .still img').count(), 2);
+  const before = await page.locator('#view .still img').first().getAttribute('src');
+  await page.locator('#pull').evaluate((slider) => { slider.value = '100'; slider.dispatchEvent(new Event('input')); });
+  assert.notEqual(await page.locator('#view .still img').first().getAttribute('src'), before);
+  await page.locator('.u-over').first().waitFor();
+  return page;
+});
+
+async function run() {
+  makeRuns();
+  const launch = (more = []) => chromium.launch({
+    executablePath: chromiumPath, timeout: kSlow_ms,
+    args: ['--no-sandbox', '--disable-dev-shm-usage', '--force-color-profile=srgb',
+           ...(more.length ? more : ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'])],
+  });
+  const browsers = [];
+  const launched = async (more) => { browsers.push(await launch(more)); return browsers.at(-1); };
+  const browser = await launched();
+  let failures = 0;
+  for (const { name, body } of tests) {
+    const start = Date.now();
+    let fault = null;
+    try {
+      const page = await body(browser, launched);
+      if (page.faults.length) fault = `the page says: ${page.faults.join(' | ')}`;
+      await page.close();
+    } catch (error) {
+      fault = error.stack;
+    }
+    console.log(`${fault ? 'FAILED' : 'ok'}  ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
+    if (fault) {
+      console.log(`    ${fault}`);
+      ++failures;
+    }
+  }
+  for (const each of browsers) await each.close();
+  console.log(failures ? `${failures} of ${tests.length} tests failed` : `${tests.length} tests passed`);
+  process.exitCode = failures ? 1 : 0;
+}
+await run();
