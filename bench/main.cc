@@ -121,7 +121,8 @@ void AddScaling(CLI::App& app, Chosen& chosen) {
   command->add_option("--parts", options->parts, "Some of them")
       ->delimiter(',')
       ->capture_default_str();
-  AddCount(command, "--frames", options->frames, "Of the long runs", 1000, 10000000);
+  AddCount(command, "--frames", options->frames, "Of the long runs, a multiple of 1000", 1000,
+           10000000);
   AddCount(command, "--runs", options->runs, "Of the others", 1, 1000);
   command->callback([=, &chosen] { chosen = [=] { return RunScaling(*options); }; });
 }
@@ -158,7 +159,14 @@ int main(int argc, char** argv) {
     benchmark::RunSpecifiedBenchmarks();
     return 0;
   }
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "tsdfpp_bench: %s (see tsdfpp_bench %s --help)\n", error.what(), argv[1]);
+    return static_cast<int>(tsdfpp::ErrorKind::kUsage);
+  }
   const auto done = chosen();
   if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());

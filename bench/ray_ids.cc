@@ -61,7 +61,9 @@ struct Row {
   Method method;
   bool moved;
 };
-constexpr std::array<Row, 5> kRows{{{"tsdf++", Method::kTsdfpp, false},
+constexpr std::array<Row, 7> kRows{{{"tsdf", Method::kTsdf, false},
+                                    {"tsdf++/literal", Method::kTsdfppLiteral, false},
+                                    {"tsdf++", Method::kTsdfpp, false},
                                     {"tsdf++/anchored", Method::kTsdfppAnchored, false},
                                     {"tsdf++/anchored, all moved", Method::kTsdfppAnchored, true},
                                     {"volumes", Method::kVolumes, false},
@@ -102,15 +104,19 @@ std::vector<SplitTiming> CastSplitIds(const std::vector<Frame>& frames, const Ma
     }
     constexpr double kNone = std::numeric_limits<double>::infinity();
     SplitTiming best{row.name, std::vector<double>(maps.size(), kNone),
-                     std::vector<double>(maps.size(), kNone)};
+                     std::vector<double>(maps.size(), kNone), std::vector<double>(maps.size())};
     // In turn, so that what else the machine does meets all of them.
     for (int repeat = 0; repeat < repeats; ++repeat) {
       for (std::size_t m = 0; m < maps.size(); ++m) {
         const double wall = WallMilliseconds();
         const double cpu = CpuMilliseconds();
-        maps[m]->CastRays(frames[count - 1].intrinsics, frames[count - 1].T_WC, options);
+        const std::vector<RaySurface> surfaces =
+            maps[m]->CastRays(frames[count - 1].intrinsics, frames[count - 1].T_WC, options);
         best.wall_ms[m] = std::min(best.wall_ms[m], WallMilliseconds() - wall);
         best.cpu_ms[m] = std::min(best.cpu_ms[m], CpuMilliseconds() - cpu);
+        const cv::Mat& depth = surfaces.front().depth;
+        best.hit[m] =
+            static_cast<double>(cv::countNonZero(depth)) / static_cast<double>(depth.total());
       }
     }
     timings.push_back(std::move(best));

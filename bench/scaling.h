@@ -12,20 +12,22 @@ namespace tsdfpp {
 struct ScalingOptions {
   std::string out = "out/scaling";
   std::vector<std::string> parts{"frames", "surface", "threads", "poses", "ids"};
-  int frames = 10000;  // of the long runs
+  int frames = 10000;  // of the long runs, a multiple of kLongRunUnit
   int runs = 5;        // of what is measured over and over
 };
+inline constexpr int kLongRunUnit = 1000;  // frames: tenths that all show the same
 
-// Errors: kUsage for an unknown part, else those of the scenes and the renderer, kEnvironment where
-// `out` cannot be written.
+// Also writes machine.csv: the processor, its cores and what else it had to do. Errors: kUsage for
+// an unknown part or a number of frames that is no multiple, else those of the scenes and the
+// renderer, kEnvironment where `out` cannot be written.
 Expected<void> RunScaling(const ScalingOptions& options);
 
 // Each writes its tables. Scenes are scenes/toycar3.toml and, with nothing moving,
 // scenes/static.toml; settings are the defaults with profile `paper`.
 //
 // frames.csv: small images of the scene there and back, again and again, for `frames` frames: the
-// time of a frame, blocks and memory, by tenths of the run. frames-summary.csv: the last tenth
-// beside the second one.
+// time of a frame, blocks and memory, by tenths of the run. frames_summary.csv: the last tenth
+// beside the first one.
 Expected<void> MeasureLongRuns(const ScalingOptions& options);
 // surface.csv: the time of a frame over the surface that it shows, as a window in the images grows.
 Expected<void> MeasureSurface(const ScalingOptions& options);

@@ -13,7 +13,6 @@ namespace tsdfpp {
 namespace {
 
 constexpr double kImageScale = 0.25;  // 240x135
-constexpr int kTenths = 10;
 constexpr std::array<Method, 4> kMethods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored,
                                          Method::kVolumes};
 
@@ -23,8 +22,10 @@ struct Film100 {
   const char* scene;
   int step;
 };
+constexpr int kTenths = 10;
 constexpr int kFilmed = 51;
 constexpr int kRound = 2 * (kFilmed - 1);
+static_assert(kLongRunUnit == kTenths * kRound);
 constexpr std::array<Film100, 2> kFilms{{{"two cars drive", kMovingScene, 6},  // to frame 301
                                          {"nothing moves", kStaticScene, 2}}};
 
@@ -38,7 +39,7 @@ double ResidentMegabytes() {
 
 struct Tenth {
   double median_ms = 0;
-  double cpu_ms = 0;  // mean
+  double cpu_ms = 0;  // median
   double p99_ms = 0;
   double worst_ms = 0;
   MapMemory memory;
@@ -48,20 +49,22 @@ struct Tenth {
 std::vector<Tenth> RunLong(Method method, const MapConfig& config, const Footage& footage,
                            int frames) {
   Pipeline pipeline = ScalingPipeline(method, config, footage.info.objects);
-  const int a_tenth = std::max(kRound, frames / kTenths / kRound * kRound);
+  const int a_tenth = frames / kTenths;
   std::vector<Tenth> tenths;
   for (int i = 0; i < kTenths; ++i) {
     Times times;
-    const double cpu = CpuMilliseconds();
+    Times cpu;
     for (int k = 0; k < a_tenth; ++k) {
       const int at = k % kRound;
       const int filmed = at < kFilmed ? at : kRound - at;
       const double start = WallMilliseconds();
+      const double cpu_start = CpuMilliseconds();
       pipeline.Process(footage.frames[static_cast<std::size_t>(filmed)]);
       times.ms.push_back(WallMilliseconds() - start);
+      cpu.ms.push_back(CpuMilliseconds() - cpu_start);
     }
-    tenths.push_back({times.Median(), (CpuMilliseconds() - cpu) / a_tenth, times.Quantile(0.99),
-                      times.Worst(), pipeline.map().Memory(), ResidentMegabytes()});
+    tenths.push_back({times.Median(), cpu.Median(), times.Quantile(0.99), times.Worst(),
+                      pipeline.map().Memory(), ResidentMegabytes()});
   }
   return tenths;
 }
@@ -72,8 +75,9 @@ Expected<void> MeasureLongRuns(const ScalingOptions& options) {
   TSDFPP_ASSIGN(const MapConfig config, ScalingConfig());
   FigureTable table({"scene", "map", "tenth", "median ms", "CPU ms", "p99 ms", "worst ms", "blocks",
                      "map MB", "process MB"});
-  FigureTable summary({"scene", "map", "frame ms 2nd tenth", "frame ms last tenth", "last over 2nd",
-                       "CPU last over 2nd", "blocks after 2nd", "blocks at the end"});
+  FigureTable summary({"scene", "map", "first ms", "last ms", "last over first", "first CPU ms",
+                       "last CPU ms", "CPU last over first", "blocks after the first",
+                       "blocks at the end", "map MB", "process grew MB"});
   for (const Film100& film : kFilms) {
     TSDFPP_ASSIGN(const Footage footage,
                   Film({film.scene, kImageScale, film.step, 1 + film.step * (kFilmed - 1), {}}));
@@ -92,11 +96,14 @@ Expected<void> MeasureLongRuns(const ScalingOptions& options) {
                    Cell(static_cast<double>(tenth.memory.bytes) / 1e6, 1),
                    Cell(tenth.process_mb, 0)});
       }
-      const Tenth& then = tenths[1];
+      const Tenth& first = tenths.front();
       const Tenth& last = tenths.back();
-      summary.Add({film.name, name, Cell(then.median_ms, 2), Cell(last.median_ms, 2),
-                   Cell(last.median_ms / then.median_ms, 2), Cell(last.cpu_ms / then.cpu_ms, 2),
-                   std::to_string(then.memory.blocks), std::to_string(last.memory.blocks)});
+      summary.Add({film.name, name, Cell(first.median_ms, 2), Cell(last.median_ms, 2),
+                   Cell(last.median_ms / first.median_ms, 2), Cell(first.cpu_ms, 2),
+                   Cell(last.cpu_ms, 2), Cell(last.cpu_ms / first.cpu_ms, 2),
+                   std::to_string(first.memory.blocks), std::to_string(last.memory.blocks),
+                   Cell(static_cast<double>(last.memory.bytes) / 1e6, 1),
+                   Cell(last.process_mb - first.process_mb, 1)});
     }
   }
   TSDFPP_RETURN_IF_ERROR(table.Write(options.out, "frames"));
