@@ -65,9 +65,9 @@ constexpr std::array<Row, 7> kRows{{{"tsdf", Method::kTsdf, false},
                                     {"tsdf++/literal", Method::kTsdfppLiteral, false},
                                     {"tsdf++", Method::kTsdfpp, false},
                                     {"tsdf++/anchored", Method::kTsdfppAnchored, false},
-                                    {"tsdf++/anchored, all moved", Method::kTsdfppAnchored, true},
+                                    {"tsdf++/anchored moved", Method::kTsdfppAnchored, true},
                                     {"volumes", Method::kVolumes, false},
-                                    {"volumes, all moved", Method::kVolumes, true}}};
+                                    {"volumes moved", Method::kVolumes, true}}};
 
 std::unique_ptr<MapRepresentation> MapSplit(const Row& row, const std::vector<Frame>& frames,
                                             std::size_t count, const MapConfig& config,

@@ -21,7 +21,7 @@ struct SplitTiming {
 inline constexpr int kSplitSides[] = {1, 2, 4, 8};  // ids are the cells of a grid over the ground
 
 // Fuses the first frames (at most 8, in which nothing should move far) under 1, 4, 16 and 64 ids
-// and casts rays from the last one, `repeats` times in turn. "All moved" are maps whose lattices
+// and casts rays from the last one, `repeats` times in turn. "Moved" are maps whose lattices
 // are all turned by a hair, so that none is the world's.
 std::vector<SplitTiming> CastSplitIds(const std::vector<Frame>& frames, const MapConfig& config,
                                       int repeats);

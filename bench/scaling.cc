@@ -6,6 +6,9 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <map>
+#include <sstream>
 #include <thread>
 
 #include "bench/clocks.h"
@@ -18,10 +21,30 @@
 namespace tsdfpp {
 namespace {
 
+const std::vector<std::string> kMachineColumns{"part",    "processor",   "cores",
+                                               "seconds", "load before", "load after"};
+
 // How many programs wanted a core, over the last minute; 0 where the system does not say.
 double LoadAverage() {
   double load = 0;
   return getloadavg(&load, 1) == 1 ? load : 0;
+}
+
+// The row of each part in machine.csv, those of parts that an earlier run measured there included.
+using MachineRows = std::map<std::string, std::vector<std::string>>;
+
+MachineRows EarlierRows(const std::string& out) {
+  MachineRows rows;
+  std::ifstream file(out + "/machine.csv");
+  std::string line;
+  std::getline(file, line);  // the columns
+  while (std::getline(file, line)) {
+    std::istringstream cells(line);
+    std::vector<std::string> row;
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
+    if (row.size() == kMachineColumns.size()) rows[row.front()] = row;
+  }
+  return rows;
 }
 
 }  // namespace
@@ -47,35 +70,41 @@ Expected<void> RunScaling(const ScalingOptions& options) {
     const char* name;
     Expected<void> (*measure)(const ScalingOptions&);
   };
-  constexpr std::array<Part, 5> kParts{{{"frames", MeasureLongRuns},
-                                        {"surface", MeasureSurface},
-                                        {"threads", MeasureThreads},
+  constexpr std::array<Part, 5> kParts{{{"ids", MeasureIds},
                                         {"poses", MeasurePoses},
-                                        {"ids", MeasureIds}}};
+                                        {"threads", MeasureThreads},
+                                        {"surface", MeasureSurface},
+                                        {"frames", MeasureLongRuns}}};
   for (const std::string& wanted : options.parts) {
     const auto is_wanted = [&](const Part& part) { return part.name == wanted; };
     if (std::none_of(kParts.begin(), kParts.end(), is_wanted)) {
       return UsageError(
-          "--parts has '{}', expected some of frames, surface, threads, poses and ids", wanted);
+          "--parts has '{}', expected some of ids, poses, threads, surface and frames", wanted);
     }
   }
   if (options.frames < kLongRunUnit || options.frames % kLongRunUnit != 0) {
     return UsageError("--frames is {}, expected a multiple of {}", options.frames, kLongRunUnit);
   }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
-  FigureTable machine({"processor", "cores", "load before", "load at the end"});
-  const double load = LoadAverage();
+  MachineRows rows = EarlierRows(options.out);
   for (const Part& part : kParts) {
     if (std::find(options.parts.begin(), options.parts.end(), part.name) == options.parts.end()) {
       continue;
     }
     const double start = WallMilliseconds();
+    const double load = LoadAverage();
     TSDFPP_RETURN_IF_ERROR(part.measure(options));
+    rows[part.name] = {part.name,
+                       MachineName(),
+                       std::to_string(std::thread::hardware_concurrency()),
+                       Cell(1e-3 * (WallMilliseconds() - start), 0),
+                       Cell(load, 1),
+                       Cell(LoadAverage(), 1)};
     fmt::print("{}: {} ({:.0f} s)\n", part.name, options.out, 1e-3 * (WallMilliseconds() - start));
     std::fflush(stdout);
   }
-  machine.Add({MachineName(), std::to_string(std::thread::hardware_concurrency()), Cell(load, 1),
-               Cell(LoadAverage(), 1)});
+  FigureTable machine(kMachineColumns);
+  for (const auto& [part, row] : rows) machine.Add(row);
   return machine.Write(options.out, "machine");
 }
 

@@ -11,15 +11,15 @@ namespace tsdfpp {
 
 struct ScalingOptions {
   std::string out = "out/scaling";
-  std::vector<std::string> parts{"frames", "surface", "threads", "poses", "ids"};
+  std::vector<std::string> parts{"ids", "poses", "threads", "surface", "frames"};
   int frames = 10000;  // of the long runs, a multiple of kLongRunUnit
   int runs = 5;        // of what is measured over and over
 };
 inline constexpr int kLongRunUnit = 1000;  // frames: tenths that all show the same
 
-// Also writes machine.csv: the processor, its cores and what else it had to do. Errors: kUsage for
-// an unknown part or a number of frames that is no multiple, else those of the scenes and the
-// renderer, kEnvironment where `out` cannot be written.
+// Also writes machine.csv, by parts: the processor, its cores and what else it had to do. Errors:
+// kUsage for an unknown part or a number of frames that is no multiple, else those of the scenes
+// and the renderer, kEnvironment where `out` cannot be written.
 Expected<void> RunScaling(const ScalingOptions& options);
 
 // Each writes its tables. Scenes are scenes/toycar3.toml and, with nothing moving,

@@ -10,8 +10,8 @@ from plot_map_figures import STYLES, fill_page, plt, rows_of, save
 
 STYLES.update({
     "volumes": ("#009E73", "X", "-"),
-    "tsdf++/anchored, all moved": ("#D55E00", "^", "--"),
-    "volumes, all moved": ("#009E73", "X", "--"),
+    "tsdf++/anchored moved": ("#D55E00", "^", "--"),
+    "volumes moved": ("#009E73", "X", "--"),
 })
 
 
@@ -34,7 +34,7 @@ def frames(tables, pictures):
     scenes = names_of(rows, "scene")
     figure, all_axes = plt.subplots(1, 2 * len(scenes), figsize=(11.2, 2.8), constrained_layout=True)
     for s, scene in enumerate(scenes):
-        for k, (column, title) in enumerate((("median ms", "ms a frame (median)"), ("blocks", "blocks, thousands"))):
+        for k, (column, title) in enumerate((("CPU ms", "CPU ms a frame"), ("blocks", "blocks, thousands"))):
             axes = all_axes[2 * s + k]
             for name in names_of(rows):
                 line = [row for row in rows if row["scene"] == scene and row["map"] == name]
@@ -62,11 +62,11 @@ def surface(tables, pictures):
     rows = rows_of(tables, "surface")
     voxels = names_of(rows, "voxel mm")
     figure, all_axes = plt.subplots(1, len(voxels), figsize=(8.4, 3.0), constrained_layout=True)
-    fits = ["voxel mm,map,ms a square metre,ms at none,R2\n"]
+    fits = ["voxel mm,map,CPU ms a square metre,CPU ms at none,R2\n"]
     for axes, voxel in zip(all_axes, voxels):
         for name in names_of(rows):
             line = [row for row in rows if row["voxel mm"] == voxel and row["map"] == name]
-            x, y = ([float(row[column]) for row in line] for column in ("visible m2", "frame ms"))
+            x, y = ([float(row[column]) for row in line] for column in ("visible m2", "CPU ms"))
             draw(axes, name, x, y)
             slope, start, explained = line_through(x, y)
             axes.plot([0, max(x)], [start, start + slope * max(x)], color=STYLES[name][0], linewidth=0.6, zorder=2)
@@ -74,7 +74,7 @@ def surface(tables, pictures):
         axes.set_xlim(left=0)
         axes.set_ylim(bottom=0)
         axes.set_xlabel("visible surface, m²")
-        axes.set_title("ms a frame, voxels of %s mm" % voxel, fontsize=9, loc="left")
+        axes.set_title("CPU ms a frame, voxels of %s mm" % voxel, fontsize=9, loc="left")
     legend(figure, all_axes[0])
     save(figure, pictures, "scaling-surface")
     with open(os.path.join(tables, "surface_fit.csv"), "w") as file:
@@ -85,7 +85,7 @@ def ids(tables, pictures):
     rows = rows_of(tables, "ids")
     figure, all_axes = plt.subplots(1, 2, figsize=(8.4, 3.0), constrained_layout=True)
     counts = [int(count) for count in names_of(rows, "ids")]
-    for axes, (column, title) in zip(all_axes, (("ms", "ray cast 960x540, ms"), ("over one id", "times the cost of one id"))):
+    for axes, (column, title) in zip(all_axes, (("CPU ms", "ray cast 960x540, CPU ms"), ("CPU over one id", "times the cost of one id"))):
         for name in names_of(rows):
             draw(axes, name, range(len(counts)), [float(row[column]) for row in rows if row["map"] == name])
         axes.set_ylim(bottom=0)
