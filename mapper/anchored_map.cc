@@ -182,6 +182,7 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
     InstanceId id;
     BlockMask cover;
     const float* distance;
+    const TsdfBlock* block;  // which the distances are still to be taken from
   };
   std::vector<Listed> listed;
   std::list<PulledCover> pulled;
@@ -189,14 +190,14 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
     if (!object.moved) {
       const TsdfBlock* block = object.grid->Find(index);
       if (block == nullptr || !Any(block->cover)) continue;
-      listed.push_back({object.id, block->cover, block->distance.data()});
+      listed.push_back({object.id, block->cover, nullptr, block});
       continue;
     }
     const Participants::Moved& moved = *object.moved;
     if (!std::binary_search(moved.reach->begin(), moved.reach->end(), index)) continue;
     PulledCover& cover = pulled.emplace_back();
     if (CoverOfBlock(moved.reader, moved.T_LW, config_.voxel_m, config_.back(), index, cover)) {
-      listed.push_back({object.id, cover.covered, cover.distance.data()});
+      listed.push_back({object.id, cover.covered, cover.distance.data(), nullptr});
     }
   }
   if (listed.empty()) {
@@ -223,8 +224,11 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
   std::array<float, kMaxLayers * kBlockVoxels> distance;
   distance.fill(std::numeric_limits<float>::infinity());
+  std::array<float, kBlockVoxels> of_block;
   for (const Listed& of : listed) {
-    InsertByDistance(of.cover, of.distance, of.id, {layers, distance.data(), ids.data()});
+    if (of.block != nullptr) ToFloats(of.block->distance.data(), kBlockVoxels, of_block.data());
+    const float* its = of.block != nullptr ? of_block.data() : of.distance;
+    InsertByDistance(of.cover, its, of.id, {layers, distance.data(), ids.data()});
   }
 }
 

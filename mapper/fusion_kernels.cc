@@ -46,6 +46,7 @@ inline std::int32_t BytesOfColour(const KernelFrame& frame, std::int32_t pixel) 
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/half_lanes-inl.h"
 #include "mapper/mask_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -110,7 +111,7 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
     for (std::size_t k = 0; k < kSlice; k += hn::Lanes(df)) {
       const std::size_t i = kSlice * z + k;
       if (next != nullptr) {
-        hwy::Prefetch(&next->distance[i]);
+        if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
         if (k == 0 && next->full[z] != ~0ULL) hwy::Prefetch(&next->weight[i]);
       }
       const auto row = [&](std::size_t r) {
@@ -191,7 +192,7 @@ bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, Bloc
 
 // docs/map.md: the colours of the voxels that `bits` marks.
 void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_t* bits,
-                 float weight_cap, TsdfBlock& block) {
+                 float weight_cap, BlockColours& colours) {
   const Floats df;
   const Ints di;
   const Shorts du;
@@ -217,7 +218,7 @@ void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_
     const auto at_zero = hn::Eq(hn::Load(di, &pixel[i]), hn::Zero(di));
     const auto seen = hn::IfThenElse(at_zero, bytes, hn::ShiftRight<8>(bytes));
     const Bytes8 d8;
-    std::uint8_t* counts = &block.colour_count[i];
+    std::uint8_t* counts = &colours.count[i];
     const auto count = hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(d8, counts)));
     const auto more = hn::Add(count, one);
     const auto share = hn::Div(one, more);
@@ -228,9 +229,9 @@ void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_
       const auto mean = hn::Add(hn::Add(old, change), half);
       hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElse(take, mean, old))), du, stored);
     };
-    fuse(&block.colour[0][i], hn::And(seen, low_byte));
-    fuse(&block.colour[1][i], hn::And(hn::ShiftRight<8>(seen), low_byte));
-    fuse(&block.colour[2][i], hn::And(hn::ShiftRight<16>(seen), low_byte));
+    fuse(&colours.channel[0][i], hn::And(seen, low_byte));
+    fuse(&colours.channel[1][i], hn::And(hn::ShiftRight<8>(seen), low_byte));
+    fuse(&colours.channel[2][i], hn::And(hn::ShiftRight<16>(seen), low_byte));
     const auto capped = hn::Min(more, hn::Set(df, weight_cap));
     hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, hn::IfThenElse(take, capped, count))), d8,
                counts);
@@ -285,6 +286,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto front = hn::Set(df, rule.front);
   const auto minus_back = hn::Set(df, -rule.back);
   const auto colour_band = hn::Set(df, rule.colour_band);
+  const auto first_colour_band = hn::Set(df, rule.first_colour_band);
   const auto cap = hn::Set(df, rule.weight_cap);
   const auto full_share = hn::Div(one, hn::Add(cap, one));
   const auto minus_half = hn::Set(df, -0.5F * place.voxel);
@@ -307,7 +309,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     const auto s = measured.s;
     auto taken = measured.yes;
     auto against = hn::MaskFromVec(hn::Zero(df));
-    const auto old_d = hn::Load(df, &block.distance[i]);
+    const auto old_d = LoadHalves(df, &block.distance[i]);
     // Where all weights are known, they need not be read.
     const auto is_full = MaskAt(df, full.data(), i);
     const bool all_full = hn::AllTrue(df, is_full);
@@ -338,7 +340,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     const auto more = hn::Add(old_w, one);
     const auto share = all_full ? full_share : hn::Div(one, more);
     const auto fused = hn::Add(old_d, hn::Mul(hn::Sub(clamped, old_d), share));
-    auto d = hn::IfThenElse(taken, fused, old_d);
+    auto d = hn::IfThenElse(taken, RoundLanesToHalf(df, fused), old_d);
     auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
     const auto near = hn::And(taken, hn::Le(s, front));
     PutBits(df, near, i, in_band.data());
@@ -346,13 +348,15 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
     }
     const auto has_colour = MaskAt(df, coloured.data(), i);
-    const auto colours =
-        hn::And(near, hn::Or(hn::Not(has_colour), hn::Le(hn::Abs(s), colour_band)));
+    const auto colours = hn::And(
+        near, hn::Le(hn::Abs(s), hn::IfThenElse(has_colour, colour_band, first_colour_band)));
     if (!hn::AllFalse(df, colours)) {
       PutBits(df, colours, i, to_colour.data());
       PutBits(df, hn::Or(has_colour, colours), i, coloured.data());
-      for (const auto& channel : block.colour) hwy::Prefetch(&channel[i]);
-      hwy::Prefetch(&block.colour_count[i]);
+      if (block.colours != nullptr) {
+        for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
+        hwy::Prefetch(&block.colours->count[i]);
+      }
       // The ends of the rows; what lies between is near.
       for (std::size_t k = i; k < i + hn::Lanes(df); k += std::min<std::size_t>(8, kLanes)) {
         const std::size_t last = k + std::min<std::size_t>(8, kLanes) - 1;
@@ -363,13 +367,13 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     }
     if (contradiction && !hn::AllFalse(df, against)) {
       const auto free = hn::And(against, hn::Gt(s, hn::Set(df, place.voxel)));
-      d = hn::IfThenElse(against, hn::IfThenElseZero(free, clamped), d);
+      d = hn::IfThenElse(against, hn::IfThenElseZero(free, RoundLanesToHalf(df, clamped)), d);
       w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), w);
       PutBits(df, against, i, cleared.data());
       any_cleared = true;
     }
     // Free space and full weights stay what they are: then the memory need not be written.
-    if (!hn::AllTrue(df, hn::Eq(d, old_d))) hn::Store(d, df, &block.distance[i]);
+    if (!hn::AllTrue(df, hn::Eq(d, old_d))) StoreHalves(df, d, &block.distance[i]);
     if (!hn::AllTrue(df, hn::Eq(w, old_w))) {
       hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
     }
@@ -381,7 +385,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     PutBits(df, hn::And(inside, hn::Ge(d, minus_back)), i, band.data());
   }
   if (any_coloured) {
-    FuseColours(frame, projected.pixel, to_colour.data(), rule.weight_cap, block);
+    FuseColours(frame, projected.pixel, to_colour.data(), rule.weight_cap, block.MakeColours());
   }
   if (any_cleared) {
     const auto places = std::bit_cast<BlockMask>(cleared);
@@ -404,6 +408,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   result.changed_band = block.band != new_band;
   block.band = new_band;
   block.coloured = std::bit_cast<BlockMask>(coloured);
+  if (any_cleared && !Any(block.coloured)) block.colours.reset();
   return result;
 }
 

@@ -51,6 +51,7 @@ struct FusionRule {
   float front = 0;             // metres
   float back = 0;
   float colour_band = 0;
+  float first_colour_band = 0;  // of what has no colour yet
   float weight_cap = 0;
 };
 

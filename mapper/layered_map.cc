@@ -285,7 +285,7 @@ MapMemory LayeredMap::VolumeMemory() const {
   MapMemory memory;
   for (const auto& [id, volume] : volumes_) {
     memory.blocks += volume.grid.size();
-    memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
+    memory.bytes += BytesOf(volume.grid);
   }
   for (const auto& [id, object] : meshes_) memory.mesh_bytes += object.mesh.Bytes();
   return memory;

@@ -108,7 +108,9 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
       if (pixel < 0 || task.lists->active[i].id != id) continue;
       const float s = observation.distance[i];
       if (s <= config_.front()) {
-        const bool coloured = block->colour_count[i] == 0 || std::abs(s) <= config_.colour_band();
+        const bool coloured =
+            std::abs(s) <=
+            (block->ColourCount(i) == 0 ? config_.first_colour_band() : config_.colour_band());
         FuseVoxel(*block, i, s, coloured ? frame.kernel.colour + 3 * pixel : nullptr, weight_cap);
         changed = true;
       } else if (frame.kernel.label[pixel] == id) {
@@ -243,7 +245,7 @@ void LiteralMap::UpdateActiveField() const {
               if (list.active[k].id != id) continue;
               block.distance[k] = values->distance[k];
               block.weight[k] = values->weight[k];
-              block.SetColour(k, values->FixedColourAt(k), values->colour_count[k]);
+              block.SetColour(k, values->FixedColourAt(k), values->ColourCount(k));
             }
           }
           block.UpdateMasks(config_.back());
@@ -330,9 +332,9 @@ MapMemory LiteralMap::Memory() const {
   MapMemory memory{lists_.size(), lists_.size() * sizeof(ListBlock) + lists_.TableBytes()};
   for (const auto& [id, volume] : volumes_) {
     memory.blocks += volume.grid.size();
-    memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
+    memory.bytes += BytesOf(volume.grid);
   }
-  memory.mesh_bytes = active_.field.size() * sizeof(TsdfBlock) + active_.mesh.Bytes();
+  memory.mesh_bytes = BytesOf(active_.field) - active_.field.TableBytes() + active_.mesh.Bytes();
   for (const auto& [id, mesh] : object_meshes_) memory.mesh_bytes += mesh.Bytes();
   return memory;
 }

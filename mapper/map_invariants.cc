@@ -53,7 +53,7 @@ bool IsCrossed(const TsdfGrid& grid, const Index3& cube) {
 Fault FindVoxelFault(const TsdfBlock& block, std::size_t i, const MapConfig& config) {
   const int weight = block.weight[i];
   const float distance = block.distance[i];
-  const std::uint16_t colours = block.colour_count[i];
+  const int colours = block.ColourCount(i);
   if (weight == 0) {
     const FixedColour none{};
     if (distance != 0 || colours != 0 || block.FixedColourAt(i) != none) {
@@ -180,7 +180,7 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
       const bool right = Bit(block->observed, place) == observed &&
                          Bit(block->negative, place) == negative &&
                          Bit(block->band, place) == (negative && distance >= -config.back()) &&
-                         Bit(block->coloured, place) == (block->colour_count[i] > 0) &&
+                         Bit(block->coloured, place) == (block->ColourCount(i) > 0) &&
                          (!Bit(block->full, place) || block->weight[i] == config.weight_cap);
       if (!right) return fmt::format("{}: the masks of voxel {} are wrong", name, Text(voxel));
       const Eigen::Vector3d q(voxel.x, voxel.y, voxel.z);

@@ -22,13 +22,15 @@ struct SliceMasks {
   std::uint64_t near_back = 0;  // distance >= -back, observed or not
 };
 
-SliceMasks MasksOf(const float* distance, const std::uint8_t* weight, float back) {
+SliceMasks MasksOf(const Half* halves, const std::uint8_t* weight, float back) {
   SliceMasks masks;
+  std::array<float, 64> distance;
+  ToFloats(halves, distance.size(), distance.data());
 #ifdef __SSE2__
   const __m128 zero = _mm_setzero_ps();
   const __m128 minus_back = _mm_set1_ps(-back);
   for (unsigned i = 0; i < 64; i += 4) {
-    const __m128 d = _mm_loadu_ps(distance + i);
+    const __m128 d = _mm_loadu_ps(&distance[i]);
     const auto bits = [i](__m128 test) {
       return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_ps(test))) << i;
     };
@@ -73,12 +75,19 @@ bool TsdfBlock::UpdateMasks(float back) {
     negative[z] = n & o;
     band[z] = b & n & o;
     std::uint64_t with_colour = 0;
-    for (std::size_t i = 0; i < 64; ++i) {
-      with_colour |= static_cast<std::uint64_t>(colour_count[64 * z + i] > 0) << i;
+    for (std::size_t i = 0; i < 64 && colours != nullptr; ++i) {
+      with_colour |= static_cast<std::uint64_t>(colours->count[64 * z + i] > 0) << i;
     }
     coloured[z] = with_colour;
   }
+  if (!Any(coloured)) colours.reset();
   return observed != old_observed || negative != old_negative || band != old_band;
+}
+
+std::size_t BytesOf(const TsdfGrid& grid) {
+  std::size_t bytes = grid.TableBytes();
+  for (const TsdfGrid::Entry& entry : grid.entries()) bytes += entry.block->Bytes();
+  return bytes;
 }
 
 Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block) {

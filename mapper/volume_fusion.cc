@@ -85,6 +85,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           rule.front = config.front();
           rule.back = config.back();
           rule.colour_band = config.colour_band();
+          rule.first_colour_band = config.first_colour_band();
           rule.weight_cap = static_cast<float>(config.weight_cap);
           TsdfBlock& block = *of.entry->block;
           const TsdfBlock* next =

@@ -92,8 +92,9 @@ std::string SaveGroup(const std::vector<const TsdfGrid::Entry*>& blocks, std::si
     ForEachObserved(block.observed, [&](std::size_t i) {
       values.distance.push_back(block.distance[i]);
       values.weight.push_back(block.weight[i]);
-      for (std::size_t c = 0; c < 3; ++c) values.colour[c].push_back(block.colour[c][i]);
-      values.colour_count.push_back(block.colour_count[i]);
+      const FixedColour colour = block.FixedColourAt(i);
+      for (std::size_t c = 0; c < 3; ++c) values.colour[c].push_back(colour[c]);
+      values.colour_count.push_back(static_cast<std::uint16_t>(block.ColourCount(i)));
     });
   }
   PutPlanes(values.distance, bytes);
@@ -138,7 +139,7 @@ Expected<LoadedBlocks> LoadGroup(ByteReader bytes, std::size_t count, const MapC
       block.distance[i] = values.distance[k];
       block.weight[i] = static_cast<std::uint8_t>(values.weight[k]);
       block.SetColour(i, {values.colour[0][k], values.colour[1][k], values.colour[2][k]},
-                      static_cast<std::uint8_t>(values.colour_count[k]));
+                      values.colour_count[k]);
       ++k;
     });
     block.UpdateMasks(config.back());

@@ -33,8 +33,9 @@ TEST(MapConfigTest, DefaultsAreValidAndAreTheCloseProfile) {
   ASSERT_TRUE(close.SetProfile("close").has_value());
   EXPECT_EQ(close, config);
   EXPECT_EQ(config.voxel(), 0.01F);
-  EXPECT_FLOAT_EQ(config.front(), 0.1F);
-  EXPECT_FLOAT_EQ(config.back(), 0.03F);
+  // In half precision: eleven bits.
+  EXPECT_EQ(config.front(), 1638.0F / 16384);
+  EXPECT_EQ(config.back(), 1966.0F / 65536);
 }
 
 TEST(MapConfigTest, ProfilePaperIsTenAndTen) {
