@@ -16,6 +16,7 @@
 #include "bench/mesh.h"
 #include "bench/rays.h"
 #include "bench/render.h"
+#include "bench/scaling.h"
 #include "bench/side_by_side.h"
 
 namespace tsdfpp {
@@ -113,6 +114,19 @@ void AddFigures(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunFigures(*options); }; });
 }
 
+void AddScaling(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<ScalingOptions>();
+  CLI::App* command = app.add_subcommand("scaling", "What docs/scaling.md shows, as CSV");
+  command->add_option("--out", options->out, "Output folder")->capture_default_str();
+  command->add_option("--parts", options->parts, "Some of them")
+      ->delimiter(',')
+      ->capture_default_str();
+  AddCount(command, "--frames", options->frames, "Of the long runs, a multiple of 1000", 1000,
+           10000000);
+  AddCount(command, "--runs", options->runs, "Of the others", 1, 1000);
+  command->callback([=, &chosen] { chosen = [=] { return RunScaling(*options); }; });
+}
+
 }  // namespace
 }  // namespace tsdfpp
 
@@ -135,6 +149,7 @@ int main(int argc, char** argv) {
   tsdfpp::AddRays(app, chosen);
   tsdfpp::AddMesh(app, chosen);
   tsdfpp::AddFigures(app, chosen);
+  tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {
         return command->get_name() == argv[1];
@@ -144,7 +159,14 @@ int main(int argc, char** argv) {
     benchmark::RunSpecifiedBenchmarks();
     return 0;
   }
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "tsdfpp_bench: %s (see tsdfpp_bench %s --help)\n", error.what(), argv[1]);
+    return static_cast<int>(tsdfpp::ErrorKind::kUsage);
+  }
   const auto done = chosen();
   if (!done) {
     std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());

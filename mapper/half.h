@@ -19,9 +19,11 @@ class Half {
   constexpr operator float() const {
     const std::uint32_t sign = (bits_ & 0x8000U) << 16U;
     const std::uint32_t rest = (bits_ & 0x7FFFU) << 13U;
-    // 2^112 puts the exponent right, of subnormal numbers too.
-    const auto finite = std::bit_cast<std::uint32_t>(std::bit_cast<float>(rest) * 0x1p112F);
-    const std::uint32_t positive = rest >= 0x0F800000U ? rest | 0x70000000U : finite;
+    const std::uint32_t special = rest >= 0x0F800000U ? 0x38000000U : 0U;
+    // No float on the way is subnormal: some renderers have their threads take those for 0.
+    const float tiny = static_cast<float>(static_cast<std::int32_t>(rest >> 13U)) * 0x1p-24F;
+    const std::uint32_t positive =
+        rest < 0x00800000U ? std::bit_cast<std::uint32_t>(tiny) : rest + 0x38000000U + special;
     return std::bit_cast<float>(positive | sign);
   }
 

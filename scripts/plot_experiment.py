@@ -12,6 +12,7 @@ import json
 import os
 import re
 import sys
+import textwrap
 
 import matplotlib
 
@@ -197,7 +198,7 @@ def plot_differences(results, folder):
                 axes.plot([mean], [y], color=colour, marker=marker, linestyle="", markersize=5, zorder=3,
                           label=method if row == 0 else None)
         words = results["metrics"][metric]
-        axes.set_title(title_of(results, metric), fontsize=9, loc="left", wrap=True)
+        axes.set_title(textwrap.fill(title_of(results, metric), 22), fontsize=9, loc="left")
         axes.set_xlabel("better →" if words["better"] == "higher" else "← better")
     all_axes[0][0].set_yticks(range(len(conditions)), [condition_text(results, c) for c in conditions])
     all_axes[0][0].invert_yaxis()

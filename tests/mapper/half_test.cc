@@ -9,6 +9,10 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/mapper/half_test.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
@@ -81,6 +85,19 @@ TEST(HalfTest, HoldsEveryNumberThatThereIs) {
     }
   }
 }
+
+#ifdef __SSE2__
+TEST(HalfTest, IsTheSameWhereSubnormalFloatsCountAsZero) {
+  for (unsigned bits = 0; bits < 0x7C00U; ++bits) {
+    const float expected = FromBits(bits);
+    const unsigned mode = _mm_getcsr();
+    _mm_setcsr(mode | 0x8040U);  // flush to zero, and denormals are zero
+    const float held = Half(expected);
+    _mm_setcsr(mode);
+    ASSERT_EQ(held, expected) << bits;
+  }
+}
+#endif
 
 TEST(HalfTest, RoundsAsOpenCvDoes) {
   for (const float value : Floats(std::numeric_limits<float>::infinity())) {
