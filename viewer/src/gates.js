@@ -28,14 +28,13 @@ function valueText(gate) {
 function gatesTable({ controls, gates }) {
   return sortableTable('gates', [
     { title: 'Gate' }, { title: 'Verdict', draw: badge },
-    { title: 'Figure', long: true }, { title: 'Of', long: true },
     { title: 'Now', about: 'Mean over the seeds; in brackets its interval, or the least and greatest' },
-    { title: 'Expected' }, { title: 'Because', long: true },
+    { title: 'Expected' }, { title: 'Figure', long: true }, { title: 'Because', long: true },
   ], [
     ...controls.map((control) => [`${control.name} (control)`, control.verdict,
-      `spread of ${control.metric}`, (control.methods ?? []).join(', '), number(control.greatest_spread),
-      `at most ${number(control.allowed_spread)}`, control.why || null]),
-    ...gates.map((gate) => [gate.name, gate.verdict, gate.of, gate.cells, valueText(gate), boundsText(gate.bounds),
+      number(control.greatest_spread), `at most ${number(control.allowed_spread)}`,
+      `spread of ${control.metric} over ${(control.methods ?? []).join(', ')}`, control.why || null]),
+    ...gates.map((gate) => [gate.name, gate.verdict, valueText(gate), boundsText(gate.bounds), `${gate.of} (${gate.cells})`,
       gate.bounds_because]),
   ].map((row) => row.map((cell) => (cell === null ? null : String(cell)))));
 }
