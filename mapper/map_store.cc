@@ -22,6 +22,26 @@ Expected<ObjectVolumes> LoadAllVolumes(const Sections& sections, const MapConfig
   return volumes;
 }
 
+// Of methods that move values, whose objects have no pose at birth to place a lattice by.
+Expected<void> CheckWorldLattices(const ObjectVolumes& volumes) {
+  for (const auto& [id, volume] : volumes) {
+    if (volume.T_WO_birth) {
+      return DataError("object {} has a lattice of its own, expected the world's", id);
+    }
+  }
+  return {};
+}
+
+// Of methods that move lattices: the first pose is the one at birth.
+Expected<void> CheckOwnLattices(const ObjectVolumes& volumes) {
+  for (const auto& [id, volume] : volumes) {
+    if (volume.T_WO && !volume.T_WO_birth) {
+      return DataError("object {} has a pose and none at birth, so its lattice is nowhere", id);
+    }
+  }
+  return {};
+}
+
 Expected<std::vector<ListsOfBlock>> LoadAllLists(const Sections& sections, const char* name,
                                                  int layers) {
   ByteReader bytes(sections.at(name));
@@ -78,6 +98,7 @@ void TsdfppMap::Save(Sections& sections) const {
 
 Expected<void> TsdfppMap::Load(const Sections& sections) {
   TSDFPP_RETURN_IF_ERROR(LayeredMap::Load(sections));
+  TSDFPP_RETURN_IF_ERROR(CheckWorldLattices(volumes_));
   for (auto& [id, volume] : volumes_) {
     for (const auto& entry : volume.grid.entries()) {
       entry.block->cover = FindCover(volume.grid, entry.index);
@@ -101,12 +122,12 @@ Expected<void> TsdfppMap::Load(const Sections& sections) {
 
 Expected<void> VolumesMap::Load(const Sections& sections) {
   TSDFPP_RETURN_IF_ERROR(LayeredMap::Load(sections));
-  for (auto& [id, volume] : volumes_) PlaceLattice(volume);
-  return {};
+  return CheckOwnLattices(volumes_);
 }
 
 Expected<void> AnchoredMap::Load(const Sections& sections) {
   TSDFPP_RETURN_IF_ERROR(LayeredMap::Load(sections));
+  TSDFPP_RETURN_IF_ERROR(CheckOwnLattices(volumes_));
   for (const auto& [id, volume] : volumes_) moved_.push_back(id);
   RefreshIndex();
   return {};
@@ -130,6 +151,7 @@ void LiteralMap::Save(Sections& sections) const {
 Expected<void> LiteralMap::Load(const Sections& sections) {
   active_.is_current = false;
   TSDFPP_ASSIGN(volumes_, LoadAllVolumes(sections, config_));
+  TSDFPP_RETURN_IF_ERROR(CheckWorldLattices(volumes_));
   TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, 2));
   const auto is_observed = [this](InstanceId id, const Index3& index, int place) {
     const auto volume = volumes_.find(id);

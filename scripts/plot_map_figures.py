@@ -178,10 +178,15 @@ def markdown(tables, name):
 
 
 def fill_page(tables, page):
+    """Tables that are not there leave what the page has."""
     with open(page) as file:
         text = file.read()
-    text = re.sub(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)",
-                  lambda match: match[1] + markdown(tables, match[2]) + match[3], text, flags=re.S)
+
+    def filled(match):
+        is_there = os.path.exists(os.path.join(tables, match[2] + ".csv"))
+        return match[1] + markdown(tables, match[2]) + match[3] if is_there else match[0]
+
+    text = re.sub(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", filled, text, flags=re.S)
     with open(page, "w") as file:
         file.write(text)
 

@@ -5,7 +5,9 @@
 #include <tbb/global_control.h>
 
 #include "core/files.h"
+#include "mapper/byte_stream.h"
 #include "mapper/section_file.h"
+#include "mapper/volume_store.h"
 #include "tests/core/temp_folder.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/every_method.h"
@@ -180,6 +182,43 @@ TEST_P(MapFile, MadeUpContentIsRefusedOrInOrder) {
     EXPECT_FALSE(loaded->map->SceneMesh().triangles.empty());
   }
   EXPECT_GT(refused, kRounds / 20);
+}
+
+// The checksums are right, the poses rigid; but where the voxels would be is not where their
+// objects were born.
+TEST(MapFileErrors, ALatticeThatIsNotTheOneAtBirthIsRefused) {
+  const Pose moved = MakePose(0.4, Eigen::Vector3d::UnitZ(), {0.3, 0, 0});
+  const auto error_of = [&](Method method, const std::optional<Pose>& birth) {
+    const auto map = DrivenMap(method, ToyConfig(), 2);
+    Sections sections = UnpackSections(MapToBytes(*map), "map.tsdf").value();
+    ByteReader bytes(sections.at("VOLS"));
+    ObjectVolumes volumes = LoadVolumes(bytes, ToyConfig()).value();
+    volumes.at(kBrick).T_WO_birth = birth;
+    volumes.at(kBrick).T_WO = moved;
+    sections.at("VOLS").clear();
+    SaveVolumes(volumes, sections.at("VOLS"));
+    const auto loaded = MapFromBytes(PackSections(sections), "map.tsdf");
+    if (loaded) return std::string();
+    EXPECT_EQ(loaded.error().kind, ErrorKind::kData);
+    return loaded.error().message;
+  };
+  for (const Method method : {Method::kTsdfpp, Method::kTsdfppLiteral}) {
+    EXPECT_EQ(error_of(method, std::nullopt), "") << MethodName(method);
+    for (const Pose& birth : {moved, Pose::Identity()}) {
+      EXPECT_EQ(
+          error_of(method, birth),
+          "map.tsdf: its map is wrong: object 1 has a lattice of its own, expected the world's")
+          << MethodName(method);
+    }
+  }
+  for (const Method method : {Method::kTsdfppAnchored, Method::kVolumes}) {
+    EXPECT_EQ(error_of(method, Pose::Identity()), "") << MethodName(method);
+    EXPECT_EQ(
+        error_of(method, std::nullopt),
+        "map.tsdf: its map is wrong: object 1 has a pose and none at birth, so its lattice is "
+        "nowhere")
+        << MethodName(method);
+  }
 }
 
 TEST(MapFileErrors, EachIsOneSentenceThatNamesTheFile) {
