@@ -94,6 +94,10 @@ Expected<CommandResult> Explain(const GateRun& run, const References& references
   const GateOutcome& outcome = run.gates.front();
   TSDFPP_ASSIGN(const GateExplanation explanation,
                 ExplainGate(run, outcome, references, out / kGatePictures));
+  // Where nothing could be judged the sentence has it.
+  const std::string why = outcome.judgement.why.empty() || outcome.judgement.values.empty()
+                              ? ""
+                              : fmt::format("value: {}\n", outcome.judgement.why);
   return CommandResult{{{"gate", outcome.gate.name},
                         {"verdict", VerdictName(outcome.judgement.verdict)},
                         {"why", outcome.judgement.why},
@@ -102,7 +106,7 @@ Expected<CommandResult> Explain(const GateRun& run, const References& references
                         {"frame", explanation.frame},
                         {"object", explanation.object},
                         {"picture", explanation.picture}},
-                       fmt::format("{}\nbounds: {} ({})\n", explanation.sentence,
+                       fmt::format("{}\n{}bounds: {} ({})\n", explanation.sentence, why,
                                    outcome.gate.bounds.Text(), outcome.gate.why)};
 }
 

@@ -121,6 +121,7 @@ TEST_F(GateCommand, FromTheFirstReferencesToAFailure) {
   const auto explained = Gate({"--explain", "as-before", "--sabotage", "labels-permuted"});
   EXPECT_EQ(explained.exit_code, 0);
   EXPECT_NE(explained.out.find("object car"), std::string::npos) << explained.out;
+  EXPECT_NE(explained.out.find("\nvalue: "), std::string::npos) << explained.out;
 }
 
 TEST_F(GateCommand, AControlThatFailsMakesAllInvalid) {
