@@ -43,9 +43,9 @@ Expected<void> CheckOwnLattices(const ObjectVolumes& volumes) {
 }
 
 Expected<std::vector<ListsOfBlock>> LoadAllLists(const Sections& sections, const char* name,
-                                                 int layers) {
+                                                 int layers, const MapConfig& config) {
   ByteReader bytes(sections.at(name));
-  TSDFPP_ASSIGN(std::vector<ListsOfBlock> lists, LoadLists(bytes, layers));
+  TSDFPP_ASSIGN(std::vector<ListsOfBlock> lists, LoadLists(bytes, layers, config.confidence_cap));
   if (!bytes.AtEnd()) return DataError("its lists have another length than they say");
   return lists;
 }
@@ -104,7 +104,8 @@ Expected<void> TsdfppMap::Load(const Sections& sections) {
       entry.block->cover = FindCover(volume.grid, entry.index);
     }
   }
-  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, layers_));
+  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists,
+                LoadAllLists(sections, kLists, layers_, config_));
   const auto covers = [this](InstanceId id, const Index3& index, int place) {
     const auto volume = volumes_.find(id);
     if (volume == volumes_.end()) return false;
@@ -152,7 +153,7 @@ Expected<void> LiteralMap::Load(const Sections& sections) {
   active_.is_current = false;
   TSDFPP_ASSIGN(volumes_, LoadAllVolumes(sections, config_));
   TSDFPP_RETURN_IF_ERROR(CheckWorldLattices(volumes_));
-  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, 2));
+  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, 2, config_));
   const auto is_observed = [this](InstanceId id, const Index3& index, int place) {
     const auto volume = volumes_.find(id);
     if (volume == volumes_.end()) return false;
@@ -197,7 +198,7 @@ Expected<void> SingleFieldMap::Load(const Sections& sections) {
   TSDFPP_ASSIGN(field_, LoadGrid(field, config_));
   if (!field.AtEnd()) return DataError("its field has another length than it says");
   for (const auto& entry : field_.entries()) labels_.FindOrAdd(entry.index);
-  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLabels, 1));
+  TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLabels, 1, config_));
   const auto is_observed = [this](InstanceId, const Index3& index, int place) {
     const TsdfBlock* block = field_.Find(index);
     return block != nullptr && Bit(block->observed, place);
@@ -208,7 +209,9 @@ Expected<void> SingleFieldMap::Load(const Sections& sections) {
     for (std::size_t i = 0; i < kBlockVoxels; ++i) {
       labels.id[i] = block.entries[i].id;
       labels.confidence[i] = static_cast<std::uint16_t>(block.entries[i].confidence);
-      if (labels.id[i] != kNoInstance) labels.ever |= EverBit(labels.id[i]);
+      if (labels.id[i] == kNoInstance) continue;
+      if (labels.confidence[i] == 0) return DataError("a label has no confidence");
+      labels.ever |= EverBit(labels.id[i]);
     }
   }
   ByteReader poses(sections.at(kPoses));

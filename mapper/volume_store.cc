@@ -14,9 +14,8 @@ constexpr std::size_t kBlocksPerGroup = 64;
 constexpr std::size_t kIndexBytes = 3 * sizeof(std::int32_t);
 // Well inside what PackIndex can hold, neighbours included.
 constexpr int kFurthestBlock = (1 << 20) - 16;
-constexpr int kLargestConfidence = 10000;  // MapConfig::Validate
-constexpr double kRigidTolerance = 1e-6;   // poses from files have nine decimals
-constexpr double kFurthest_m = 1e5;        // voxels there are still numbered by 32 bits
+constexpr double kRigidTolerance = 1e-6;  // poses from files have nine decimals
+constexpr double kFurthest_m = 1e5;       // voxels there are still numbered by 32 bits
 
 void PutIndex(const Index3& index, std::string& bytes) {
   PutBytes(static_cast<std::int32_t>(index.x), bytes);
@@ -127,8 +126,10 @@ Expected<LoadedBlocks> LoadGroup(ByteReader bytes, std::size_t count, const MapC
   const auto cap = static_cast<float>(config.weight_cap);
   for (std::size_t k = 0; k < voxels; ++k) {
     const float weight = values.weight[k];
-    const bool good = std::isfinite(values.distance[k]) && weight >= 1 && weight <= cap &&
-                      weight == std::floor(weight) && values.colour_count[k] <= config.weight_cap;
+    const float distance = RoundToHalf(values.distance[k]);
+    const bool good = distance >= -config.back() && distance <= config.front() && weight >= 1 &&
+                      weight <= cap && weight == std::floor(weight) &&
+                      values.colour_count[k] <= config.weight_cap;
     if (!good) return DataError("a voxel's value is out of range");
   }
   std::size_t k = 0;
@@ -269,7 +270,7 @@ void SaveLists(const std::vector<ListsOfBlock>& blocks, int layers, std::string&
   }
 }
 
-Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers) {
+Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers, int confidence_cap) {
   const auto stride = static_cast<std::size_t>(layers);
   const std::size_t entries = kBlockVoxels * stride;
   const std::size_t block_bytes = kIndexBytes + entries * 2 * sizeof(std::uint16_t);
@@ -296,7 +297,7 @@ Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers) {
     for (std::size_t i = 0; i < entries; ++i) {
       const ListEntry& entry = block.entries[i];
       const std::size_t first = i - i % stride;
-      bool good = entry.confidence >= 0 && entry.confidence <= kLargestConfidence;
+      bool good = entry.confidence >= 0 && entry.confidence <= confidence_cap;
       if (entry.id == kNoInstance) {
         good = entry.confidence == 0;
       } else {

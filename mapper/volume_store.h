@@ -36,6 +36,6 @@ struct ListsOfBlock {
 void SaveLists(const std::vector<ListsOfBlock>& blocks, int layers, std::string& bytes);
 // Errors: kData, a fragment, where a block is out of order or empty, or a list has a gap, an object
 // twice, or a confidence out of range.
-Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers);
+Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers, int confidence_cap);
 
 }  // namespace tsdfpp

@@ -178,6 +178,7 @@ TEST_P(MapFile, MadeUpContentIsRefusedOrInOrder) {
       ASSERT_EQ(loaded.error().kind, ErrorKind::kData) << loaded.error().message;
       continue;
     }
+    ASSERT_EQ(loaded->map->FindFault(), std::nullopt) << "round " << i;
     SetPosesThenFuse(*loaded->map, DriveFrame(1));
     EXPECT_FALSE(loaded->map->SceneMesh().triangles.empty());
   }
