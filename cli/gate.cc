@@ -15,7 +15,6 @@
 namespace tsdfpp {
 namespace {
 
-constexpr const char* kPictures = "pictures";  // in the folder of the results
 constexpr int kFreshSeeds = 20;
 constexpr std::uint64_t kFirstFreshSeed = 1001;
 
@@ -94,7 +93,11 @@ Expected<CommandResult> Explain(const GateRun& run, const References& references
                                 const std::filesystem::path& out) {
   const GateOutcome& outcome = run.gates.front();
   TSDFPP_ASSIGN(const GateExplanation explanation,
-                ExplainGate(run, outcome, references, out / kPictures));
+                ExplainGate(run, outcome, references, out / kGatePictures));
+  // Where nothing could be judged the sentence has it.
+  const std::string why = outcome.judgement.why.empty() || outcome.judgement.values.empty()
+                              ? ""
+                              : fmt::format("value: {}\n", outcome.judgement.why);
   return CommandResult{{{"gate", outcome.gate.name},
                         {"verdict", VerdictName(outcome.judgement.verdict)},
                         {"why", outcome.judgement.why},
@@ -103,25 +106,21 @@ Expected<CommandResult> Explain(const GateRun& run, const References& references
                         {"frame", explanation.frame},
                         {"object", explanation.object},
                         {"picture", explanation.picture}},
-                       fmt::format("{}\nbounds: {} ({})\n", explanation.sentence,
+                       fmt::format("{}\n{}bounds: {} ({})\n", explanation.sentence, why,
                                    outcome.gate.bounds.Text(), outcome.gate.why)};
 }
 
 // The reports, with a picture for each gate that does not hold.
 Expected<CommandResult> Report(const GateRun& run, const References& references,
                                const std::filesystem::path& out) {
-  std::map<std::string, std::string> explanations;
+  GateExplanations explanations;
   for (const GateOutcome& outcome : run.gates) {
     if (outcome.passed()) continue;
-    TSDFPP_ASSIGN(const GateExplanation one,
-                  ExplainGate(run, outcome, references, out / kPictures));
-    if (one.picture.empty()) continue;
-    explanations[outcome.gate.name] =
-        fmt::format("Worst at {} frame {}{}: ![picture]({}/{})", one.replicate, one.frame,
-                    one.object.empty() ? "" : ", " + one.object, kPictures, one.picture);
+    TSDFPP_ASSIGN(explanations[outcome.gate.name],
+                  ExplainGate(run, outcome, references, out / kGatePictures));
   }
   TSDFPP_RETURN_IF_ERROR(WriteGateReports(run, explanations, out));
-  return CommandResult{GateJson(run), GateTable(run, WantsColour()), run.exit_code()};
+  return CommandResult{GateJson(run, explanations), GateTable(run, WantsColour()), run.exit_code()};
 }
 
 Expected<CommandResult> RunGateCommand(const Options& options) {

@@ -13,6 +13,7 @@ namespace {
 struct Options {
   std::string run;
   std::string compare;
+  std::string gates;
   std::string out;
   bool video = false;
 };
@@ -21,8 +22,9 @@ Expected<CommandResult> RunVideo(const Options& options) {
   const std::filesystem::path out = options.out.empty()
                                         ? std::filesystem::path(options.run) / "report.mp4"
                                         : std::filesystem::path(options.out);
-  if (!options.compare.empty()) {
-    return UsageError("--compare is for the page, expected it without --video");
+  if (!options.compare.empty() || !options.gates.empty()) {
+    return UsageError("{} is for the page, expected it without --video",
+                      options.compare.empty() ? "--gates" : "--compare");
   }
   TSDFPP_ASSIGN(const ReportVideo video, WriteReportVideo(options.run, out));
   return CommandResult{{{"video", out.string()},
@@ -42,11 +44,19 @@ Expected<CommandResult> RunReport(const Options& options) {
     folders.emplace_back(options.compare);
     command += " --compare " + options.compare;
   }
+  // Verdicts that lie beside the comparison belong to it.
+  std::filesystem::path gates = std::filesystem::path(options.run) / "gates.json";
+  if (!options.gates.empty()) {
+    gates = options.gates;
+    command += " --gates " + options.gates;
+  } else if (std::error_code none; !std::filesystem::exists(gates, none)) {
+    gates.clear();
+  }
   const std::filesystem::path out = options.out.empty()
                                         ? std::filesystem::path(options.run) / "report.html"
                                         : std::filesystem::path(options.out);
   if (!options.out.empty()) command += " --out " + options.out;
-  TSDFPP_ASSIGN(const ReportPage page, MakeReportPage(folders, command));
+  TSDFPP_ASSIGN(const ReportPage page, MakeReportPage(folders, command, kLargestPage_bytes, gates));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out, page.html));
   for (const std::string& remark : page.remarks) spdlog::warn("{}", remark);
   return CommandResult{
@@ -64,6 +74,10 @@ Run AddReport(CLI::App& app, const CommonOptions&) {
       ->required();
   app.add_option("--compare", options->compare, "A second such folder, to set against the first")
       ->check(NotEmpty("a folder"));
+  app.add_option("--gates", options->gates,
+                 "The verdicts to show: a gates.json that tsdfpp gate wrote; RUN/gates.json where "
+                 "that is there")
+      ->check(NotEmpty("a file"));
   app.add_option("--out", options->out, "The file; RUN/report.html or RUN/report.mp4 by default")
       ->check(NotEmpty("a file"));
   app.add_flag("--video", options->video,

@@ -78,17 +78,18 @@ nlohmann::json CellToJson(const Cell& cell, const CellResult& result) {
   }
   nlohmann::json images = nlohmann::json::object();
   for (const auto& [frame, digest] : result.image_digests) images[std::to_string(frame)] = digest;
-  return {{"schema", kCellSchema},
-          {"id", cell.id},
-          {"sequence", cell.sequence},
-          {"key", cell.key},
-          {"settings", SettingsJson(cell.settings)},
-          {"examined", Named(result.examined)},
-          {"removed", result.removed},
-          {"frames", frames},
-          {"evaluation", result.evaluation},
-          {"times", result.times},
-          {"images", images}};
+  return {
+      {"schema", kCellSchema},
+      {"id", cell.id},
+      {"sequence", cell.sequence},
+      {"key", cell.key},
+      {"settings", SettingsJson(cell.settings)},
+      {"examined", Named(result.examined)},
+      {"removed", result.removed},
+      {"frames", frames},
+      {"evaluation", result.evaluation},
+      {"times", {{"run", result.timed_in}, {"frame_ms", result.frame_ms}, {"steps", result.times}}},
+      {"images", images}};
 }
 
 Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
@@ -107,7 +108,10 @@ Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
     result.examined = FromNamed(json.at("examined"), SweepMetrics().size());
     result.evaluation = json.at("evaluation");
     result.removed = json.at("removed").get<std::vector<InstanceId>>();
-    result.times = json.at("times");
+    const nlohmann::json& times = json.at("times");
+    result.times = times.at("steps");
+    result.frame_ms = times.at("frame_ms").get<std::vector<double>>();
+    result.timed_in = times.at("run");
     for (const auto& [frame, digest] : json.at("images").items()) {
       result.image_digests[std::stoi(frame)] = digest;
     }

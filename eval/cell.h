@@ -13,7 +13,7 @@
 
 namespace tsdfpp {
 
-inline constexpr int kCellSchema = 1;
+inline constexpr int kCellSchema = 2;
 
 struct Cell {
   CellSettings settings;
@@ -40,7 +40,11 @@ struct CellResult {
   nlohmann::json evaluation;                 // everything, at the examined frame
   std::vector<InstanceId> removed;           // at the examined frame
   std::map<int, std::string> image_digests;  // ImageDigest of every frame used
-  nlohmann::json times;                      // RunTimes::ToJson; null where not measured
+  nlohmann::json times;                      // RunTimes::ToJson; null where steps are not measured
+  std::vector<double> frame_ms;              // of each frame used
+  // The run in which it was timed: cells of one run took turns, frame by frame, so that their times
+  // may be compared.
+  std::string timed_in;
 };
 
 // Of the bytes of depth, mask and colour as the mapper got them, and its poses as text.

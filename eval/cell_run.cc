@@ -1,8 +1,18 @@
 #include "eval/cell_run.h"
 
 #include <algorithm>
+#include <random>
 
 namespace tsdfpp {
+namespace {
+
+// No two calls have the same, not even on two machines.
+std::string NameOfThisRun() {
+  std::random_device entropy;
+  return fmt::format("{:08x}{:08x}", entropy(), entropy());
+}
+
+}  // namespace
 
 CellMapper::CellMapper(const CellSettings& settings, const std::vector<ObjectInfo>& objects)
     : config_(*settings.Pipeline()) {
@@ -18,9 +28,11 @@ CellMapper::CellMapper(const CellSettings& settings, const std::vector<ObjectInf
 
 void CellMapper::Process(const Frame& frame) {
   if (pipeline_) {
-    times_.Add(pipeline_->Process(frame));
+    const StepTimes step = pipeline_->Process(frame);
+    times_.Add(step);
+    frame_s_.push_back(step.track_s + step.update_poses_s + step.fuse_s);
   } else {
-    open3d_->Integrate(frame);
+    frame_s_.push_back(open3d_->Integrate(frame));
   }
 }
 
@@ -37,8 +49,8 @@ SceneMeshes CellMapper::Meshes(const std::set<InstanceId>& movers) {
 }
 
 RunCosts CellMapper::costs() const {
-  if (!pipeline_) return {};
-  return {times_, pipeline_->map().Memory()};
+  if (!pipeline_) return {std::nullopt, frame_s_, open3d_->OccupiedBytes()};
+  return {times_, frame_s_, pipeline_->map().Memory().bytes};
 }
 
 std::set<InstanceId> MoversNow(const SequenceInfo& info, const SceneTruth& truth) {
@@ -49,6 +61,7 @@ std::set<InstanceId> MoversNow(const SequenceInfo& info, const SceneTruth& truth
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
                                            const std::function<void()>& progress) {
+  const std::string timed_in = NameOfThisRun();
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
   TSDFPP_ASSIGN(SceneTruth truth,
                 SabotagedTruth(variant.sabotage, source.source(), variant.voxel_m));
@@ -106,6 +119,8 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
   for (Run& run : runs) {
     const RunCosts costs = run.mapper.costs();
     run.result.times = costs.times ? costs.times->ToJson() : nlohmann::json(nullptr);
+    for (const double seconds : costs.frame_s) run.result.frame_ms.push_back(1e3 * seconds);
+    run.result.timed_in = timed_in;
     run.result.image_digests = digests;
     results.push_back(std::move(run.result));
   }

@@ -30,7 +30,8 @@ class CellMapper {
   PipelineConfig config_;
   std::unique_ptr<Pipeline> pipeline_;
   std::unique_ptr<Open3dVolume> open3d_;
-  RunTimes times_;
+  RunTimes times_;               // not of Open3D
+  std::vector<double> frame_s_;  // of each frame
 };
 
 // The objects whose removal the experiment is about: those that the scene names; in a scene that

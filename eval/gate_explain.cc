@@ -6,6 +6,7 @@
 
 #include "core/files.h"
 #include "eval/cell_run.h"
+#include "eval/gate_times.h"
 #include "eval/pictures.h"
 #include "eval/sweep_metrics.h"
 
@@ -190,10 +191,21 @@ WorstPlace FindWorst(const GateOutcome& outcome, const GateReference* reference)
   for (const CellFrame& frame : pair->ours->frames) {
     if (frame.examined) worst.frame = frame.frame;
   }
+  worst.which = "the examined one";
+  if (outcome.gate.metric == kFrameTimeMetric) {
+    const std::map<int, double> ratios = FrameTimeRatios(*pair->ours, *pair->theirs);
+    const auto slowest =
+        std::max_element(ratios.begin(), ratios.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    if (slowest == ratios.end()) return worst;
+    worst.which = "the slowest against the other's time";
+    worst.frame = slowest->first;
+    return worst;
+  }
   for (const CellFrame& frame : pair->ours->frames) {
     const std::optional<double> value = ValueAt(outcome, worst.replicate, frame, reference);
     if (!value || outcome.gate.bounds.Hold(*value)) continue;
-    worst.examined = frame.examined;
+    if (!frame.examined) worst.which = "the first evaluated one out of the bounds";
     worst.frame = frame.frame;
     break;
   }
@@ -232,11 +244,9 @@ Expected<GateExplanation> ExplainGate(const GateRun& run, const GateOutcome& out
   explanation.picture = gate.name + ".png";
   TSDFPP_RETURN_IF_ERROR(Draw(seen, folder / explanation.picture));
   explanation.sentence = fmt::format(
-      "{} is {}: worst at {}{}frame {}{}{}; picture {}", gate.name,
+      "{} is {}: worst at {}{}frame {} ({}){}; picture {}", gate.name,
       VerdictName(outcome.judgement.verdict), worst.replicate, worst.replicate.empty() ? "" : " ",
-      worst.frame,
-      worst.examined ? " (the examined one)" : " (the first evaluated one out of the bounds)",
-      explanation.object.empty() ? "" : ", object " + explanation.object,
+      worst.frame, worst.which, explanation.object.empty() ? "" : ", object " + explanation.object,
       (folder / explanation.picture).string());
   return explanation;
 }

@@ -28,7 +28,7 @@ Expected<GateExplanation> ExplainGate(const GateRun& run, const GateOutcome& out
 struct WorstPlace {
   std::string replicate;
   int frame = 0;
-  bool examined = true;  // whether no frame before was out of the bounds
+  std::string which;  // that frame is, in words: "the examined one"
 };
 WorstPlace FindWorst(const GateOutcome& outcome, const GateReference* reference);
 

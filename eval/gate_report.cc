@@ -109,6 +109,15 @@ std::string TableCell(const std::string& text) {
   return cell;
 }
 
+// A clause to follow a sentence; empty where there is no picture.
+std::string Explained(const GateExplanation& explanation) {
+  if (explanation.picture.empty()) return "";
+  return fmt::format(" Worst at {} frame {}{}: ![picture]({}/{})", explanation.replicate,
+                     explanation.frame,
+                     explanation.object.empty() ? "" : ", " + TableCell(explanation.object),
+                     kGatePictures, explanation.picture);
+}
+
 nlohmann::json OutcomeJson(const GateOutcome& outcome) {
   const Judgement& judgement = outcome.judgement;
   const Gate& gate = outcome.gate;
@@ -191,9 +200,17 @@ std::string GateTable(const GateRun& run, bool colour) {
   return text + Summary(run) + "\n";
 }
 
-nlohmann::json GateJson(const GateRun& run) {
+nlohmann::json GateJson(const GateRun& run, const GateExplanations& explanations) {
   nlohmann::json gates = nlohmann::json::array();
-  for (const GateOutcome& outcome : run.gates) gates.push_back(OutcomeJson(outcome));
+  for (const GateOutcome& outcome : run.gates) {
+    gates.push_back(OutcomeJson(outcome));
+    const auto found = explanations.find(outcome.gate.name);
+    if (found == explanations.end()) continue;
+    gates.back()["explanation"] = {{"replicate", found->second.replicate},
+                                   {"frame", found->second.frame},
+                                   {"object", found->second.object},
+                                   {"picture", found->second.picture}};
+  }
   nlohmann::json controls = nlohmann::json::array();
   for (const ControlOutcome& one : run.controls) {
     controls.push_back({{"name", one.control.name},
@@ -254,8 +271,7 @@ std::string GateJUnit(const GateRun& run) {
       cases);
 }
 
-std::string GateMarkdown(const GateRun& run,
-                         const std::map<std::string, std::string>& explanations) {
+std::string GateMarkdown(const GateRun& run, const GateExplanations& explanations) {
   std::string text =
       fmt::format("### Accuracy gates, {}: {}\n\n", run.options.profile, Summary(run));
   if (run.options.sabotage != Sabotage::kNone) {
@@ -280,7 +296,7 @@ std::string GateMarkdown(const GateRun& run,
     text += fmt::format("\n**{}** is {}: {}.", TableCell(one.gate.name),
                         VerdictName(one.judgement.verdict), TableCell(one.judgement.why));
     const auto explanation = explanations.find(one.gate.name);
-    if (explanation != explanations.end()) text += " " + explanation->second;
+    if (explanation != explanations.end()) text += Explained(explanation->second);
     text += "\n";
   }
   if (!run.sabotages.empty()) {
@@ -295,10 +311,9 @@ std::string GateMarkdown(const GateRun& run,
                             TableCell(run.environment.machine));
 }
 
-Expected<void> WriteGateReports(const GateRun& run,
-                                const std::map<std::string, std::string>& explanations,
+Expected<void> WriteGateReports(const GateRun& run, const GateExplanations& explanations,
                                 const std::filesystem::path& out) {
-  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.json", GateJson(run).dump(1) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.json", GateJson(run, explanations).dump(1) + "\n"));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.junit.xml", GateJUnit(run)));
   return WriteFile(out / "gates.md", GateMarkdown(run, explanations));
 }

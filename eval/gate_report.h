@@ -7,30 +7,33 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "eval/gate_explain.h"
 #include "eval/gate_run.h"
 
 namespace tsdfpp {
 
 inline constexpr int kGatesSchema = 1;
+inline constexpr const char* kGatePictures = "pictures";  // beside gates.json
 
 // A line a control, gate and sabotage, and what it comes to; `colour` marks verdicts for a
 // terminal.
 std::string GateTable(const GateRun& run, bool colour);
 
-nlohmann::json GateJson(const GateRun& run);
+using GateExplanations = std::map<std::string, GateExplanation>;  // by gate
+
+// `explanations` are of gates that do not hold.
+nlohmann::json GateJson(const GateRun& run, const GateExplanations& explanations);
 
 // A suite of test cases, one a control, gate and sabotage: an inconclusive or invalid gate is an
 // error, a failed one a failure.
 std::string GateJUnit(const GateRun& run);
 
-// A table of the gates with the change against the reference. `explanations` are lines of Markdown
-// by gate, put below.
-std::string GateMarkdown(const GateRun& run,
-                         const std::map<std::string, std::string>& explanations);
+// A table of the gates with the change against the reference; below, what is behind those that do
+// not hold, with pictures.
+std::string GateMarkdown(const GateRun& run, const GateExplanations& explanations);
 
 // gates.json, gates.junit.xml and gates.md below `out`. Errors: kEnvironment.
-Expected<void> WriteGateReports(const GateRun& run,
-                                const std::map<std::string, std::string>& explanations,
+Expected<void> WriteGateReports(const GateRun& run, const GateExplanations& explanations,
                                 const std::filesystem::path& out);
 
 }  // namespace tsdfpp

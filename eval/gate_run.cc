@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "eval/gate_times.h"
 #include "eval/sweep_metrics.h"
 
 namespace tsdfpp {
@@ -38,6 +39,11 @@ ExperimentConfig WithCells(const ExperimentConfig& config, const std::vector<Cel
   return only;
 }
 
+struct PlannedPair {
+  CellSettings ours;
+  std::optional<CellSettings> theirs;
+};
+
 // What is to be run, an experiment.
 class Needs {
  public:
@@ -46,18 +52,26 @@ class Needs {
       cells_[experiment].push_back(settings);
     }
   }
+  // Both were added before.
+  void AddTimedTogether(const std::string& experiment, const PlannedPair& pair) {
+    together_[experiment].push_back(pair);
+  }
   const std::map<std::string, std::vector<CellSettings>>& cells() const { return cells_; }
+  const std::vector<PlannedPair>& TimedTogether(const std::string& experiment) const {
+    static const std::vector<PlannedPair> none;
+    const auto found = together_.find(experiment);
+    return found == together_.end() ? none : found->second;
+  }
 
  private:
   std::set<std::string> keys_;
+  std::map<std::string, std::vector<PlannedPair>> together_;
   std::map<std::string, std::vector<CellSettings>> cells_;
 };
 
-struct PlannedPair {
-  CellSettings ours;
-  std::optional<CellSettings> theirs;
-};
 using PlannedGate = std::map<std::string, PlannedPair>;
+
+bool IsOfTimes(const Gate& gate) { return FindMetric(gate.metric)->unit == "ms"; }
 
 PlannedGate PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
                      const std::vector<std::uint64_t>& seeds) {
@@ -90,6 +104,7 @@ void AddNeeds(const Gate& gate, const PlannedGate& plan, Needs& needs) {
   for (const auto& [replicate, pair] : plan) {
     needs.Add(gate.experiment, pair.ours);
     if (pair.theirs) needs.Add(gate.experiment, *pair.theirs);
+    if (IsOfTimes(gate)) needs.AddTimedTogether(gate.experiment, pair);
   }
 }
 
@@ -164,13 +179,41 @@ ControlOutcome DecideControl(const GatesConfig& config, const GateControl& contr
   return outcome;
 }
 
+// Cells that were not timed in one run, such as those of an experiment that got a method later.
+// They leave the folder, so that the next run makes them together. Whether there were any.
+bool ForgetTimedApart(const std::vector<PlannedPair>& together, const SweepResult& result,
+                      const std::filesystem::path& out) {
+  const CellStore store(out / "cells");
+  const auto entry_of = [&](const CellSettings& settings) {
+    return std::find_if(result.entries.begin(), result.entries.end(), [&](const auto& entry) {
+      return SettingsJson(entry.cell.settings) == SettingsJson(settings);
+    });
+  };
+  bool any = false;
+  for (const PlannedPair& pair : together) {
+    const auto ours = entry_of(pair.ours);
+    const auto theirs = entry_of(*pair.theirs);
+    if (WereTimedTogether(ours->result, theirs->result)) continue;
+    any = true;
+    for (const auto& entry : {ours, theirs}) {
+      std::error_code ignored;
+      std::filesystem::remove(store.PathOf(entry->cell.id), ignored);
+    }
+  }
+  return any;
+}
+
 Expected<void> RunNeeds(const GatesConfig& config, const Needs& needs, const SweepOptions& options,
                         GateCells& cells, GateEnvironment& environment) {
   for (const auto& [name, settings] : needs.cells()) {
     SweepOptions sweep = options;
     sweep.out = options.out / name;
-    TSDFPP_ASSIGN(SweepResult result,
-                  RunSweep(WithCells(config.FindExperiment(name)->config, settings), sweep));
+    sweep.threads = 1;  // Open3D's, so that a ratio of times means the same on any machine
+    const ExperimentConfig experiment = WithCells(config.FindExperiment(name)->config, settings);
+    TSDFPP_ASSIGN(SweepResult result, RunSweep(experiment, sweep));
+    if (ForgetTimedApart(needs.TimedTogether(name), result, sweep.out)) {
+      TSDFPP_ASSIGN(result, RunSweep(experiment, sweep));
+    }
     environment = {result.program, result.renderer, mj_versionString(), MachineName()};
     for (SweepResult::Entry& entry : result.entries) {
       cells.Add(name, entry.cell.settings, std::move(entry.result));
@@ -197,8 +240,22 @@ Judgement JudgeGate(const Gate& gate, const GateData& data, const GateReference*
     reference_mean /= static_cast<double>(reference->values.size());
   }
   std::vector<double> values;
+  int timed = 0;
   for (const auto& [replicate, pair] : data) {
     if (pair.ours == nullptr) return Invalid(fmt::format("{} was not run", replicate));
+    if (IsOfTimes(gate)) {
+      if (pair.theirs == nullptr) return Invalid(fmt::format("{} has no pair", replicate));
+      timed += static_cast<int>(FrameTimeRatios(*pair.ours, *pair.theirs).size());
+      if (!WereTimedTogether(*pair.ours, *pair.theirs)) {
+        return Invalid(fmt::format("{}: the two were not timed in one run", replicate));
+      }
+      if (gate.metric == kFrameTimeMetric) {
+        const Measured ratio = TimeRatio(*pair.ours, *pair.theirs);
+        if (!ratio.value) return Invalid(fmt::format("{}: {}", replicate, ratio.why_not));
+        values.push_back(*ratio.value);
+        continue;
+      }
+    }
     const Measured& ours = pair.ours->examined[metric];
     if (!ours.value) {
       return Invalid(
@@ -226,7 +283,12 @@ Judgement JudgeGate(const Gate& gate, const GateData& data, const GateReference*
     }
     values.push_back(gate.ratio ? *ours.value / other : *ours.value - other);
   }
-  return Judge(values, gate.bounds, gate.confidence, statistics);
+  Judgement judgement = Judge(values, gate.bounds, gate.confidence, statistics);
+  if (IsOfTimes(gate) && timed < kLeastTimedFrames) {
+    judgement.verdict = Verdict::kInconclusive;
+    judgement.why = fmt::format("{} frames were timed, {} are needed", timed, kLeastTimedFrames);
+  }
+  return judgement;
 }
 
 void GateCells::Add(const std::string& experiment, const CellSettings& settings,

@@ -7,6 +7,7 @@
 #include "core/files.h"
 #include "eval/base64.h"
 #include "eval/recording.h"
+#include "eval/report_gates.h"
 #include "sequence/sequence_json.h"
 #include "viewer/report_template.h"
 
@@ -136,7 +137,8 @@ std::string ScriptText(const json& value) {
   return safe;
 }
 
-std::string DataText(const std::vector<Comparison>& comparisons, const std::string& command) {
+std::string DataText(const std::vector<Comparison>& comparisons, const json& gates,
+                     const std::string& command) {
   json reports = json::array();
   std::string blocks;
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
@@ -154,6 +156,7 @@ std::string DataText(const std::vector<Comparison>& comparisons, const std::stri
   const json data{{"schema", 1},
                   {"version", TSDFPP_VERSION},
                   {"command", command},
+                  {"gates", gates},
                   {"reports", std::move(reports)}};
   return "<script type=\"application/json\" id=\"report-data\">" + ScriptText(data) +
          "</script>\n" + blocks;
@@ -162,7 +165,8 @@ std::string DataText(const std::vector<Comparison>& comparisons, const std::stri
 }  // namespace
 
 Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& folders,
-                                    const std::string& command, std::size_t largest_bytes) {
+                                    const std::string& command, std::size_t largest_bytes,
+                                    const std::filesystem::path& gates) {
   const std::string_view page = ReportTemplate();
   const std::size_t mark = page.find(kReportDataMark);
   if (mark == std::string_view::npos) {
@@ -174,9 +178,13 @@ Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& fo
     TSDFPP_ASSIGN(Comparison comparison, ReadComparison(folder));
     comparisons.push_back(std::move(comparison));
   }
+  json verdicts;
+  if (!gates.empty()) {
+    TSDFPP_ASSIGN(verdicts, ReadGateResults(gates));
+  }
   ReportPage made;
   while (true) {
-    const std::string data = DataText(comparisons, command);
+    const std::string data = DataText(comparisons, verdicts, command);
     if (page.size() + data.size() <= largest_bytes) {
       made.html = std::string(page.substr(0, mark)) + data +
                   std::string(page.substr(mark + kReportDataMark.size()));

@@ -20,11 +20,13 @@ struct ReportPage {
 };
 
 // The page of the comparisons in `folders` (what `tsdfpp compare` wrote; one or two), made by
-// `command`. Nothing that they hold can act as markup or as a script. Errors: kData where a
-// comparison's file is missing, unreadable or not of the form that it should have; kEnvironment
-// where this build has no page.
+// `command`, with the verdicts in `gates` (a gates.json that `tsdfpp gate` wrote) where that is not
+// empty. Nothing that they hold can act as markup or as a script. Errors: kData where a file is
+// missing, unreadable or not of the form that it should have; kEnvironment where this build has no
+// page.
 Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& folders,
                                     const std::string& command,
-                                    std::size_t largest_bytes = kLargestPage_bytes);
+                                    std::size_t largest_bytes = kLargestPage_bytes,
+                                    const std::filesystem::path& gates = {});
 
 }  // namespace tsdfpp

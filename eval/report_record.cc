@@ -287,6 +287,7 @@ Expected<void> ReportRecorder::Take(const CompareRun& run, const Evaluation& eva
     chunks.push_back(std::move(chunk));
   }
   for (const nlohmann::json& chunk : chunks) {
+    if (chunk["layer"] == "hole") continue;  // a large hole must not cost the map its detail
     left -= std::min(left, chunk["triangles"].get<std::size_t>());
   }
   AddChunks(layers.common, "common", left, chunks);

@@ -8,8 +8,8 @@
 namespace tsdfpp {
 namespace {
 
-// More than the frames of any such set: every observation counts the same.
-constexpr int kWeightCap = 10000;
+// The most that a voxel counts: up to so many frames, every observation counts the same.
+constexpr int kWeightCap = 255;
 
 bool HasTrajectory(const ObjectInfo& object) {
   return object.id != kBackground && !object.semantic_class.empty();

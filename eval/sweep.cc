@@ -119,7 +119,7 @@ Expected<void> RunTasks(const std::vector<Task>& tasks, const CellStore& store,
   if (tasks.empty()) return {};
   const int jobs = std::clamp(options.jobs, 1, static_cast<int>(tasks.size()));
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const int threads = std::max(1, cores / jobs);
+  const int threads = options.threads > 0 ? options.threads : std::max(1, cores / jobs);
   TSDFPP_ASSIGN(Workers workers, Workers::Start(jobs, [&](Channel& parent) {
                   return Work(tasks, store, threads, parent);
                 }));

@@ -15,7 +15,8 @@ namespace tsdfpp {
 
 struct SweepOptions {
   std::filesystem::path out;
-  int jobs = 1;  // worker processes, one a sequence at a time
+  int jobs = 1;     // worker processes, one a sequence at a time
+  int threads = 0;  // of each worker; 0: the cores, shared among them
   // Set by a signal handler to stop. The handler must be installed without SA_RESTART.
   const std::atomic<bool>* stop = nullptr;
   // Frames that were mapped, of all that are to be mapped.

@@ -1,6 +1,7 @@
 #include "eval/sweep_metrics.h"
 
 #include "eval/evaluation_columns.h"
+#include "metrics/statistics.h"
 
 namespace tsdfpp {
 namespace {
@@ -72,6 +73,7 @@ const std::vector<SweepMetric>& SweepMetrics() {
                    Better::kLower, 2});
     all.push_back(
         {"table_accuracy_rmse_mm", "distance error of the table", "mm", Better::kLower, 2});
+    all.push_back({kFrameTimeMetric, "time to map a frame", "ms", Better::kLower, 2});
     all.push_back({"move_ms", "time to move objects, a frame", "ms", Better::kLower, 2});
     all.push_back({"fuse_ms", "time to fuse, a frame", "ms", Better::kLower, 2});
     all.push_back({"mesh_ms", "time to mesh the scene", "ms", Better::kLower, 2});
@@ -98,11 +100,13 @@ std::vector<Measured> MeasureAll(const Evaluation& evaluation, const std::set<In
   }
   values.push_back(MoversAccuracy(evaluation, movers));
   values.push_back(TableAccuracy(evaluation));
+  values.push_back(costs.frame_s.empty() ? Measured::Undefined("no frame was mapped")
+                                         : Measured::Of(1e3 * MedianOf(costs.frame_s)));
   for (const char* step : {"update_poses", "fuse", "mesh_scene"}) {
     values.push_back(Median(costs, step));
   }
-  values.push_back(costs.memory ? Measured::Of(static_cast<double>(costs.memory->bytes) / 1e6)
-                                : Measured::Undefined("the mapper does not tell its size"));
+  values.push_back(costs.bytes ? Measured::Of(static_cast<double>(*costs.bytes) / 1e6)
+                               : Measured::Undefined("the mapper does not tell its size"));
   return values;
 }
 

@@ -16,6 +16,9 @@ namespace tsdfpp {
 
 enum class Better { kHigher, kLower };
 
+// The time to map a frame, of all mappers alike.
+inline constexpr const char* kFrameTimeMetric = "frame_ms";
+
 struct SweepMetric {
   std::string name;   // in CSV, JSON and experiments
   std::string words;  // in sentences and on axes, e.g. "hidden table kept"
@@ -33,8 +36,9 @@ std::size_t EvaluationMetricCount();
 
 // What a mapper took for its work.
 struct RunCosts {
-  std::optional<RunTimes> times;    // none: not measured step by step
-  std::optional<MapMemory> memory;  // none: not known
+  std::optional<RunTimes> times;     // none: not measured step by step
+  std::vector<double> frame_s;       // of each frame, all steps together
+  std::optional<std::size_t> bytes;  // of the map; none: not known
 };
 
 // The values of SweepMetrics(), in their order. `movers` are the objects that were removed.

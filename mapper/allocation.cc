@@ -7,7 +7,7 @@
 #include <array>
 #include <bit>
 
-#include "mapper/fusion_kernels.h"
+#include "mapper/frame_kernels.h"
 
 namespace tsdfpp {
 namespace {

@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <limits>
 #include <list>
 #include <set>
@@ -16,6 +17,7 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 8;
+constexpr std::size_t kLookUpsPerTask = 512;
 
 }  // namespace
 
@@ -86,12 +88,12 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   // the list.
   std::vector<std::uint8_t> shared(fused.size(), 0);
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, fused.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, fused.size(), kLookUpsPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const FusedBlock& block = fused[i];
           shared[i] = volumes_.at(block.id).lattice_is_world && Any(block.block->cover) &&
-                              IsShared(block.index, block.id)
+                              MayListSeveral(block.index)
                           ? 1
                           : 0;
         }
@@ -105,18 +107,11 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   CheckInDebugBuilds(*this);
 }
 
-// Whether another object may be listed in this block of the index.
-bool AnchoredMap::IsShared(const Index3& index, InstanceId id) const {
-  for (const auto& [other, volume] : volumes_) {
-    if (other == id) continue;
-    if (volume.lattice_is_world) {
-      const TsdfBlock* block = volume.grid.Find(index);
-      if (block != nullptr && Any(block->cover)) return true;
-    } else if (const auto reach = reach_.find(other); reach != reach_.end()) {
-      if (std::binary_search(reach->second.begin(), reach->second.end(), index)) return true;
-    }
-  }
-  return false;
+// Of a block of the index that is not dirty; a dirty one is computed anew in any case.
+bool AnchoredMap::MayListSeveral(const Index3& index) const {
+  if (layers_ == 1) return true;  // the one that is listed does not tell
+  const IndexBlock* ids = index_.Find(index);
+  return ids != nullptr && ids->size() > kBlockVoxels;
 }
 
 void AnchoredMap::Remove(InstanceId id) {
@@ -187,6 +182,7 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
     InstanceId id;
     BlockMask cover;
     const float* distance;
+    const TsdfBlock* block;  // which the distances are still to be taken from
   };
   std::vector<Listed> listed;
   std::list<PulledCover> pulled;
@@ -194,21 +190,28 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
     if (!object.moved) {
       const TsdfBlock* block = object.grid->Find(index);
       if (block == nullptr || !Any(block->cover)) continue;
-      listed.push_back({object.id, block->cover, block->distance.data()});
+      listed.push_back({object.id, block->cover, nullptr, block});
       continue;
     }
     const Participants::Moved& moved = *object.moved;
     if (!std::binary_search(moved.reach->begin(), moved.reach->end(), index)) continue;
     PulledCover& cover = pulled.emplace_back();
     if (CoverOfBlock(moved.reader, moved.T_LW, config_.voxel_m, config_.back(), index, cover)) {
-      listed.push_back({object.id, cover.covered, cover.distance.data()});
+      listed.push_back({object.id, cover.covered, cover.distance.data(), nullptr});
     }
   }
   if (listed.empty()) {
     ids.clear();
     return;
   }
-  ids.assign(static_cast<std::size_t>(kBlockVoxels * layers_), kNoInstance);
+  // No voxel lists more objects than the block has.
+  const int layers = std::min(layers_, static_cast<int>(listed.size()));
+  const auto size = static_cast<std::size_t>(kBlockVoxels * layers);
+  if (ids.size() != size) {
+    ids = IndexBlock(size, kNoInstance);
+  } else {
+    std::fill(ids.begin(), ids.end(), kNoInstance);
+  }
   if (listed.size() == 1) {
     int first = 0;
     for (const std::uint64_t slice : listed[0].cover) {
@@ -221,8 +224,11 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
   std::array<float, kMaxLayers * kBlockVoxels> distance;
   distance.fill(std::numeric_limits<float>::infinity());
+  std::array<float, kBlockVoxels> of_block;
   for (const Listed& of : listed) {
-    InsertByDistance(of.cover, of.distance, of.id, {layers_, distance.data(), ids.data()});
+    if (of.block != nullptr) ToFloats(of.block->distance.data(), kBlockVoxels, of_block.data());
+    const float* its = of.block != nullptr ? of_block.data() : of.distance;
+    InsertByDistance(of.cover, its, of.id, {layers, distance.data(), ids.data()});
   }
 }
 
@@ -253,10 +259,9 @@ std::vector<Listing> AnchoredMap::ListAt(const Eigen::Vector3i& voxel) const {
   const IndexBlock* ids = index_.Find(BlockOf(ToIndex3(voxel)));
   if (ids == nullptr || ids->empty()) return listings;
   const int place = PlaceInBlock(ToIndex3(voxel));
-  for (int i = 0; i < layers_; ++i) {
-    const InstanceId id = (*ids)[static_cast<std::size_t>(kBlockVoxels * i + place)];
-    if (id == kNoInstance) break;
-    listings.push_back({id, 0});
+  for (auto i = static_cast<std::size_t>(place); i < ids->size(); i += kBlockVoxels) {
+    if ((*ids)[i] == kNoInstance) break;
+    listings.push_back({(*ids)[i], 0});
   }
   return listings;
 }

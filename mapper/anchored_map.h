@@ -32,7 +32,7 @@ class AnchoredMap final : public LayeredMap {
 
  private:
   // Entry k of the list of voxel i at [k * kBlockVoxels + i], active first, kNoInstance where
-  // unused.
+  // unused; as many layers as the block has objects, up to K.
   using IndexBlock = std::vector<InstanceId>;
   struct Participants;
 
@@ -40,7 +40,7 @@ class AnchoredMap final : public LayeredMap {
   // a function of volumes and poses.
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
-  bool IsShared(const Index3& index, InstanceId id) const;
+  bool MayListSeveral(const Index3& index) const;
   void ComputeBlock(const Index3& index, const Participants& participants, IndexBlock& ids) const;
 
   int layers_;

@@ -3,32 +3,19 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <compare>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "mapper/block_directory.h"
+
 namespace tsdfpp {
 
 inline constexpr int kBlockSide = 8;
 inline constexpr int kBlockVoxels = kBlockSide * kBlockSide * kBlockSide;
-
-// Index of a voxel or of a block; ordered by z, then y, then x.
-struct Index3 {
-  int x = 0;
-  int y = 0;
-  int z = 0;
-
-  Index3 operator+(const Index3& other) const { return {x + other.x, y + other.y, z + other.z}; }
-  bool operator==(const Index3&) const = default;
-  std::strong_ordering operator<=>(const Index3& other) const {
-    if (z != other.z) return z <=> other.z;
-    if (y != other.y) return y <=> other.y;
-    return x <=> other.x;
-  }
-};
 
 inline Index3 ToIndex3(const Eigen::Vector3i& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -43,21 +30,6 @@ inline Index3 VoxelAt(const Index3& block, int place) {
           block.z * kBlockSide + (place >> 6)};
 }
 
-// 21 bits an axis, which at 1 cm reaches 80 km from the origin.
-inline std::uint64_t PackIndex(const Index3& index) {
-  constexpr std::int64_t kOffset = 1 << 20;
-  constexpr std::uint64_t kMask = (1ULL << 21U) - 1;
-  return (static_cast<std::uint64_t>(index.z + kOffset) & kMask) << 42U |
-         (static_cast<std::uint64_t>(index.y + kOffset) & kMask) << 21U |
-         (static_cast<std::uint64_t>(index.x + kOffset) & kMask);
-}
-inline Index3 UnpackIndex(std::uint64_t key) {
-  constexpr int kOffset = 1 << 20;
-  constexpr std::uint64_t kMask = (1ULL << 21U) - 1;
-  return {static_cast<int>(key & kMask) - kOffset, static_cast<int>((key >> 21U) & kMask) - kOffset,
-          static_cast<int>(key >> 42U) - kOffset};
-}
-
 // A hash of blocks. References to blocks stay valid until the block is erased.
 template <typename Block>
 class BlockGrid {
@@ -67,10 +39,10 @@ class BlockGrid {
     std::unique_ptr<Block> block;
   };
 
-  BlockGrid() { slots_.resize(kInitialSlots, kEmpty); }
+  BlockGrid() = default;
   BlockGrid(BlockGrid&&) noexcept = default;
   BlockGrid& operator=(BlockGrid&&) noexcept = default;
-  BlockGrid(const BlockGrid& other) : slots_(other.slots_) {
+  BlockGrid(const BlockGrid& other) : directory_(other.directory_) {
     entries_.reserve(other.entries_.size());
     for (const Entry& entry : other.entries_) {
       entries_.push_back({entry.index, std::make_unique<Block>(*entry.block)});
@@ -84,18 +56,20 @@ class BlockGrid {
 
   // The block's place in entries(), or nothing.
   std::optional<std::size_t> NumberOf(const Index3& index) const {
-    for (std::size_t slot = SlotOf(index);; slot = (slot + 1) & (slots_.size() - 1)) {
-      const std::int32_t at = slots_[slot];
-      if (at == kEmpty) return std::nullopt;
-      if (entries_[static_cast<std::size_t>(at)].index == index)
-        return static_cast<std::size_t>(at);
-    }
+    const std::int32_t number = directory_.Find(index);
+    if (number == BlockDirectory::kNone) return std::nullopt;
+    return static_cast<std::size_t>(number);
   }
 
   // The block, or nullptr.
-  Block* Find(const Index3& index) const {
-    const auto number = NumberOf(index);
-    return number ? entries_[*number].block.get() : nullptr;
+  Block* Find(const Index3& index) const { return BlockOrNone(directory_.Find(index)); }
+
+  // A block (13) and the 26 around it, x fastest, then y, then z; nullptr where there is none.
+  std::array<const Block*, 27> FindAround(const Index3& index) const {
+    const std::array<std::int32_t, 27> numbers = directory_.FindAround(index);
+    std::array<const Block*, 27> blocks;
+    for (std::size_t i = 0; i < numbers.size(); ++i) blocks[i] = BlockOrNone(numbers[i]);
+    return blocks;
   }
 
   Block& FindOrAdd(const Index3& index) {
@@ -105,12 +79,8 @@ class BlockGrid {
 
   // The block must not be there yet.
   Block& Add(const Index3& index, std::unique_ptr<Block> block) {
-    if ((entries_.size() + 1) * 2 > slots_.size()) {
-      slots_.assign(slots_.size() * 2, kEmpty);
-      for (std::size_t i = 0; i < entries_.size(); ++i) Place(i);
-    }
+    directory_.Set(index, static_cast<std::int32_t>(entries_.size()));
     entries_.push_back({index, std::move(block)});
-    Place(entries_.size() - 1);
     return *entries_.back().block;
   }
 
@@ -119,18 +89,17 @@ class BlockGrid {
     if (indices.empty()) return;
     std::size_t first = entries_.size();
     for (const Index3& index : indices) {
-      const std::size_t slot = FindSlot(index);
-      const auto entry = static_cast<std::size_t>(slots_[slot]);
+      const auto entry = static_cast<std::size_t>(directory_.Find(index));
       entries_[entry].block.reset();
       first = std::min(first, entry);
-      Vacate(slot);
+      directory_.Erase(index);
     }
     // What was made last goes first, as a rule, so that there is little to move.
     std::size_t kept = first;
     for (std::size_t i = first; i < entries_.size(); ++i) {
       if (entries_[i].block == nullptr) continue;
       if (i != kept) {
-        slots_[FindSlot(entries_[i].index)] = static_cast<std::int32_t>(kept);
+        directory_.Set(entries_[i].index, static_cast<std::int32_t>(kept));
         entries_[kept] = std::move(entries_[i]);
       }
       ++kept;
@@ -154,47 +123,16 @@ class BlockGrid {
   }
 
   std::size_t TableBytes() const {
-    return slots_.size() * sizeof(std::int32_t) + entries_.capacity() * sizeof(Entry);
+    return directory_.Bytes() + entries_.capacity() * sizeof(Entry);
   }
 
  private:
-  // Of a block that is there. An entry that was moved, or erased, matches by its index still.
-  std::size_t FindSlot(const Index3& index) const {
-    std::size_t slot = SlotOf(index);
-    while (entries_[static_cast<std::size_t>(slots_[slot])].index != index) {
-      slot = (slot + 1) & (slots_.size() - 1);
-    }
-    return slot;
-  }
-  // Empties a slot and pulls the ones behind it forward, so that no search ends too early.
-  void Vacate(std::size_t slot) {
-    const std::size_t mask = slots_.size() - 1;
-    for (std::size_t next = (slot + 1) & mask; slots_[next] != kEmpty; next = (next + 1) & mask) {
-      const std::size_t home = SlotOf(entries_[static_cast<std::size_t>(slots_[next])].index);
-      if (((next - home) & mask) < ((next - slot) & mask)) continue;
-      slots_[slot] = slots_[next];
-      slot = next;
-    }
-    slots_[slot] = kEmpty;
+  Block* BlockOrNone(std::int32_t number) const {
+    return number == BlockDirectory::kNone ? nullptr
+                                           : entries_[static_cast<std::size_t>(number)].block.get();
   }
 
-  static constexpr std::int32_t kEmpty = -1;
-  static constexpr std::size_t kInitialSlots = 64;
-
-  std::size_t SlotOf(const Index3& index) const {
-    std::uint64_t key = PackIndex(index);
-    key ^= key >> 31U;
-    key *= 0x9E3779B97F4A7C15ULL;
-    key ^= key >> 29U;
-    return static_cast<std::size_t>(key) & (slots_.size() - 1);
-  }
-  void Place(std::size_t entry) {
-    std::size_t slot = SlotOf(entries_[entry].index);
-    while (slots_[slot] != kEmpty) slot = (slot + 1) & (slots_.size() - 1);
-    slots_[slot] = static_cast<std::int32_t>(entry);
-  }
-
-  std::vector<std::int32_t> slots_;
+  BlockDirectory directory_;
   std::vector<Entry> entries_;
 };
 

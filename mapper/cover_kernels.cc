@@ -109,6 +109,47 @@ namespace tsdfpp {
 
 HWY_EXPORT(Corners);
 
+namespace {
+
+// The voxels and their neighbours in the block.
+BlockMask Widened(const BlockMask& mask) {
+  constexpr std::uint64_t kFirstColumn = 0x0101010101010101ULL;
+  BlockMask flat;
+  for (std::size_t z = 0; z < mask.size(); ++z) {
+    const std::uint64_t x =
+        mask[z] | (mask[z] & ~(kFirstColumn << 7U)) << 1U | (mask[z] & ~kFirstColumn) >> 1U;
+    flat[z] = x | x << 8U | x >> 8U;
+  }
+  BlockMask wide;
+  for (std::size_t z = 0; z < mask.size(); ++z) {
+    wide[z] = flat[z] | (z > 0 ? flat[z - 1] : 0) | (z + 1 < mask.size() ? flat[z + 1] : 0);
+  }
+  return wide;
+}
+
+}  // namespace
+
+BlockMask ChangedSigns(const BlockMask& old_observed, const BlockMask& old_negative,
+                       const BlockMask& observed, const BlockMask& negative) {
+  BlockMask changed;
+  BlockMask inside;
+  BlockMask outside;
+  for (std::size_t z = 0; z < changed.size(); ++z) {
+    changed[z] = (old_observed[z] ^ observed[z]) | (old_negative[z] ^ negative[z]);
+    inside[z] = old_negative[z] | negative[z];
+    outside[z] = (old_observed[z] & ~old_negative[z]) | (observed[z] & ~negative[z]);
+  }
+  if (!Any(changed)) return changed;
+  constexpr std::uint64_t kRim = 0xFF818181818181FFULL;
+  const BlockMask near_inside = Widened(inside);
+  const BlockMask near_outside = Widened(outside);
+  for (std::size_t z = 0; z < changed.size(); ++z) {
+    const std::uint64_t rim = z == 0 || z + 1 == changed.size() ? ~0ULL : kRim;
+    changed[z] &= rim | (near_inside[z] & near_outside[z]);
+  }
+  return changed;
+}
+
 BlockMask CornersOfCrossedCubes(const MasksAround& observed, const MasksAround& negative) {
   return HWY_DYNAMIC_DISPATCH(Corners)(observed, negative);
 }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/types.h"
+#include "mapper/cover_kernels.h"
 
 // One pass of this file an instruction set; the machine's best is chosen at run time. On x86-64 all
 // give the same bits: only correctly rounded operations, none contracted
@@ -17,48 +18,14 @@
 namespace tsdfpp {
 namespace {
 
-// table[pixel]. Plain loads: from a frame, which no cache holds, gathers took longer.
-template <typename From, typename To>
-void Read(const From* table, const Lanes& pixel, To* out) {
-  for (std::size_t i = 0; i < kBlockVoxels; ++i) out[i] = table[pixel[i]];
-}
-
-// The voxels and their neighbours in the block.
-inline BlockMask Widened(const BlockMask& mask) {
-  constexpr std::uint64_t kFirstColumn = 0x0101010101010101ULL;
-  BlockMask flat;
-  for (std::size_t z = 0; z < mask.size(); ++z) {
-    const std::uint64_t x =
-        mask[z] | (mask[z] & ~(kFirstColumn << 7U)) << 1U | (mask[z] & ~kFirstColumn) >> 1U;
-    flat[z] = x | x << 8U | x >> 8U;
+// table[pixel], `kLanes` at a time, where these are to be looked at. Plain loads: from a frame,
+// which no cache holds, gathers took longer.
+template <std::size_t kLanes, typename From, typename To>
+void Read(const From* table, const Lanes& pixel, const std::uint8_t* look, To* out) {
+  for (std::size_t i = 0; i < kBlockVoxels; i += kLanes) {
+    if (look[i] == 0) continue;
+    for (std::size_t k = i; k < i + kLanes; ++k) out[k] = table[pixel[k]];
   }
-  BlockMask wide;
-  for (std::size_t z = 0; z < mask.size(); ++z) {
-    wide[z] = flat[z] | (z > 0 ? flat[z - 1] : 0) | (z + 1 < mask.size() ? flat[z + 1] : 0);
-  }
-  return wide;
-}
-
-// See FusionResult. What is beyond the block may have either sign.
-inline BlockMask ChangedSigns(const BlockMask& old_observed, const BlockMask& old_negative,
-                              const BlockMask& observed, const BlockMask& negative) {
-  BlockMask changed;
-  BlockMask inside;
-  BlockMask outside;
-  for (std::size_t z = 0; z < changed.size(); ++z) {
-    changed[z] = (old_observed[z] ^ observed[z]) | (old_negative[z] ^ negative[z]);
-    inside[z] = old_negative[z] | negative[z];
-    outside[z] = (old_observed[z] & ~old_negative[z]) | (observed[z] & ~negative[z]);
-  }
-  if (!Any(changed)) return changed;
-  constexpr std::uint64_t kRim = 0xFF818181818181FFULL;
-  const BlockMask near_inside = Widened(inside);
-  const BlockMask near_outside = Widened(outside);
-  for (std::size_t z = 0; z < changed.size(); ++z) {
-    const std::uint64_t rim = z == 0 || z + 1 == changed.size() ? ~0ULL : kRim;
-    changed[z] &= rim | (near_inside[z] & near_outside[z]);
-  }
-  return changed;
 }
 
 // Four bytes that end with the three of a pixel, or begin with them at pixel 0: no byte beyond the
@@ -79,6 +46,7 @@ inline std::int32_t BytesOfColour(const KernelFrame& frame, std::int32_t pixel) 
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/half_lanes-inl.h"
 #include "mapper/mask_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -91,6 +59,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 using Shorts = hn::Rebind<std::uint16_t, Floats>;
+using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
 constexpr std::size_t kSlice = 64;
 
 // The voxels of a block as the camera sees them; what is out of view is infinitely far away, at
@@ -99,9 +68,12 @@ struct Projected {
   HWY_ALIGN std::array<float, kBlockVoxels> z;      // p_C.z
   HWY_ALIGN std::array<float, kBlockVoxels> scale;  // ray * iz
   HWY_ALIGN Lanes pixel;
+  // At the first voxel of a vector: whether one of its voxels is in view and not behind all.
+  std::array<std::uint8_t, kBlockVoxels> look;
 };
+constexpr std::size_t kLanes = hn::MaxLanes(Floats());
 
-// False where no voxel is in view.
+// False where none is to be looked at.
 bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock* next,
              Projected& out) {
   const Floats df;
@@ -130,6 +102,7 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
   const auto half = hn::Set(df, 0.5F);
   const auto zero = hn::Zero(df);
   const auto far_away = hn::Set(df, std::numeric_limits<float>::infinity());
+  const auto behind = hn::Set(df, place.behind_m);
   auto any = hn::MaskFromVec(hn::Zero(df));
   for (std::size_t z = 0; z < kBlockSide; ++z) {
     const float pz = static_cast<float>(place.first.z + static_cast<int>(z)) * place.voxel;
@@ -138,8 +111,8 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
     for (std::size_t k = 0; k < kSlice; k += hn::Lanes(df)) {
       const std::size_t i = kSlice * z + k;
       if (next != nullptr) {
-        hwy::Prefetch(&next->distance[i]);
-        if (next->full[z] != ~0ULL) hwy::Prefetch(&next->weight[i]);
+        if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
+        if (k == 0 && next->full[z] != ~0ULL) hwy::Prefetch(&next->weight[i]);
       }
       const auto row = [&](std::size_t r) {
         const auto fixed =
@@ -163,7 +136,9 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
       hn::Store(hn::Add(hn::Mul(line, stride), column), di, &out.pixel[i]);
       hn::Store(hn::IfThenElse(in_view, cam_z, far_away), df, &out.z[i]);
       hn::Store(hn::Mul(ray, iz), df, &out.scale[i]);
-      any = hn::Or(any, in_view);
+      const auto look = hn::And(in_view, hn::Le(cam_z, behind));
+      out.look[i] = hn::AllFalse(df, look) ? 0 : 1;
+      any = hn::Or(any, look);
     }
   }
   return !hn::AllFalse(df, any);
@@ -193,13 +168,17 @@ bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, Bloc
   if (!Project(frame, place, nullptr, projected)) return false;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
-  Read(frame.depth, projected.pixel, depth.data());
-  Read(frame.label, projected.pixel, label.data());
+  Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
+  Read<kLanes>(frame.label, projected.pixel, projected.look.data(), label.data());
   const Floats df;
   const Ints di;
   const auto minus_back = hn::Set(df, -back);
   auto any = hn::MaskFromVec(hn::Zero(di));
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    if (projected.look[i] == 0) {
+      hn::StoreU(hn::Set(di, -1), di, &out.pixel[i]);
+      continue;
+    }
     const auto measured = Measure(projected, depth.data(), i, minus_back);
     const auto labelled = hn::Ne(hn::Load(di, &label[i]), hn::Set(di, kNoInstance));
     const auto observed = hn::And(hn::RebindMask(di, measured.yes), labelled);
@@ -213,7 +192,7 @@ bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, Bloc
 
 // docs/map.md: the colours of the voxels that `bits` marks.
 void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_t* bits,
-                 float weight_cap, TsdfBlock& block) {
+                 float weight_cap, BlockColours& colours) {
   const Floats df;
   const Ints di;
   const Shorts du;
@@ -238,8 +217,9 @@ void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_
     const auto bytes = hn::Load(di, &colour[i]);
     const auto at_zero = hn::Eq(hn::Load(di, &pixel[i]), hn::Zero(di));
     const auto seen = hn::IfThenElse(at_zero, bytes, hn::ShiftRight<8>(bytes));
-    std::uint16_t* counts = &block.colour_count[i];
-    const auto count = hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(du, counts)));
+    const Bytes8 d8;
+    std::uint8_t* counts = &colours.count[i];
+    const auto count = hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(d8, counts)));
     const auto more = hn::Add(count, one);
     const auto share = hn::Div(one, more);
     const auto fuse = [&](std::uint16_t* stored, auto level) {
@@ -249,11 +229,11 @@ void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_
       const auto mean = hn::Add(hn::Add(old, change), half);
       hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElse(take, mean, old))), du, stored);
     };
-    fuse(&block.colour[0][i], hn::And(seen, low_byte));
-    fuse(&block.colour[1][i], hn::And(hn::ShiftRight<8>(seen), low_byte));
-    fuse(&block.colour[2][i], hn::And(hn::ShiftRight<16>(seen), low_byte));
+    fuse(&colours.channel[0][i], hn::And(seen, low_byte));
+    fuse(&colours.channel[1][i], hn::And(hn::ShiftRight<8>(seen), low_byte));
+    fuse(&colours.channel[2][i], hn::And(hn::ShiftRight<16>(seen), low_byte));
     const auto capped = hn::Min(more, hn::Set(df, weight_cap));
-    hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElse(take, capped, count))), du,
+    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, hn::IfThenElse(take, capped, count))), d8,
                counts);
   }
 }
@@ -289,15 +269,16 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   if (!Project(frame, place, next, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
-  Read(frame.depth, projected.pixel, depth.data());
+  Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
   if (kLabels != Labels::kOne && !rule.one_label) {
-    Read(frame.label, projected.pixel, label.data());
+    Read<kLanes>(frame.label, projected.pixel, projected.look.data(), label.data());
   } else if (kLabels == Labels::kEvery) {
     label.fill(rule.id);
   }
 
   const Floats df;
   const Ints di;
+  const Bytes8 d8;
   const auto zero = hn::Zero(df);
   const auto one = hn::Set(df, 1.0F);
   const auto id = hn::Set(di, rule.id);
@@ -305,7 +286,9 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto front = hn::Set(df, rule.front);
   const auto minus_back = hn::Set(df, -rule.back);
   const auto colour_band = hn::Set(df, rule.colour_band);
+  const auto first_colour_band = hn::Set(df, rule.first_colour_band);
   const auto cap = hn::Set(df, rule.weight_cap);
+  const auto full_share = hn::Div(one, hn::Add(cap, one));
   const auto minus_half = hn::Set(df, -0.5F * place.voxel);
   const bool contradiction = kLabels == Labels::kSome && rule.contradiction;
 
@@ -321,15 +304,17 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   bool any_coloured = false;
   bool any_cleared = false;
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    if (projected.look[i] == 0) continue;
     const auto measured = Measure(projected, depth.data(), i, minus_back);
     const auto s = measured.s;
     auto taken = measured.yes;
     auto against = hn::MaskFromVec(hn::Zero(df));
-    const auto old_d = hn::Load(df, &block.distance[i]);
+    const auto old_d = LoadHalves(df, &block.distance[i]);
     // Where all weights are known, they need not be read.
     const auto is_full = MaskAt(df, full.data(), i);
     const bool all_full = hn::AllTrue(df, is_full);
-    const auto old_w = all_full ? cap : hn::Load(df, &block.weight[i]);
+    const auto old_w =
+        all_full ? cap : hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(d8, &block.weight[i])));
     hn::VFromD<Ints> seen = id;
     if constexpr (kLabels != Labels::kOne) {
       seen = hn::Load(di, &label[i]);
@@ -347,11 +332,15 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     }
     const auto touched = hn::Or(taken, against);
     if (hn::AllFalse(df, touched)) continue;
+    const auto clamped = hn::Min(s, front);
+    // Free space seen once more, that no longer counts observations, stays what it is.
+    const auto settled = hn::And(hn::Eq(old_d, front), hn::And(is_full, hn::Gt(s, front)));
+    if (hn::AllTrue(df, hn::Or(hn::Not(touched), settled))) continue;
     result.changed = true;
     const auto more = hn::Add(old_w, one);
-    const auto clamped = hn::Min(s, front);
-    const auto fused = hn::Add(old_d, hn::Div(hn::Sub(clamped, old_d), more));
-    auto d = hn::IfThenElse(taken, fused, old_d);
+    const auto share = all_full ? full_share : hn::Div(one, more);
+    const auto fused = hn::Add(old_d, hn::Mul(hn::Sub(clamped, old_d), share));
+    auto d = hn::IfThenElse(taken, RoundLanesToHalf(df, fused), old_d);
     auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
     const auto near = hn::And(taken, hn::Le(s, front));
     PutBits(df, near, i, in_band.data());
@@ -359,26 +348,35 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
     }
     const auto has_colour = MaskAt(df, coloured.data(), i);
-    const auto colours =
-        hn::And(near, hn::Or(hn::Not(has_colour), hn::Le(hn::Abs(s), colour_band)));
+    const auto colours = hn::And(
+        near, hn::Le(hn::Abs(s), hn::IfThenElse(has_colour, colour_band, first_colour_band)));
     if (!hn::AllFalse(df, colours)) {
       PutBits(df, colours, i, to_colour.data());
       PutBits(df, hn::Or(has_colour, colours), i, coloured.data());
-      for (const auto& channel : block.colour) hwy::Prefetch(&channel[i]);
-      hwy::Prefetch(&block.colour_count[i]);
-      hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[i]));
+      if (block.colours != nullptr) {
+        for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
+        hwy::Prefetch(&block.colours->count[i]);
+      }
+      // The ends of the rows; what lies between is near.
+      for (std::size_t k = i; k < i + hn::Lanes(df); k += std::min<std::size_t>(8, kLanes)) {
+        const std::size_t last = k + std::min<std::size_t>(8, kLanes) - 1;
+        hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[k]));
+        hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[last]));
+      }
       any_coloured = true;
     }
     if (contradiction && !hn::AllFalse(df, against)) {
       const auto free = hn::And(against, hn::Gt(s, hn::Set(df, place.voxel)));
-      d = hn::IfThenElse(against, hn::IfThenElseZero(free, clamped), d);
+      d = hn::IfThenElse(against, hn::IfThenElseZero(free, RoundLanesToHalf(df, clamped)), d);
       w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), w);
       PutBits(df, against, i, cleared.data());
       any_cleared = true;
     }
     // Free space and full weights stay what they are: then the memory need not be written.
-    if (!hn::AllTrue(df, hn::Eq(d, old_d))) hn::Store(d, df, &block.distance[i]);
-    if (!hn::AllTrue(df, hn::Eq(w, old_w))) hn::Store(w, df, &block.weight[i]);
+    if (!hn::AllTrue(df, hn::Eq(d, old_d))) StoreHalves(df, d, &block.distance[i]);
+    if (!hn::AllTrue(df, hn::Eq(w, old_w))) {
+      hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
+    }
     if (!all_full || any_cleared) PutBits(df, hn::Eq(w, cap), i, full.data());
     const auto known = hn::Gt(w, zero);
     const auto inside = hn::And(known, hn::Lt(d, zero));
@@ -387,7 +385,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     PutBits(df, hn::And(inside, hn::Ge(d, minus_back)), i, band.data());
   }
   if (any_coloured) {
-    FuseColours(frame, projected.pixel, to_colour.data(), rule.weight_cap, block);
+    FuseColours(frame, projected.pixel, to_colour.data(), rule.weight_cap, block.MakeColours());
   }
   if (any_cleared) {
     const auto places = std::bit_cast<BlockMask>(cleared);
@@ -410,6 +408,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   result.changed_band = block.band != new_band;
   block.band = new_band;
   block.coloured = std::bit_cast<BlockMask>(coloured);
+  if (any_cleared && !Any(block.coloured)) block.colours.reset();
   return result;
 }
 
@@ -418,86 +417,6 @@ FusionResult Fuse(const KernelFrame& frame, const BlockPlace& place, const Fusio
   if (votes != nullptr) return FuseWith<Labels::kEvery>(frame, place, rule, block, next, votes);
   if (rule.one_label) return FuseWith<Labels::kOne>(frame, place, rule, block, next, nullptr);
   return FuseWith<Labels::kSome>(frame, place, rule, block, next, nullptr);
-}
-
-// The tiles of one row of tiles.
-void Summarise(const KernelFrame& frame, int tile_row, Tile* tiles) {
-  const Floats df;
-  const Ints di;
-  const Shorts du;
-  const auto width = static_cast<int>(frame.width);
-  const int first_line = tile_row * kTile_px;
-  const int last_line = std::min(first_line + kTile_px, static_cast<int>(frame.height));
-  const auto farthest_valid = hn::Set(df, kMaxValidDepth_m);
-  const auto zero = hn::Zero(df);
-  for (int left = 0; left < width; left += kTile_px, ++tiles) {
-    Tile tile;
-    if (left + kTile_px > width) {
-      for (int line = first_line; line < last_line; ++line) {
-        for (int column = left; column < width; ++column) {
-          const auto pixel = static_cast<std::size_t>(line) * static_cast<std::size_t>(width) +
-                             static_cast<std::size_t>(column);
-          const float depth = frame.depth[pixel];
-          tile.least_label = std::min(tile.least_label, frame.label[pixel]);
-          tile.greatest_label = std::max(tile.greatest_label, frame.label[pixel]);
-          if (!IsValidDepth(depth)) continue;
-          tile.nearest = std::min(tile.nearest, depth);
-          tile.farthest = std::max(tile.farthest, depth);
-        }
-      }
-      *tiles = tile;
-      continue;
-    }
-    auto nearest = hn::Set(df, tile.nearest);
-    auto farthest = zero;
-    auto least = hn::Set(di, kNoInstance);
-    auto greatest = hn::Zero(di);
-    for (int line = first_line; line < last_line; ++line) {
-      const auto pixel = static_cast<std::size_t>(line) * static_cast<std::size_t>(width) +
-                         static_cast<std::size_t>(left);
-      for (std::size_t k = pixel; k < pixel + kTile_px; k += hn::Lanes(df)) {
-        const auto depth = hn::LoadU(df, frame.depth + k);
-        const auto valid = hn::And(hn::Gt(depth, zero), hn::Le(depth, farthest_valid));
-        nearest = hn::IfThenElse(valid, hn::Min(nearest, depth), nearest);
-        farthest = hn::IfThenElse(valid, hn::Max(farthest, depth), farthest);
-        const auto label = hn::PromoteTo(di, hn::LoadU(du, frame.label + k));
-        least = hn::Min(least, label);
-        greatest = hn::Max(greatest, label);
-      }
-    }
-    tile.nearest = hn::GetLane(hn::MinOfLanes(df, nearest));
-    tile.farthest = hn::GetLane(hn::MaxOfLanes(df, farthest));
-    tile.least_label = static_cast<std::uint16_t>(hn::GetLane(hn::MinOfLanes(di, least)));
-    tile.greatest_label = static_cast<std::uint16_t>(hn::GetLane(hn::MaxOfLanes(di, greatest)));
-    *tiles = tile;
-  }
-}
-
-void RayBlocks(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-               const RayRanges& ranges, std::size_t count, std::uint64_t* keys) {
-  const hn::CappedTag<double, kKeysPerStep> dd;
-  const hn::Rebind<std::int64_t, decltype(dd)> dl;
-  const hn::Rebind<std::int32_t, decltype(dd)> di;
-  const auto half = hn::Set(dd, 0.5);
-  // As PackIndex().
-  const auto offset = hn::Set(di, 1 << 20);
-  const auto in_range = hn::Set(di, (1 << 21) - 1);
-  auto number = hn::Iota(dd, 0);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(dd)) {
-    const auto range =
-        hn::Min(hn::Add(hn::Set(dd, ranges.first), hn::Mul(hn::Set(dd, ranges.step), number)),
-                hn::Set(dd, ranges.last));
-    const auto block = [&](std::size_t axis) {
-      const auto point =
-          hn::Add(hn::Set(dd, origin[axis]), hn::Mul(hn::Set(dd, direction[axis]), range));
-      const auto voxel = hn::DemoteTo(di, hn::Floor(hn::Add(point, half)));
-      return hn::PromoteTo(dl, hn::And(hn::Add(hn::ShiftRight<3>(voxel), offset), in_range));
-    };
-    const auto key =
-        hn::Or(block(0), hn::Or(hn::ShiftLeft<21>(block(1)), hn::ShiftLeft<42>(block(2))));
-    hn::StoreU(key, dl, reinterpret_cast<std::int64_t*>(keys + i));
-    number = hn::Add(number, hn::Set(dd, static_cast<double>(hn::Lanes(dd))));
-  }
 }
 
 }  // namespace
@@ -509,8 +428,6 @@ namespace tsdfpp {
 
 HWY_EXPORT(Observe);
 HWY_EXPORT(Fuse);
-HWY_EXPORT(Summarise);
-HWY_EXPORT(RayBlocks);
 
 bool ObserveVoxels(const KernelFrame& frame, const BlockPlace& place, float back,
                    BlockObservation& out) {
@@ -520,15 +437,6 @@ bool ObserveVoxels(const KernelFrame& frame, const BlockPlace& place, float back
 FusionResult FuseVoxels(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                         TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
   return HWY_DYNAMIC_DISPATCH(Fuse)(frame, place, rule, block, next, votes);
-}
-
-void SummariseTiles(const KernelFrame& frame, int row, Tile* tiles) {
-  HWY_DYNAMIC_DISPATCH(Summarise)(frame, row, tiles);
-}
-
-void BlocksAtPoints(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-                    const RayRanges& ranges, std::size_t count, std::uint64_t* keys) {
-  HWY_DYNAMIC_DISPATCH(RayBlocks)(origin, direction, ranges, count, keys);
 }
 
 }  // namespace tsdfpp

@@ -22,18 +22,6 @@ struct KernelFrame {
   std::array<float, 4> intrinsics{};  // fx, fy, cx, cy
 };
 
-// What the pixels of a square of the image hold.
-inline constexpr int kTile_px = 16;
-struct Tile {
-  float nearest = std::numeric_limits<float>::infinity();  // metres, of the valid depths
-  float farthest = 0;
-  std::uint16_t least_label = kNoInstance;  // of all pixels
-  std::uint16_t greatest_label = 0;
-};
-
-// The tiles of row `row` of tiles, from left to right.
-void SummariseTiles(const KernelFrame& frame, int row, Tile* tiles);
-
 // What a frame says of the voxels of a block.
 struct BlockObservation {
   std::array<float, kBlockVoxels> distance;  // s, metres; meaningless without a pixel
@@ -46,6 +34,8 @@ struct BlockPlace {
   const float* T_CL = nullptr;  // rows of a 3x4 matrix
   float voxel = 0;              // metres
   Index3 first;                 // the block's lowest voxel
+  // p_C.z from which on a voxel is certainly farther behind what is seen than the back band.
+  float behind_m = std::numeric_limits<float>::infinity();
 };
 
 // Projects the voxels of a block and reads what the frame has there. False where no voxel is
@@ -61,6 +51,7 @@ struct FusionRule {
   float front = 0;             // metres
   float back = 0;
   float colour_band = 0;
+  float first_colour_band = 0;  // of what has no colour yet
   float weight_cap = 0;
 };
 
@@ -86,19 +77,5 @@ struct LabelVotes {
 // the cache meanwhile. `votes`, where given, lets the observations in band vote.
 FusionResult FuseVoxels(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                         TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes = nullptr);
-
-// Points at the ranges min(first + step * i, last), in the units of the ray's direction.
-struct RayRanges {
-  double first = 0;
-  double step = 0;
-  double last = 0;
-};
-
-// The blocks, as PackIndex() packs them, of the voxels nearest to `count` points of a ray,
-// origin + direction * range in voxels of the lattice. Whole vectors are written: `keys` has room
-// for `count` + kKeysPerStep.
-inline constexpr std::size_t kKeysPerStep = 8;
-void BlocksAtPoints(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-                    const RayRanges& ranges, std::size_t count, std::uint64_t* keys);
 
 }  // namespace tsdfpp

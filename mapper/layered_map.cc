@@ -40,7 +40,8 @@ std::optional<VoxelValue> ValueOf(const TsdfGrid& grid, const Index3& voxel) {
   const int place = PlaceInBlock(voxel);
   const auto i = static_cast<std::size_t>(place);
   if (block == nullptr || block->weight[i] <= 0) return std::nullopt;
-  return VoxelValue{block->distance[i], block->weight[i], block->ColourAt(place)};
+  return VoxelValue{block->distance[i], static_cast<float>(block->weight[i]),
+                    block->ColourAt(place)};
 }
 
 std::vector<InstanceId> LayeredMap::Objects() const {
@@ -284,7 +285,7 @@ MapMemory LayeredMap::VolumeMemory() const {
   MapMemory memory;
   for (const auto& [id, volume] : volumes_) {
     memory.blocks += volume.grid.size();
-    memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
+    memory.bytes += BytesOf(volume.grid);
   }
   for (const auto& [id, object] : meshes_) memory.mesh_bytes += object.mesh.Bytes();
   return memory;

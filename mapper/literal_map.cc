@@ -50,7 +50,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   for (const PlannedBlock& planned :
        PlanBlocks(view, sorted.size(), config_.voxel(), config_.back(), candidate_at)) {
     const auto* entry = sorted[planned.number];
-    tasks.push_back({entry->index, entry->block.get(), {}});
+    tasks.push_back({entry->index, entry->block.get(), planned.behind_m, {}});
   }
   const auto for_each_task = [&](const auto& function) {
     tbb::parallel_for(
@@ -72,7 +72,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
   BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel());
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.behind_m);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const std::int32_t pixel = observation.pixel[i];
@@ -96,7 +96,7 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
 void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW,
                             const Task& task) {
   BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel());
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.behind_m);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   const auto weight_cap = static_cast<float>(config_.weight_cap);
   for (auto& [id, volume] : volumes_) {
@@ -108,7 +108,9 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
       if (pixel < 0 || task.lists->active[i].id != id) continue;
       const float s = observation.distance[i];
       if (s <= config_.front()) {
-        const bool coloured = block->colour_count[i] == 0 || std::abs(s) <= config_.colour_band();
+        const bool coloured =
+            std::abs(s) <=
+            (block->ColourCount(i) == 0 ? config_.first_colour_band() : config_.colour_band());
         FuseVoxel(*block, i, s, coloured ? frame.kernel.colour + 3 * pixel : nullptr, weight_cap);
         changed = true;
       } else if (frame.kernel.label[pixel] == id) {
@@ -243,7 +245,7 @@ void LiteralMap::UpdateActiveField() const {
               if (list.active[k].id != id) continue;
               block.distance[k] = values->distance[k];
               block.weight[k] = values->weight[k];
-              block.SetColour(k, values->FixedColourAt(k), values->colour_count[k]);
+              block.SetColour(k, values->FixedColourAt(k), values->ColourCount(k));
             }
           }
           block.UpdateMasks(config_.back());
@@ -330,9 +332,9 @@ MapMemory LiteralMap::Memory() const {
   MapMemory memory{lists_.size(), lists_.size() * sizeof(ListBlock) + lists_.TableBytes()};
   for (const auto& [id, volume] : volumes_) {
     memory.blocks += volume.grid.size();
-    memory.bytes += volume.grid.size() * sizeof(TsdfBlock) + volume.grid.TableBytes();
+    memory.bytes += BytesOf(volume.grid);
   }
-  memory.mesh_bytes = active_.field.size() * sizeof(TsdfBlock) + active_.mesh.Bytes();
+  memory.mesh_bytes = BytesOf(active_.field) - active_.field.TableBytes() + active_.mesh.Bytes();
   for (const auto& [id, mesh] : object_meshes_) memory.mesh_bytes += mesh.Bytes();
   return memory;
 }

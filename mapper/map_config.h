@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/toml_reader.h"
+#include "mapper/half.h"
 
 namespace tsdfpp {
 
@@ -18,9 +19,10 @@ std::vector<Method> AllMethods();
 // Errors: kUsage, naming the methods there are. "anchored" and "literal" are understood as well.
 Expected<Method> MethodFromName(std::string_view name);
 
-// Observations farther from the surface colour only what has no colour yet: no mesh reads it there
-// (docs/map.md).
+// Observations farther from the surface colour nothing, or only what has no colour yet: no mesh
+// reads it there (docs/map.md).
 inline constexpr double kColourBand_voxels = 2;
+inline constexpr double kFirstColourBand_voxels = 3;
 
 // Which neighbours of its source point a moved voxel needs (docs/map.md, "Resampling").
 enum class Resampling {
@@ -47,10 +49,12 @@ struct MapConfig {
   Resampling resampling = Resampling::kAll;  // of the methods that move values
 
   float voxel() const { return static_cast<float>(voxel_m); }
-  float front() const { return static_cast<float>(trunc_front_voxels * voxel_m); }
-  float back() const { return static_cast<float>(trunc_back_voxels * voxel_m); }
+  // As distances are kept.
+  float front() const { return RoundToHalf(static_cast<float>(trunc_front_voxels * voxel_m)); }
+  float back() const { return RoundToHalf(static_cast<float>(trunc_back_voxels * voxel_m)); }
 
   float colour_band() const { return static_cast<float>(kColourBand_voxels * voxel_m); }
+  float first_colour_band() const { return static_cast<float>(kFirstColourBand_voxels * voxel_m); }
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

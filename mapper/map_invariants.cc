@@ -51,9 +51,9 @@ bool IsCrossed(const TsdfGrid& grid, const Index3& cube) {
 }
 
 Fault FindVoxelFault(const TsdfBlock& block, std::size_t i, const MapConfig& config) {
-  const float weight = block.weight[i];
+  const int weight = block.weight[i];
   const float distance = block.distance[i];
-  const std::uint16_t colours = block.colour_count[i];
+  const int colours = block.ColourCount(i);
   if (weight == 0) {
     const FixedColour none{};
     if (distance != 0 || colours != 0 || block.FixedColourAt(i) != none) {
@@ -61,8 +61,7 @@ Fault FindVoxelFault(const TsdfBlock& block, std::size_t i, const MapConfig& con
     }
     return std::nullopt;
   }
-  const bool weighs =
-      weight > 0 && weight <= static_cast<float>(config.weight_cap) * (1 + kRounding);
+  const bool weighs = weight > 0 && weight <= config.weight_cap;
   if (!weighs || colours > config.weight_cap) {
     return fmt::format("has weight {} and {} colours, expected up to {}", weight, colours,
                        config.weight_cap);
@@ -178,11 +177,11 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
         return fmt::format("{}: voxel {} {}", name, Text(voxel), *fault);
       }
       const bool negative = observed && distance < 0;
-      const bool right =
-          Bit(block->observed, place) == observed && Bit(block->negative, place) == negative &&
-          Bit(block->band, place) == (negative && distance >= -config.back()) &&
-          Bit(block->coloured, place) == (block->colour_count[i] > 0) &&
-          (!Bit(block->full, place) || block->weight[i] == static_cast<float>(config.weight_cap));
+      const bool right = Bit(block->observed, place) == observed &&
+                         Bit(block->negative, place) == negative &&
+                         Bit(block->band, place) == (negative && distance >= -config.back()) &&
+                         Bit(block->coloured, place) == (block->ColourCount(i) > 0) &&
+                         (!Bit(block->full, place) || block->weight[i] == config.weight_cap);
       if (!right) return fmt::format("{}: the masks of voxel {} are wrong", name, Text(voxel));
       const Eigen::Vector3d q(voxel.x, voxel.y, voxel.z);
       if (with_cover && Bit(block->cover, place) != CoversPoint(grid, q, config.back())) {
@@ -260,6 +259,16 @@ Fault TsdfppMap::FindFault() const {
   if (Fault fault = FindCountFault(*this, blocks)) return fault;
   for (const auto& [index, lists] : index_.entries()) {
     if (IsEmpty(*lists)) return fmt::format("block {} of the index is empty", Text(index));
+    if (lists->entries.size() % kBlockVoxels != 0 ||
+        lists->entries.size() > static_cast<std::size_t>(kBlockVoxels * layers_)) {
+      return fmt::format("block {} of the index has {} listings", Text(index),
+                         lists->entries.size());
+    }
+    ListBlock shortest = *lists;
+    FreeEmptyLayers(shortest);
+    if (shortest.entries.size() != lists->entries.size()) {
+      return fmt::format("block {} of the index has a layer that lists nothing", Text(index));
+    }
     for (std::size_t i = kBlockVoxels; i < lists->entries.size(); ++i) {
       const InstanceId before = lists->entries[i - kBlockVoxels].id;
       if (before == kNoInstance && lists->entries[i].id != kNoInstance) {

@@ -89,8 +89,9 @@ void TsdfppMap::Save(Sections& sections) const {
   LayeredMap::Save(sections);
   std::vector<ListsOfBlock> lists;
   for (const auto* entry : index_.Sorted()) {
-    lists.push_back(
-        {entry->index, Transposed(entry->block->entries, static_cast<std::size_t>(layers_))});
+    std::vector<ListEntry> entries = entry->block->entries;
+    entries.resize(static_cast<std::size_t>(kBlockVoxels * layers_));
+    lists.push_back({entry->index, Transposed(entries, static_cast<std::size_t>(layers_))});
   }
   SaveLists(lists, layers_, sections[kLists]);
 }
@@ -112,7 +113,9 @@ Expected<void> TsdfppMap::Load(const Sections& sections) {
   };
   for (const ListsOfBlock& block : lists) {
     TSDFPP_RETURN_IF_ERROR(CheckListings(block, layers_, covers));
-    ListsOf(block.index).entries = Transposed(block.entries, kBlockVoxels);
+    ListBlock& added = ListsOf(block.index);
+    added.entries = Transposed(block.entries, kBlockVoxels);
+    FreeEmptyLayers(added);
   }
   return {};
 }

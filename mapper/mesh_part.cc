@@ -198,7 +198,7 @@ void MakeVertices(MeshPart& part, float voxel) {
       const Index3 v = VoxelAt(part.index, place);
       const std::size_t i = At(place);
       const float d0 = block.distance[i];
-      const bool coloured0 = block.colour_count[i] > 0;
+      const bool coloured0 = block.ColourCount(i) > 0;
       for (int axis = 0; axis < 3; ++axis) {
         if (((edges[At(axis)] >> static_cast<unsigned>(bit)) & 1U) == 0) continue;
         const bool inner = ((place >> (3 * axis)) & 7) < 7;
@@ -209,7 +209,7 @@ void MakeVertices(MeshPart& part, float voxel) {
         Eigen::Vector3f position(static_cast<float>(v.x), static_cast<float>(v.y),
                                  static_cast<float>(v.z));
         position[axis] += t;
-        const bool coloured1 = other.colour_count[j] > 0;
+        const bool coloured1 = other.ColourCount(j) > 0;
         const FixedColour c0 =
             coloured0 ? block.FixedColourAt(i) : (coloured1 ? other.FixedColourAt(j) : kUncoloured);
         const FixedColour c1 = coloured1 ? other.FixedColourAt(j) : c0;

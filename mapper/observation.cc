@@ -112,6 +112,7 @@ Tile TilesUnder(const FrameView& frame, const Extent& extent) {
 struct Verdict {
   std::uint32_t bin = kNotSeen;
   InstanceId label = kNoInstance;
+  float behind_m = std::numeric_limits<float>::infinity();
 };
 
 Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, float back) {
@@ -128,7 +129,8 @@ Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, 
     }
     const Tile seen = TilesUnder(frame, extent);
     // Along the ray what is behind is at least as far behind as along the axis.
-    if (seen.farthest <= 0 || seen.farthest + back + slack_m < extent.z.low) return verdict;
+    verdict.behind_m = seen.farthest + back + slack_m;
+    if (seen.farthest <= 0 || verdict.behind_m < extent.z.low) return verdict;
     const bool has_label = seen.least_label <= block.id && block.id <= seen.greatest_label;
     if (!block.of_any_label && !has_label) return verdict;
     if (seen.least_label == seen.greatest_label) verdict.label = seen.least_label;
@@ -212,15 +214,18 @@ std::vector<PlannedBlock> PlanBlocks(
   for (std::size_t i = 0; i < count; ++i) {
     const Verdict& verdict = verdicts[i];
     if (verdict.bin == kNotSeen) continue;
-    planned[first[verdict.bin]++] = {static_cast<std::uint32_t>(i), verdict.label};
+    planned[first[verdict.bin]++] = {static_cast<std::uint32_t>(i), verdict.label,
+                                     verdict.behind_m};
   }
   return planned;
 }
 
-BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel) {
+BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel,
+                   float behind_m) {
   return {T_CL.rows[0].data(),
           voxel,
-          {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide}};
+          {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide},
+          behind_m};
 }
 
 }  // namespace tsdfpp

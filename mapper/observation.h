@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/types.h"
+#include "mapper/frame_kernels.h"
 #include "mapper/fusion_kernels.h"
 
 namespace tsdfpp {
@@ -56,6 +57,7 @@ struct PlannedBlock {
   // The one label of all pixels that the block's voxels can fall on, kNoInstance where there may be
   // several.
   InstanceId label = kNoInstance;
+  float behind_m = 0;  // see BlockPlace
 };
 
 // The candidates i of [0, count), given by `candidate_at(i)`, of which the frame may observe a
@@ -67,6 +69,6 @@ std::vector<PlannedBlock> PlanBlocks(
     const std::function<BlockCandidate(std::size_t)>& candidate_at);
 
 // The block as the kernels take it; `T_CL` must outlive the result.
-BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel);
+BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel, float behind_m);
 
 }  // namespace tsdfpp

@@ -68,6 +68,12 @@ class PatchBlocks {
     });
   }
 
+  bool any_coloured() const {
+    return std::any_of(blocks_.begin(), blocks_.end(), [](const TsdfBlock* block) {
+      return block != nullptr && block->colours != nullptr;
+    });
+  }
+
   PatchBits Bits(BlockMask TsdfBlock::*mask) const {
     PatchBits bits{};
     ForEachPiece([&](const TsdfBlock* block, int place, int to, int count) {
@@ -185,7 +191,8 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
   }
   if (!any) return false;
   PatchValues values;
-  blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.distance[i]; }, values);
+  blocks.Fill([](const TsdfBlock& block, std::size_t i) { return float{block.distance[i]}; },
+              values);
   InterpolateCounted(values, points, candidate.data(), out.distance.data());
   any = false;
   out.covered = {};
@@ -222,36 +229,46 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
     any = any || written;
   }
   if (!any) return false;
-  const auto keep_wanted = [&](auto& values) {
-    for (std::size_t i = 0; i < kBlockVoxels; ++i) values[i] = wanted[i] != 0 ? values[i] : 0;
-  };
   PatchValues values;
-  blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.distance[i]; }, values);
-  interpolate(values, points, wanted.data(), out.distance.data());
-  blocks.Fill([](const TsdfBlock& block, std::size_t i) { return block.weight[i]; }, values);
-  interpolate(values, points, wanted.data(), out.weight.data());
+  blocks.Fill([](const TsdfBlock& block, std::size_t i) { return float{block.distance[i]}; },
+              values);
+  std::array<float, kBlockVoxels> distance;
+  interpolate(values, points, wanted.data(), distance.data());
+  blocks.Fill(
+      [](const TsdfBlock& block, std::size_t i) { return static_cast<float>(block.weight[i]); },
+      values);
+  std::array<float, kBlockVoxels> weight{};
+  interpolate(values, points, wanted.data(), weight.data());
   PatchValues counts;
   blocks.Fill([](const TsdfBlock& block,
-                 std::size_t i) { return static_cast<float>(block.colour_count[i]); },
+                 std::size_t i) { return static_cast<float>(block.ColourCount(i)); },
               counts);
   std::array<float, kBlockVoxels> count{};
   std::array<float, kBlockVoxels> total{};
   interpolate(counts, points, wanted.data(), count.data());
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    out.distance[i] = wanted[i] != 0 ? distance[i] : 0;
+    out.weight[i] = wanted[i] != 0 ? static_cast<std::uint8_t>(weight[i] + 0.5F) : 0;
+  }
+  if (!blocks.any_coloured()) return true;
   std::array<PatchValues, 3> channels;
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    blocks.Fill([channel](const TsdfBlock& block,
-                          std::size_t i) { return static_cast<float>(block.colour[channel][i]); },
-                channels[channel]);
+    blocks.Fill(
+        [channel](const TsdfBlock& block, std::size_t i) {
+          return block.colours == nullptr ? 0.0F
+                                          : static_cast<float>(block.colours->channel[channel][i]);
+        },
+        channels[channel]);
   }
-  InterpolateColours(channels, counts, points, wanted.data(),
-                     {out.colour[0].data(), out.colour[1].data(), out.colour[2].data()},
-                     total.data());
-  keep_wanted(out.distance);
-  keep_wanted(out.weight);
-  for (auto& channel : out.colour) keep_wanted(channel);
+  BlockColours& colours = out.MakeColours();
+  InterpolateColours(
+      channels, counts, points, wanted.data(),
+      {colours.channel[0].data(), colours.channel[1].data(), colours.channel[2].data()},
+      total.data());
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const bool coloured = wanted[i] != 0 && total[i] > 0;
-    out.colour_count[i] = coloured ? static_cast<std::uint16_t>(count[i] + 0.5F) : 0;
+    colours.count[i] = coloured ? static_cast<std::uint8_t>(count[i] + 0.5F) : 0;
+    for (auto& channel : colours.channel) channel[i] = colours.count[i] > 0 ? channel[i] : 0;
   }
   return true;
 }

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <memory>
 
 #include "mapper/cube_rows.h"
@@ -75,12 +74,12 @@ void CopyDistances(const UpperNeighbours& blocks, RayBlock& out) {
       const std::size_t from = At(PlaceInBlock({0, y, z}));
       float* to = &out.distance[At((z * kCorners + y) * kCorners)];
       if (const TsdfBlock* block = blocks[At(place)]) {
-        std::memcpy(to, &block->distance[from], kBlockSide * sizeof(float));
+        ToFloats(&block->distance[from], kBlockSide, to);
       } else {
         std::fill(to, to + kBlockSide, 0.0F);
       }
       const TsdfBlock* next = blocks[At(place + 1)];
-      to[kBlockSide] = next == nullptr ? 0 : next->distance[from];
+      to[kBlockSide] = next == nullptr ? 0.0F : float{next->distance[from]};
     }
   }
 }

@@ -369,7 +369,7 @@ class Caster::Tile {
       const Index3 voxel = base + Index3{corner & 1, (corner >> 1) & 1, corner >> 2};
       const TsdfBlock* block = BlockOf(voxel) == BlockOf(base) ? inner : grid.Find(BlockOf(voxel));
       const std::size_t place = At(PlaceInBlock(voxel));
-      if (block == nullptr || block->colour_count[place] == 0) continue;
+      if (block == nullptr || block->ColourCount(place) == 0) continue;
       double weight = 1;
       for (int a = 0; a < 3; ++a) weight *= ((corner >> a) & 1) != 0 ? f[a] : 1 - f[a];
       const FixedColour c = block->FixedColourAt(place);

@@ -59,8 +59,8 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
           const auto& [index, block] = blocks[planned[k].number];
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : blocks[planned[k + 1].number].block.get();
-          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel()), planned[k].label, next, *block,
-                    *labels_.Find(index));
+          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel(), planned[k].behind_m),
+                    planned[k].label, next, *block, *labels_.Find(index));
         }
       },
       tbb::simple_partitioner());
@@ -78,6 +78,7 @@ void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockPlace& place, 
   rule.back = config_.back();
   // Colours go wherever labels do: a triangle's label and colour are of the same observations.
   rule.colour_band = std::numeric_limits<float>::infinity();
+  rule.first_colour_band = rule.colour_band;
   rule.weight_cap = static_cast<float>(config_.weight_cap);
   LabelVotes votes{labels.id.data(), labels.confidence.data(), config_.confidence_cap};
   const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next, &votes);
@@ -199,7 +200,7 @@ void SingleFieldMap::Arrive(InstanceId id, const Index3& index, const TsdfBlock&
     }
     block->distance[i] = arrival.distance[i];
     block->weight[i] = arrival.weight[i];
-    block->SetColour(i, arrival.FixedColourAt(i), arrival.colour_count[i]);
+    block->SetColour(i, arrival.FixedColourAt(i), arrival.ColourCount(i));
     labels->id[i] = id;
     labels->confidence[i] = confidence(i);
     labels->ever |= EverBit(id);
@@ -309,8 +310,7 @@ std::vector<Eigen::Vector3i> SingleFieldMap::ListedVoxels() const {
 
 MapMemory SingleFieldMap::Memory() const {
   return {field_.size(),
-          field_.size() * (sizeof(TsdfBlock) + sizeof(LabelBlock)) + field_.TableBytes() +
-              labels_.TableBytes(),
+          BytesOf(field_) + field_.size() * sizeof(LabelBlock) + labels_.TableBytes(),
           mesh_.Bytes()};
 }
 

@@ -22,19 +22,25 @@ struct SliceMasks {
   std::uint64_t near_back = 0;  // distance >= -back, observed or not
 };
 
-SliceMasks MasksOf(const float* distance, const float* weight, float back) {
+SliceMasks MasksOf(const Half* halves, const std::uint8_t* weight, float back) {
   SliceMasks masks;
+  std::array<float, 64> distance;
+  ToFloats(halves, distance.size(), distance.data());
 #ifdef __SSE2__
   const __m128 zero = _mm_setzero_ps();
   const __m128 minus_back = _mm_set1_ps(-back);
   for (unsigned i = 0; i < 64; i += 4) {
-    const __m128 d = _mm_loadu_ps(distance + i);
+    const __m128 d = _mm_loadu_ps(&distance[i]);
     const auto bits = [i](__m128 test) {
       return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_ps(test))) << i;
     };
-    masks.observed |= bits(_mm_cmpgt_ps(_mm_loadu_ps(weight + i), zero));
     masks.negative |= bits(_mm_cmplt_ps(d, zero));
     masks.near_back |= bits(_mm_cmpge_ps(d, minus_back));
+  }
+  for (unsigned i = 0; i < 64; i += 16) {
+    const __m128i w = _mm_loadu_si128(reinterpret_cast<const __m128i*>(weight + i));
+    const int none = _mm_movemask_epi8(_mm_cmpeq_epi8(w, _mm_setzero_si128()));
+    masks.observed |= static_cast<std::uint64_t>(static_cast<unsigned>(none) ^ 0xFFFFU) << i;
   }
 #else
   for (unsigned i = 0; i < 64; ++i) {
@@ -69,30 +75,32 @@ bool TsdfBlock::UpdateMasks(float back) {
     negative[z] = n & o;
     band[z] = b & n & o;
     std::uint64_t with_colour = 0;
-    for (std::size_t i = 0; i < 64; ++i) {
-      with_colour |= static_cast<std::uint64_t>(colour_count[64 * z + i] > 0) << i;
+    for (std::size_t i = 0; i < 64 && colours != nullptr; ++i) {
+      with_colour |= static_cast<std::uint64_t>(colours->count[64 * z + i] > 0) << i;
     }
     coloured[z] = with_colour;
   }
+  if (!Any(coloured)) colours.reset();
   return observed != old_observed || negative != old_negative || band != old_band;
+}
+
+std::size_t BytesOf(const TsdfGrid& grid) {
+  std::size_t bytes = grid.TableBytes();
+  for (const TsdfGrid::Entry& entry : grid.entries()) bytes += entry.block->Bytes();
+  return bytes;
 }
 
 Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block) {
   Surroundings around;
   around.band = &kNoVoxels;
-  std::size_t i = 0;
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x, ++i) {
-        const TsdfBlock* at = grid.Find(block + Index3{x, y, z});
-        around.observed[i] = at == nullptr ? &kNoVoxels : &at->observed;
-        around.negative[i] = at == nullptr ? &kNoVoxels : &at->negative;
-        if (i == 13 && at != nullptr) around.band = &at->band;
-        hwy::Prefetch(around.observed[i]);
-        hwy::Prefetch(around.negative[i]);
-      }
-    }
+  const std::array<const TsdfBlock*, 27> blocks = grid.FindAround(block);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    around.observed[i] = blocks[i] == nullptr ? &kNoVoxels : &blocks[i]->observed;
+    around.negative[i] = blocks[i] == nullptr ? &kNoVoxels : &blocks[i]->negative;
+    hwy::Prefetch(around.observed[i]);
+    hwy::Prefetch(around.negative[i]);
   }
+  if (blocks[13] != nullptr) around.band = &blocks[13]->band;
   return around;
 }
 

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 
 #include "core/types.h"
 #include "mapper/block_grid.h"
+#include "mapper/half.h"
 
 namespace tsdfpp {
 
@@ -34,18 +36,38 @@ using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
 // anything: it depends on threads.
 std::uint64_t NewRevision();
 
+struct alignas(64) BlockColours {
+  std::array<std::array<std::uint16_t, kBlockVoxels>, 3> channel{};  // 8.8 fixed point
+  std::array<std::uint8_t, kBlockVoxels> count{};
+};
+
+// A unique_ptr that copies what it points at.
+template <typename T>
+class Copied : public std::unique_ptr<T> {
+ public:
+  Copied() = default;
+  Copied(const Copied& other)
+      : std::unique_ptr<T>(other == nullptr ? nullptr : std::make_unique<T>(*other)) {}
+  Copied(Copied&&) noexcept = default;
+  Copied& operator=(Copied other) noexcept {
+    this->swap(other);
+    return *this;
+  }
+  ~Copied() = default;
+};
+
 // Aligned to cache lines, which whole vectors then do not straddle.
 struct alignas(64) TsdfBlock {
-  std::array<float, kBlockVoxels> distance{};  // metres, positive in front of the surface
-  std::array<float, kBlockVoxels> weight{};    // observations; 0 is unobserved
-  std::array<std::array<std::uint16_t, kBlockVoxels>, 3> colour{};  // by channel, 8.8 fixed point
-  std::array<std::uint16_t, kBlockVoxels> colour_count{};
+  std::array<Half, kBlockVoxels> distance{};        // metres, positive in front of the surface
+  std::array<std::uint8_t, kBlockVoxels> weight{};  // observations; 0 is unobserved
+  // Only while a voxel has a colour: most blocks lie too far from a surface.
+  Copied<BlockColours> colours;
 
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
-  BlockMask coloured{};  // colour_count > 0
+  BlockMask coloured{};  // the number of colours is above 0
   BlockMask full{};      // of these it is known that the weight is at its cap
 
   // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
@@ -54,7 +76,8 @@ struct alignas(64) TsdfBlock {
   std::uint64_t revision = 0;
 
   // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
-  // true where one of observed, negative and band changed. `back` in metres.
+  // true where one of observed, negative and band changed. `back` in metres. Frees the colours
+  // where none is left.
   bool UpdateMasks(float back);
   bool AnyNegative() const { return Any(negative); }
   bool AnyObserved() const { return Any(observed); }
@@ -64,12 +87,23 @@ struct alignas(64) TsdfBlock {
     weight[i] = 0;
     SetColour(i, {}, 0);
   }
+  int ColourCount(std::size_t i) const { return colours == nullptr ? 0 : colours->count[i]; }
   FixedColour FixedColourAt(std::size_t i) const {
-    return {colour[0][i], colour[1][i], colour[2][i]};
+    if (colours == nullptr) return {};
+    return {colours->channel[0][i], colours->channel[1][i], colours->channel[2][i]};
   }
-  void SetColour(std::size_t i, const FixedColour& fixed, std::uint16_t count) {
-    for (std::size_t channel = 0; channel < 3; ++channel) colour[channel][i] = fixed[channel];
-    colour_count[i] = count;
+  BlockColours& MakeColours() {
+    if (colours == nullptr) colours.reset(new BlockColours);
+    return *colours;
+  }
+  void SetColour(std::size_t i, const FixedColour& fixed, int count) {
+    if (count == 0 && colours == nullptr) return;
+    BlockColours& into = MakeColours();
+    for (std::size_t c = 0; c < 3; ++c) into.channel[c][i] = fixed[c];
+    into.count[i] = static_cast<std::uint8_t>(count);
+  }
+  std::size_t Bytes() const {
+    return sizeof(TsdfBlock) + (colours == nullptr ? 0 : sizeof(BlockColours));
   }
   Colour ColourAt(int place) const {
     const FixedColour c = FixedColourAt(static_cast<std::size_t>(place));
@@ -81,6 +115,9 @@ struct alignas(64) TsdfBlock {
 };
 
 using TsdfGrid = BlockGrid<TsdfBlock>;
+
+// Of the blocks and the tables that find them.
+std::size_t BytesOf(const TsdfGrid& grid);
 
 // The masks of a block (number 13) and of the 26 around it, x fastest, then y, then z; never
 // nullptr.

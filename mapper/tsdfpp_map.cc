@@ -1,5 +1,6 @@
 #include "mapper/tsdfpp_map.h"
 
+#include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -16,6 +17,8 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 16;
+
+constexpr std::size_t kAhead = 4;  // groups, while one is worked on
 
 constexpr std::size_t kLookUpsPerTask = 512;
 
@@ -98,6 +101,14 @@ class TsdfppMap::Groups {
   }
 
   std::vector<Group>& all() { return groups_; }
+  // What the votes at the group read first.
+  void Prefetch(const Group& group, const std::vector<FusedBlock>& fused) const {
+    hwy::Prefetch(&group.lists->settled);
+    if (group.first_vote == kNone) return;
+    const FusedBlock& from = fused[static_cast<std::size_t>(group.first_vote)];
+    hwy::Prefetch(&from.votes);
+    hwy::Prefetch(&from.block->cover);
+  }
   template <typename Function>
   void ForEachChange(const Group& group, const Function& function) const {
     ForEach(group.first_change, next_change_, function);
@@ -140,14 +151,35 @@ std::unique_ptr<MapRepresentation> TsdfppMap::Clone() const {
 
 TsdfppMap::ListBlock& TsdfppMap::ListsOf(const Index3& block) {
   ListBlock& lists = index_.FindOrAdd(block);
-  if (lists.entries.empty()) lists.entries.resize(static_cast<std::size_t>(kBlockVoxels * layers_));
+  if (lists.entries.empty()) lists.entries.resize(kBlockVoxels);
   return lists;
 }
 
-VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) const {
+VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) {
   lists.settled[static_cast<std::size_t>(place >> 6)] &=
       ~(1ULL << static_cast<unsigned>(place & 63));
-  return {&lists.entries[static_cast<std::size_t>(place)], layers_, kBlockVoxels};
+  const auto layers = static_cast<int>(lists.entries.size() / kBlockVoxels);
+  return {&lists.entries[static_cast<std::size_t>(place)], layers, kBlockVoxels};
+}
+
+VoxelList TsdfppMap::ListWithRoom(ListBlock& lists, int place) const {
+  const std::size_t size = lists.entries.size();
+  const std::size_t last = size - kBlockVoxels + static_cast<std::size_t>(place);
+  if (lists.entries[last].id != kNoInstance &&
+      size < static_cast<std::size_t>(kBlockVoxels * layers_)) {
+    lists.entries.reserve(size + kBlockVoxels);  // no more than that
+    lists.entries.resize(size + kBlockVoxels);
+  }
+  return ListOf(lists, place);
+}
+
+void TsdfppMap::FreeEmptyLayers(ListBlock& lists) {
+  const auto is_free = [](const ListEntry& entry) { return entry.id == kNoInstance; };
+  while (lists.entries.size() > kBlockVoxels &&
+         std::all_of(lists.entries.end() - kBlockVoxels, lists.entries.end(), is_free)) {
+    lists.entries.resize(lists.entries.size() - kBlockVoxels);
+    lists.entries.shrink_to_fit();
+  }
 }
 
 bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
@@ -161,8 +193,11 @@ bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
   const VotesCounted counted =
       VoteForActive(votes, id, config_.confidence_cap, lists.entries.data());
   for (std::size_t z = 0; z < votes.size(); ++z) lists.settled[z] |= counted.saturated[z];
-  ForEachVoxel(counted.others,
-               [&](int place) { ListOf(lists, place).Vote(id, config_.confidence_cap); });
+  ForEachVoxel(counted.others, [&](int place) {
+    const bool is_listed = ListOf(lists, place).Lists(id);
+    (is_listed ? ListOf(lists, place) : ListWithRoom(lists, place))
+        .Vote(id, config_.confidence_cap);
+  });
   return Any(counted.others);
 }
 
@@ -201,8 +236,13 @@ bool TsdfppMap::IsEmpty(const ListBlock& lists) {
 void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
   std::vector<Index3> empty;
   for (const Index3& index : blocks) {
-    const ListBlock* lists = index_.Find(index);
-    if (lists != nullptr && IsEmpty(*lists)) empty.push_back(index);
+    ListBlock* lists = index_.Find(index);
+    if (lists == nullptr) continue;
+    if (IsEmpty(*lists)) {
+      empty.push_back(index);
+    } else {
+      FreeEmptyLayers(*lists);
+    }
   }
   index_.Erase(empty);
 }
@@ -214,8 +254,9 @@ void TsdfppMap::Activate(InstanceId id) {
     if (!Any(entry.block->cover)) continue;
     ListBlock& lists = ListsOf(entry.index);
     NoteIndexChange(entry.index);
-    ForEachVoxel(entry.block->cover,
-                 [&](int place) { ListOf(lists, place).PushFront(id, config_.moved_confidence); });
+    ForEachVoxel(entry.block->cover, [&](int place) {
+      ListWithRoom(lists, place).PushFront(id, config_.moved_confidence);
+    });
   }
 }
 
@@ -255,6 +296,7 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
       tbb::blocked_range<std::size_t>(0, groups.all().size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          if (i + kAhead < range.end()) groups.Prefetch(groups.all()[i + kAhead], fused);
           Groups::Group& group = groups.all()[i];
           ListBlock& lists = *group.lists;
           bool lost_any = false;
@@ -272,11 +314,12 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
           });
           groups.ForEachChange(group, [&](std::size_t k) {
             ForEachVoxel(changes[k].gained, [&](int place) {
-              VoxelList list = ListOf(lists, place);
-              if (!list.Lists(changes[k].id)) list.Append(changes[k].id, 1);
+              if (ListOf(lists, place).Lists(changes[k].id)) return;
+              ListWithRoom(lists, place).Append(changes[k].id, 1);
             });
           });
           group.emptied = lost_any && IsEmpty(lists);
+          if (lost_any && !group.emptied) FreeEmptyLayers(lists);
         }
       },
       tbb::simple_partitioner());
@@ -311,11 +354,12 @@ void TsdfppMap::Remove(InstanceId id) {
   for (const Vacated& voxel : vacated) {
     if (blocks.empty() || blocks.back() != voxel.block) blocks.push_back(voxel.block);
     if (!config_.relist_on_removal) continue;
-    VoxelList list = ListOf(*index_.Find(voxel.block), voxel.place);
+    ListBlock& lists = *index_.Find(voxel.block);
     for (const auto& [other, volume] : volumes_) {
       const TsdfBlock* block = volume.grid.Find(voxel.block);
-      if (block == nullptr || !Bit(block->cover, voxel.place) || list.Lists(other)) continue;
-      list.Append(other, 1);
+      if (block == nullptr || !Bit(block->cover, voxel.place)) continue;
+      if (ListOf(lists, voxel.place).Lists(other)) continue;
+      ListWithRoom(lists, voxel.place).Append(other, 1);
     }
   }
   for (const Index3& block : blocks) NoteIndexChange(block);
@@ -344,8 +388,8 @@ std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
   const ListBlock* lists = index_.Find(BlockOf(ToIndex3(voxel)));
   if (lists == nullptr || lists->entries.empty()) return listings;
   const int place = PlaceInBlock(ToIndex3(voxel));
-  for (int i = 0; i < layers_; ++i) {
-    const ListEntry& entry = lists->entries[static_cast<std::size_t>(kBlockVoxels * i + place)];
+  for (auto i = static_cast<std::size_t>(place); i < lists->entries.size(); i += kBlockVoxels) {
+    const ListEntry& entry = lists->entries[i];
     if (entry.id == kNoInstance) break;
     listings.push_back({entry.id, entry.confidence});
   }
@@ -366,9 +410,10 @@ std::vector<Eigen::Vector3i> TsdfppMap::ListedVoxels() const {
 MapMemory TsdfppMap::Memory() const {
   MapMemory memory = VolumeMemory();
   memory.blocks += index_.size();
-  memory.bytes +=
-      index_.size() * sizeof(ListEntry) * static_cast<std::size_t>(kBlockVoxels * layers_) +
-      index_.TableBytes();
+  memory.bytes += index_.TableBytes();
+  for (const auto& entry : index_.entries()) {
+    memory.bytes += entry.block->entries.size() * sizeof(ListEntry);
+  }
   return memory;
 }
 

@@ -32,7 +32,8 @@ class TsdfppMap final : public LayeredMap {
 
  private:
   struct ListBlock {
-    std::vector<ListEntry> entries;  // entry k of the list of voxel i at [k * kBlockVoxels + i]
+    // Entry k of the list of voxel i at [k * kBlockVoxels + i]; as many layers as its longest list.
+    std::vector<ListEntry> entries;
     // Voxels where `settled_id` is active with full confidence, so that its votes change nothing.
     BlockMask settled{};
     InstanceId settled_id = kNoInstance;
@@ -42,7 +43,9 @@ class TsdfppMap final : public LayeredMap {
 
   ListBlock& ListsOf(const Index3& block);
   // To be changed: the voxel is no longer taken for settled.
-  VoxelList ListOf(ListBlock& lists, int place) const;
+  static VoxelList ListOf(ListBlock& lists, int place);
+  // The same with room for one object more, unless it has K.
+  VoxelList ListWithRoom(ListBlock& lists, int place) const;
   // True where the active object may have become another one.
   bool Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
   // The blocks of the index that lost a listing.
@@ -51,8 +54,10 @@ class TsdfppMap final : public LayeredMap {
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
   std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused);
-  // Frees those of these blocks whose lists are all empty.
+  // Frees those of these blocks whose lists are all empty, and the last layers of the others where
+  // they are.
   void FreeEmptyLists(const std::vector<Index3>& blocks);
+  static void FreeEmptyLayers(ListBlock& lists);
   static bool IsEmpty(const ListBlock& lists);
 
   int layers_;

@@ -85,11 +85,13 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           rule.front = config.front();
           rule.back = config.back();
           rule.colour_band = config.colour_band();
+          rule.first_colour_band = config.first_colour_band();
           rule.weight_cap = static_cast<float>(config.weight_cap);
           TsdfBlock& block = *of.entry->block;
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].entry->block.get();
-          const BlockPlace place = PlaceOf(*of.T_CL, of.entry->index, config.voxel());
+          const BlockPlace place =
+              PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k].behind_m);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();

@@ -17,18 +17,20 @@ using ObjectVolumes = std::map<InstanceId, ObjectVolume>;
 // three bytes, or is nullptr where the observation has none to give.
 inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std::uint8_t* colour,
                       float weight_cap) {
-  const float weight = block.weight[i];
-  block.distance[i] += (distance - block.distance[i]) / (weight + 1);
-  block.weight[i] = std::min(weight + 1, weight_cap);
+  const auto weight = static_cast<float>(block.weight[i]);
+  const float old_distance = block.distance[i];
+  block.distance[i] = old_distance + (distance - old_distance) * (1 / (weight + 1));
+  block.weight[i] = static_cast<std::uint8_t>(std::min(weight + 1, weight_cap));
   if (colour == nullptr) return;
-  const auto count = static_cast<float>(block.colour_count[i]);
+  BlockColours& colours = block.MakeColours();
+  const auto count = static_cast<float>(colours.count[i]);
   const float share = 1 / (count + 1);
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto old = static_cast<float>(block.colour[channel][i]);
+    const auto old = static_cast<float>(colours.channel[channel][i]);
     const float mean = old + (256.0F * static_cast<float>(colour[channel]) - old) * share;
-    block.colour[channel][i] = static_cast<std::uint16_t>(mean + 0.5F);
+    colours.channel[channel][i] = static_cast<std::uint16_t>(mean + 0.5F);
   }
-  block.colour_count[i] = static_cast<std::uint16_t>(std::min(count + 1, weight_cap));
+  colours.count[i] = static_cast<std::uint8_t>(std::min(count + 1, weight_cap));
 }
 
 // A block that the frame changed.

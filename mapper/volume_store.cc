@@ -16,7 +16,6 @@ constexpr std::size_t kIndexBytes = 3 * sizeof(std::int32_t);
 constexpr int kFurthestBlock = (1 << 20) - 16;
 constexpr int kLargestConfidence = 10000;  // MapConfig::Validate
 constexpr double kRigidTolerance = 1e-6;   // poses from files have nine decimals
-constexpr float kRounding = 1e-5F;         // of interpolated weights
 constexpr double kFurthest_m = 1e5;        // voxels there are still numbered by 32 bits
 
 void PutIndex(const Index3& index, std::string& bytes) {
@@ -93,8 +92,9 @@ std::string SaveGroup(const std::vector<const TsdfGrid::Entry*>& blocks, std::si
     ForEachObserved(block.observed, [&](std::size_t i) {
       values.distance.push_back(block.distance[i]);
       values.weight.push_back(block.weight[i]);
-      for (std::size_t c = 0; c < 3; ++c) values.colour[c].push_back(block.colour[c][i]);
-      values.colour_count.push_back(block.colour_count[i]);
+      const FixedColour colour = block.FixedColourAt(i);
+      for (std::size_t c = 0; c < 3; ++c) values.colour[c].push_back(colour[c]);
+      values.colour_count.push_back(static_cast<std::uint16_t>(block.ColourCount(i)));
     });
   }
   PutPlanes(values.distance, bytes);
@@ -124,10 +124,11 @@ Expected<LoadedBlocks> LoadGroup(ByteReader bytes, std::size_t count, const MapC
   for (auto& channel : values.colour) channel = GetPlanes<std::uint16_t>(voxels, bytes);
   values.colour_count = GetPlanes<std::uint16_t>(voxels, bytes);
   if (!bytes.AtEnd()) return DataError("a group of blocks has another length than it says");
-  const float cap = static_cast<float>(config.weight_cap) * (1 + kRounding);
+  const auto cap = static_cast<float>(config.weight_cap);
   for (std::size_t k = 0; k < voxels; ++k) {
-    const bool good = std::isfinite(values.distance[k]) && values.weight[k] > 0 &&
-                      values.weight[k] <= cap && values.colour_count[k] <= config.weight_cap;
+    const float weight = values.weight[k];
+    const bool good = std::isfinite(values.distance[k]) && weight >= 1 && weight <= cap &&
+                      weight == std::floor(weight) && values.colour_count[k] <= config.weight_cap;
     if (!good) return DataError("a voxel's value is out of range");
   }
   std::size_t k = 0;
@@ -136,7 +137,7 @@ Expected<LoadedBlocks> LoadGroup(ByteReader bytes, std::size_t count, const MapC
     TsdfBlock& block = *blocks[b].second;
     ForEachObserved(observed[b], [&](std::size_t i) {
       block.distance[i] = values.distance[k];
-      block.weight[i] = values.weight[k];
+      block.weight[i] = static_cast<std::uint8_t>(values.weight[k]);
       block.SetColour(i, {values.colour[0][k], values.colour[1][k], values.colour[2][k]},
                       values.colour_count[k]);
       ++k;

@@ -12,6 +12,7 @@ import json
 import os
 import re
 import sys
+import textwrap
 
 import matplotlib
 
@@ -107,12 +108,10 @@ def limit_axis(axes, results, metric, values):
         axes.set_ylim(-0.01, 1.02)
 
 
-def label_of(results, condition, method, x):
+def label_of(varied, condition, method):
     """The method, and the settings that tell its lines apart."""
     parts = [method]
-    for axis in results["varied"]:
-        if axis == x:
-            continue
+    for axis in varied:
         value = condition["settings"][axis]
         defaults = {"resampling": "all", "profile": None}
         if axis in defaults and value == defaults[axis]:
@@ -125,6 +124,10 @@ def plot_conditions(results, folder):
     plot = results["plot"]
     x_axis = plot["x"]
     conditions = [c for c in results["conditions"] if c["settings"].get(x_axis) is not None]
+    values_of = lambda axis, of: {c["settings"][axis] for c in of}  # noqa: E731
+    # A grid in which x does not vary has no line.
+    conditions = [c for c in conditions if len(values_of(x_axis, [d for d in conditions if d["grid"] == c["grid"]])) > 1]
+    varied = [axis for axis in results["varied"] if axis != x_axis and len(values_of(axis, conditions)) > 1]
     many = {c["settings"][x_axis] for c in conditions}
     words = not all(isinstance(value, (int, float)) for value in many)
     places = {value: i for i, value in enumerate(dict.fromkeys(c["settings"][x_axis] for c in conditions))}
@@ -132,17 +135,13 @@ def plot_conditions(results, folder):
     for axes, metric in zip(panels.axes, plot["metrics"]):
         lines = {}
         for condition in conditions:
-            # A grid in which x does not vary has no line.
-            same = {c["settings"][x_axis] for c in conditions if c["grid"] == condition["grid"]}
-            if len(same) < 2:
-                continue
             for method in condition["methods"]:
                 figure = condition["means"][method][metric]
                 mean = number(figure["mean"])
                 if mean is None:
                     continue
                 value = condition["settings"][x_axis]
-                label = label_of(results, condition, method, x_axis)
+                label = label_of(varied, condition, method)
                 if len({c["grid"] for c in conditions}) > 1 and condition["grid"] != conditions[0]["grid"] and words:
                     label += f", {condition['grid']}"
                 lines.setdefault(label, []).append((places[value] if words else value, mean, figure.get("low", mean),
@@ -159,7 +158,7 @@ def plot_conditions(results, folder):
             ticks = sorted(many)
             axes.set_xticks(ticks, [f"{t:g}" for t in ticks], rotation=45 if max(len(f"{t:g}") for t in ticks) > 4 else 0)
             axes.minorticks_off()
-        axes.set_xlabel(plot["x_label"])
+        axes.set_xlabel(textwrap.fill(plot["x_label"], 34))
         axes.set_title(title_of(results, metric), fontsize=9, loc="left")
         limit_axis(axes, results, metric, [p[1] for points in lines.values() for p in points])
     panels.finish(folder, results["experiment"]["name"])
@@ -197,7 +196,7 @@ def plot_differences(results, folder):
                 axes.plot([mean], [y], color=colour, marker=marker, linestyle="", markersize=5, zorder=3,
                           label=method if row == 0 else None)
         words = results["metrics"][metric]
-        axes.set_title(title_of(results, metric), fontsize=9, loc="left", wrap=True)
+        axes.set_title(textwrap.fill(title_of(results, metric), 22), fontsize=9, loc="left")
         axes.set_xlabel("better →" if words["better"] == "higher" else "← better")
     all_axes[0][0].set_yticks(range(len(conditions)), [condition_text(results, c) for c in conditions])
     all_axes[0][0].invert_yaxis()
@@ -260,7 +259,7 @@ def plot_frames(results, rows, folder):
             frames = sorted(points)
             panels.line(axes, label, frames, [sum(points[f]) / len(points[f]) for f in frames],
                         every=max(1, len(frames) // 8))
-        axes.set_xlabel(plot["x_label"])
+        axes.set_xlabel(textwrap.fill(plot["x_label"], 34))
         axes.set_title(title_of(results, metric), fontsize=9, loc="left")
         limit_axis(axes, results, metric, [v for points in lines.values() for vs in points.values() for v in vs])
     panels.finish(folder, results["experiment"]["name"])

@@ -121,6 +121,7 @@ TEST_F(GateCommand, FromTheFirstReferencesToAFailure) {
   const auto explained = Gate({"--explain", "as-before", "--sabotage", "labels-permuted"});
   EXPECT_EQ(explained.exit_code, 0);
   EXPECT_NE(explained.out.find("object car"), std::string::npos) << explained.out;
+  EXPECT_NE(explained.out.find("\nvalue: "), std::string::npos) << explained.out;
 }
 
 TEST_F(GateCommand, AControlThatFailsMakesAllInvalid) {
@@ -130,6 +131,43 @@ TEST_F(GateCommand, AControlThatFailsMakesAllInvalid) {
   EXPECT_NE(output.out.find("a control failed"), std::string::npos) << output.out;
   EXPECT_EQ(Gate({"--update", "--reason", "no"}).exit_code, 4);
   EXPECT_EQ(File("gates-references.json"), "");
+}
+
+// A cell that was there before its peer is mapped again beside it: times of two runs say nothing.
+TEST_F(GateCommand, ComparesTimesOfOneRunOnly) {
+  const std::string plain = std::string(kGates).substr(0, std::string(kGates).find("[[control]]"));
+  const std::string alone = R"([[gate]]
+name = "alone"
+experiment = "tiny"
+metric = "movers_completion"
+where = { method = "tsdf" }
+min = 0.1
+confidence = 1
+why = "it is seen"
+)";
+  const std::string timed = R"([[gate]]
+name = "time"
+experiment = "tiny"
+metric = "frame_ms"
+where = { method = "tsdf++" }
+against = { method = "tsdf" }
+ratio = true
+max = 1000
+confidence = 1
+why = "not too slow"
+)";
+  Write("gates.toml", plain + alone);
+  EXPECT_EQ(Gate({}).exit_code, 0);
+  Write("gates.toml", plain + alone + timed);
+  const auto both = Gate({"--json"});
+  EXPECT_EQ(both.exit_code, 4) << both.out << both.err;
+  const auto json = nlohmann::json::parse(both.out);
+  EXPECT_EQ(json["gates"][0]["verdict"], "pass");
+  EXPECT_EQ(json["gates"][1]["verdict"], "inconclusive");
+  EXPECT_EQ(json["gates"][1]["why"], "5 frames were timed, 20 are needed");
+  const auto explained = Gate({"--explain", "time"});
+  EXPECT_NE(explained.out.find("time is inconclusive: worst at seed=1; frame "), std::string::npos)
+      << explained.out << explained.err;
 }
 
 TEST_F(GateCommand, WrongFilesAndOptionsGetASentence) {

@@ -5,6 +5,8 @@
 
 #include "core/files.h"
 #include "eval/gate_report.h"
+#include "eval/gate_times.h"
+#include "eval/report_gates.h"
 #include "eval/sweep_metrics.h"
 #include "tests/core/temp_folder.h"
 
@@ -79,6 +81,49 @@ TEST_F(GateRunTest, RatiosToAPeer) {
             Verdict::kFail);
   EXPECT_EQ(JudgeGate(gate, Data({5, 7, 9}, {1, 0, 3}), nullptr, kStatistics).verdict,
             Verdict::kInvalid);
+}
+
+// Of each pair of frames, so that a machine that is slow for a while changes nothing.
+TEST_F(GateRunTest, TimesAreComparedFrameByFrame) {
+  Gate gate = Of(Gate::Kind::kPaired, {{}, 0.5});
+  gate.metric = kFrameTimeMetric;
+  gate.ratio = true;
+  const auto timed = [&](const std::vector<double>& ms, const std::string& run) {
+    CellResult& cell = cells_.emplace_back(CellWith(Measured::Undefined("not of this test")));
+    cell.examined.assign(SweepMetrics().size(), Measured::Of(1e9));  // must not be looked at
+    for (std::size_t i = 0; i < ms.size(); ++i)
+      cell.image_digests.emplace(static_cast<int>(10 * i), "d");
+    cell.frame_ms = ms;
+    cell.timed_in = run;
+    return &cell;
+  };
+  // Theirs: 100 ms, then 1000 ms as something else began to work. Ours takes 0.2 of it but for two
+  // frames in which the machine stalled.
+  std::vector<double> theirs(12, 100);
+  theirs.resize(24, 1000);
+  std::vector<double> ours;
+  for (const double ms : theirs) ours.push_back(0.2 * ms);
+  ours[3] = ours[17] = 5000;
+  const auto judge = [&](double factor, const std::string& run, std::size_t frames = 24) {
+    std::vector<double> scaled;
+    for (std::size_t i = 0; i < frames; ++i) scaled.push_back(factor * ours[i]);
+    GateData data;
+    for (const char* seed : {"seed=1;", "seed=2;"}) {
+      data[seed] = {timed(scaled, run), timed(theirs, "one")};
+    }
+    return JudgeGate(gate, data, nullptr, kStatistics);
+  };
+  const Judgement good = judge(1, "one");
+  EXPECT_EQ(good.verdict, Verdict::kPass) << good.why;
+  EXPECT_NEAR(*good.mean.value, 0.2, 1e-12);
+  EXPECT_EQ(judge(3, "one").verdict, Verdict::kFail) << "three times as slow";
+  EXPECT_EQ(judge(1, "one", 10).verdict, Verdict::kPass) << "20 frames of two seeds";
+  const Judgement few = judge(1, "one", 9);
+  EXPECT_EQ(few.verdict, Verdict::kInconclusive);
+  EXPECT_EQ(few.why, "18 frames were timed, 20 are needed");
+  const Judgement apart = judge(1, "another");
+  EXPECT_EQ(apart.verdict, Verdict::kInvalid);
+  EXPECT_EQ(apart.why, "seed=1;: the two were not timed in one run");
 }
 
 TEST_F(GateRunTest, ReferencesAreTwoSided) {
@@ -201,11 +246,61 @@ TEST(GateReportTest, JUnitIsEscapedAndCounted) {
 }
 
 TEST(GateReportTest, MarkdownNamesWhatFailsAndBreaksNoTable) {
-  const std::string text =
-      GateMarkdown(RunOf(Verdict::kFail, "a|b<i>"), {{"a|b<i>", "See [picture](p.png)."}});
+  const std::string text = GateMarkdown(
+      RunOf(Verdict::kFail, "a|b<i>"), {{"a|b<i>", {"seed=1;", 40, "c<u>r", "in words", "p.png"}}});
   EXPECT_NE(text.find("| a\\|b&lt;i&gt; | **fail** |"), std::string::npos) << text;
-  EXPECT_NE(text.find("See [picture](p.png)."), std::string::npos) << text;
+  EXPECT_NE(text.find("Worst at seed=1; frame 40, c&lt;u&gt;r: ![picture](pictures/p.png)"),
+            std::string::npos)
+      << text;
   EXPECT_EQ(GateMarkdown(RunOf(Verdict::kPass, "g"), {}).find("**"), std::string::npos);
+}
+
+// What the report's page reads is what the gates wrote; else there is a sentence.
+TEST(GateReportTest, ResultsComeBackForTheReport) {
+  const test::TempFolder folder;
+  const auto file = folder.path() / "gates.json";
+  GateRun run = RunOf(Verdict::kFail, "g");
+  run.sabotages.push_back({Sabotage::kFrozenObject, run.gates});
+  ControlOutcome control;
+  control.control.name = "c";
+  control.control.metric = kMetric;
+  control.verdict = Verdict::kPass;
+  run.controls.push_back(control);
+  ASSERT_TRUE(
+      WriteGateReports(run, {{"g", {"seed=1;", 40, "car", "in words", "g.png"}}}, folder.path()));
+  ASSERT_TRUE(WriteFile(folder.path() / kGatePictures / "g.png", "png"));
+  const auto results = ReadGateResults(file);
+  ASSERT_TRUE(results.has_value()) << results.error().message;
+  EXPECT_EQ((*results)["gates"][0]["verdict"], "fail");
+  EXPECT_EQ((*results)["gates"][0]["explanation"]["frame"], 40);
+  EXPECT_EQ((*results)["pictures"]["g"], "data:image/png;base64,cG5n");
+
+  const auto spoilt = [&](const std::function<void(nlohmann::json&)>& spoil) -> std::string {
+    nlohmann::json json = nlohmann::json::parse(ReadFile(file).value());
+    spoil(json);
+    const auto other = folder.path() / "spoilt.json";
+    EXPECT_TRUE(WriteFile(other, json.dump()));
+    const auto read = ReadGateResults(other);
+    if (read) return (*read)["pictures"].dump();
+    EXPECT_EQ(read.error().kind, ErrorKind::kData);
+    return read.error().message.substr(folder.path().string().size() + 1);
+  };
+  using Json = nlohmann::json;
+  EXPECT_EQ(spoilt([](Json& j) { j["schema"] = 7; }), "spoilt.json: schema is 7, expected 1");
+  EXPECT_EQ(spoilt([](Json& j) { j.erase("controls"); }),
+            "spoilt.json: 'controls' is missing or no list");
+  EXPECT_EQ(spoilt([](Json& j) { j["gates"][0]["verdict"] = 3; }),
+            "spoilt.json: a gate's 'verdict' is missing or no text");
+  EXPECT_EQ(spoilt([](Json& j) { j["gates"][0].erase("bounds"); }),
+            "spoilt.json: gate 'g' has no bounds or no mean");
+  EXPECT_EQ(
+      spoilt([](Json& j) { j["sabotages"][0].erase("caught"); }),
+      "spoilt.json: sabotage 'frozen-object' does not say whether it was caught, and by what");
+  EXPECT_EQ(spoilt([](Json& j) { j = Json::array(); }), "spoilt.json is no JSON object");
+  // No file but those of the folder of pictures.
+  EXPECT_EQ(spoilt([](Json& j) { j["gates"][0]["explanation"]["picture"] = "../gates.json"; }),
+            "{}");
+  EXPECT_EQ(ReadGateResults(folder.path() / "none.json").error().kind, ErrorKind::kData);
 }
 
 TEST(GateReportTest, ExitCodeAndColours) {

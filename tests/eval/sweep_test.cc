@@ -70,7 +70,8 @@ scene = "tiny.toml"
   json Timeless(const fs::path& cell) {
     json read = json::parse(Bytes(cell), nullptr, false);
     read.erase("times");
-    for (const char* timed : {"move_ms", "fuse_ms", "mesh_ms"}) read["examined"].erase(timed);
+    for (const char* timed : {"frame_ms", "move_ms", "fuse_ms", "mesh_ms"})
+      read["examined"].erase(timed);
     for (const char* timed : {"mesh_s", "evaluate_s"}) read["evaluation"].erase(timed);
     return read;
   }

@@ -53,6 +53,31 @@ TEST(BlockGrid, ErasesAndAddsAsAMapDoesAndKeepsTheOrder) {
   EXPECT_GT(erasures, 1000U);
 }
 
+// Neighbours may lie in other cells of the directory, on either side of zero.
+TEST(BlockGrid, FindsWhatIsAround) {
+  Dice dice(5);
+  BlockGrid<int> grid;
+  const auto any = [&] {
+    return Index3{dice.Whole(14) - 7, dice.Whole(14) - 7, dice.Whole(14) - 7};
+  };
+  for (int i = 0; i < 900; ++i) grid.FindOrAdd(any()) = i;
+  int found = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Index3 index = any();
+    const auto around = grid.FindAround(index);
+    std::size_t k = 0;
+    for (int z = -1; z <= 1; ++z) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x, ++k) {
+          ASSERT_EQ(around[k], grid.Find(index + Index3{x, y, z}));
+          if (around[k] != nullptr) ++found;
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 1000);
+}
+
 TEST(BlockGrid, ErasingAllLeavesNothing) {
   BlockGrid<int> grid;
   std::vector<Index3> all;

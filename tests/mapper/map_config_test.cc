@@ -33,8 +33,9 @@ TEST(MapConfigTest, DefaultsAreValidAndAreTheCloseProfile) {
   ASSERT_TRUE(close.SetProfile("close").has_value());
   EXPECT_EQ(close, config);
   EXPECT_EQ(config.voxel(), 0.01F);
-  EXPECT_FLOAT_EQ(config.front(), 0.1F);
-  EXPECT_FLOAT_EQ(config.back(), 0.03F);
+  // In half precision: eleven bits.
+  EXPECT_EQ(config.front(), 1638.0F / 16384);
+  EXPECT_EQ(config.back(), 1966.0F / 65536);
 }
 
 TEST(MapConfigTest, ProfilePaperIsTenAndTen) {
@@ -73,6 +74,7 @@ TEST(MapConfigTest, EachBadFieldIsNamedWithItsValue) {
       {"layers", "-1", [](MapConfig& c) { c.layers = -1; }},
       {"layers", "9", [](MapConfig& c) { c.layers = 9; }},
       {"weight_cap", "0", [](MapConfig& c) { c.weight_cap = 0; }},
+      {"weight_cap", "256", [](MapConfig& c) { c.weight_cap = 256; }},
       {"confidence_cap", "0", [](MapConfig& c) { c.confidence_cap = 0; }},
       {"moved_confidence", "-2", [](MapConfig& c) { c.moved_confidence = -2; }},
       {"moved_confidence", "11", [](MapConfig& c) { c.moved_confidence = c.confidence_cap + 1; }},

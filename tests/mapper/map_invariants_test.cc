@@ -53,10 +53,11 @@ TEST_P(Invariants, ValuesOutOfRangeAreNoticed) {
     p.block->distance[p.observed] = std::numeric_limits<float>::quiet_NaN();
   });
   ExpectFault("has weight", [](Place& p) { p.block->weight[p.observed] = 51; });
-  ExpectFault("has weight", [](Place& p) { p.block->weight[p.observed] = -1; });
-  ExpectFault("colours", [](Place& p) { p.block->colour_count[p.observed] = 1000; });
+  ExpectFault("has weight", [](Place& p) { p.block->weight[p.observed] = 255; });
+  ExpectFault("colours", [](Place& p) { p.block->MakeColours().count[p.observed] = 200; });
   ExpectFault("is unobserved and holds", [](Place& p) { p.block->distance[p.unobserved] = 0.01F; });
-  ExpectFault("is unobserved and holds", [](Place& p) { p.block->colour[1][p.unobserved] = 1; });
+  ExpectFault("is unobserved and holds",
+              [](Place& p) { p.block->MakeColours().channel[1][p.unobserved] = 1; });
 }
 
 TEST_P(Invariants, MasksThatAreNotOfTheValuesAreNoticed) {

@@ -118,7 +118,7 @@ TEST(MeshCache, FollowsAnyChangeOfAGrid) {
           FillAtRandom(grid.FindOrAdd(RandomBlock(dice)), dice, dice.Whole(2) == 0);
         }
       } else if (what == 1) {  // values, but no sign
-        for (float& distance : some.distance) distance *= 0.9F;
+        for (Half& distance : some.distance) distance = distance * 0.9F;
         some.UpdateMasks(kBack_m);
       } else if (what == 2) {  // a single voxel
         // Most of them at a corner of the block, which seven others read.
@@ -128,7 +128,8 @@ TEST(MeshCache, FollowsAnyChangeOfAGrid) {
         if (dice.Whole(2) == 0) {
           some.Clear(place);
         } else {
-          some.distance[static_cast<std::size_t>(place)] *= -1;
+          Half& turned = some.distance[static_cast<std::size_t>(place)];
+          turned = -turned;
         }
         some.UpdateMasks(kBack_m);
       } else if (what == 3) {  // one block less, and the others in another order
@@ -162,13 +163,13 @@ TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
   EXPECT_EQ(nothing.remade, 0U);
 
   TsdfBlock& middle = *grid.Find({0, 0, 0});
-  for (float& distance : middle.distance) distance *= 0.9F;
+  for (Half& distance : middle.distance) distance = distance * 0.9F;
   middle.UpdateMasks(kBack_m);
   const MeshWork values = cache.Update(grid, kVoxel_m);
   EXPECT_EQ(values.changed, 1U);
   EXPECT_EQ(values.remade, 4U) << "vertices on edges that end in the block lie in three others";
 
-  middle.distance[0] *= -1;
+  middle.distance[0] = -middle.distance[0];
   middle.UpdateMasks(kBack_m);
   const MeshWork sign = cache.Update(grid, kVoxel_m);
   EXPECT_EQ(sign.changed, 1U);

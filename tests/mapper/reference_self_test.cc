@@ -65,7 +65,8 @@ TEST(ReferenceSelfTest, OffTheAxisTheDistanceIsAlongTheRay) {
   // (8, 6, 14): depth 2 voxels in front, along a ray of length sqrt(64 + 36 + 196) over 14.
   const auto value = map->ValueAt(0, {8, 6, 14});
   ASSERT_TRUE(value.has_value());
-  EXPECT_FLOAT_EQ(value->distance_m, 2 * kVoxel * std::sqrt(296.0F) / 14.0F);
+  constexpr float kHalf_m = 0x1p-15F;  // half of the step between two numbers of 1/16 to 1/8
+  EXPECT_NEAR(value->distance_m, 2 * kVoxel * std::sqrt(296.0F) / 14.0F, kHalf_m);
 }
 
 TEST(ReferenceSelfTest, ObservationsAverageUpToTheCap) {

@@ -177,7 +177,7 @@ void FuseObject(InstanceId id, const View& view, const MapConfig& config, DenseV
     if (!config.contradiction || !contradicted) return;
     voxel = DenseVoxel{};
     if (seen->s > h) {
-      voxel.distance = std::min(seen->s, config.front());
+      voxel.distance = Kept(std::min(seen->s, config.front()));
       voxel.weight = 1;
     }
   });

@@ -2,8 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 namespace tsdfpp::reference {
+
+// By OpenCV's half precision, not the mapper's.
+float Kept(float distance) {
+  const auto kept = static_cast<float>(cv::float16_t(distance));
+  return kept == 0 ? 0.0F : kept;
+}
 
 Colour DenseVoxel::Rounded() const {
   Colour rounded{};
@@ -59,11 +66,12 @@ void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel, bool
   if (seen.s < -config.back()) return;
   const auto cap = static_cast<float>(config.weight_cap);
   const float s = std::min(seen.s, config.front());
-  voxel.distance = voxel.distance + (s - voxel.distance) / (voxel.weight + 1.0F);
+  const float part = 1.0F / (voxel.weight + 1.0F);
+  voxel.distance = Kept(voxel.distance + (s - voxel.distance) * part);
   voxel.weight = std::min(voxel.weight + 1.0F, cap);
-  const float colour_band = static_cast<float>(2 * config.voxel_m);
+  const auto colour_band = static_cast<float>((voxel.colours > 0 ? 2 : 3) * config.voxel_m);
   if (!InBand(seen.s, config)) return;
-  if (!colour_all && voxel.colours > 0 && !(std::abs(seen.s) <= colour_band)) return;
+  if (!colour_all && !(std::abs(seen.s) <= colour_band)) return;
   const float share = 1.0F / (static_cast<float>(voxel.colours) + 1.0F);
   for (int c = 0; c < 3; ++c) {
     const float old = voxel.colour[c];
@@ -124,8 +132,8 @@ std::optional<DenseVoxel> InterpolateVoxel(const Neighbourhood& place,
     return sum / total;
   };
   DenseVoxel voxel;
-  voxel.distance = mean([](const DenseVoxel& corner) { return corner.distance; });
-  voxel.weight = mean([](const DenseVoxel& corner) { return corner.weight; });
+  voxel.distance = Kept(mean([](const DenseVoxel& corner) { return corner.distance; }));
+  voxel.weight = std::floor(mean([](const DenseVoxel& corner) { return corner.weight; }) + 0.5F);
   const float count =
       mean([](const DenseVoxel& corner) { return static_cast<float>(corner.colours); });
   voxel.colours = static_cast<int>(std::floor(count + 0.5F));
@@ -137,7 +145,7 @@ std::optional<DenseVoxel> InterpolateVoxel(const Neighbourhood& place,
     coloured += place.Coefficient(i);
     for (int c = 0; c < 3; ++c) colour[c] += place.Coefficient(i) * corners[i].colour[c];
   }
-  for (int c = 0; c < 3 && coloured > 0; ++c) {
+  for (int c = 0; c < 3 && coloured > 0 && voxel.colours > 0; ++c) {
     voxel.colour[c] = static_cast<float>(std::floor(colour[c] / coloured + 0.5));
   }
   return voxel;

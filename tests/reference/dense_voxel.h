@@ -42,6 +42,9 @@ class View {
   float h_;
 };
 
+// A distance as a voxel keeps it: in half precision.
+float Kept(float distance);
+
 bool InBand(float s, const MapConfig& config);
 
 // In band or clamped; nothing behind the band. `colour_all`: whatever the distance.

@@ -25,7 +25,7 @@ inline TriangleMesh PlainMesh(const TsdfGrid& grid, float voxel) {
     const TsdfBlock* block = grid.Find(BlockOf(v));
     const auto i = static_cast<std::size_t>(PlaceInBlock(v));
     if (block == nullptr || block->weight[i] <= 0) return std::nullopt;
-    return Value{block->distance[i], block->FixedColourAt(i), block->colour_count[i] > 0};
+    return Value{block->distance[i], block->FixedColourAt(i), block->ColourCount(i) > 0};
   };
   const auto corner_of = [](const Index3& cube, int corner) {
     return cube + Index3{corner & 1, (corner >> 1) & 1, corner >> 2};

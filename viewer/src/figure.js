@@ -55,7 +55,7 @@ export function figurePart(data, state) {
           const key = first.recording.key_frames.find((each) => each.frame === frame);
           return el('td', {}, picture(first, key.colour, `camera image of frame ${frame}`, go(frame, 0)));
         }), hasAfter ? el('td', {}) : null),
-        runs.map((run) => el('tr', {}, el('th', { scope: 'row' }, shortLabel(run, data.runs).split(', ').map((word) => el('span', {}, word))),
+        runs.map((run) => el('tr', {}, el('th', { scope: 'row' }, shortLabel(run, data.runs).split(', ').map((word) => el('span', {}, word.replaceAll('/', '/\u200b')))),
           columns.map((frame) => {
             const key = run.recorded.key_frames.find((each) => each.frame === frame);
             return el('td', {}, key ? picture(run, key.picture, `${run.label} at frame ${frame}`, go(frame, 0)) : '–');

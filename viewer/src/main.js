@@ -6,6 +6,7 @@ import { barPart } from './bar.js';
 import { figurePart, tablePicturesPart } from './figure.js';
 import { viewPart } from './views.js';
 import { plotsPart } from './plots.js';
+import { gatesPart } from './gates.js';
 import { originPart, tablesPart } from './tables.js';
 
 function start(app) {
@@ -29,7 +30,7 @@ function start(app) {
   append(app, [
     headerPart(data), cardsPart(data, state), barPart(data, state, frames), figurePart(data, state),
     viewPart(data, state), plotsPart(data, state, frames), tablePicturesPart(data), tablesPart(data),
-    originPart(data)]);
+    gatesPart(data), originPart(data)]);
   window.report = { data, state, frames };
 }
 

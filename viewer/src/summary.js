@@ -62,6 +62,16 @@ function verdictLine(data, runs) {
     el('span', { class: 'quiet' }, ` (${settingText(data, hero)})`), '.');
 }
 
+// "11 of 12 gates hold (profile quick), 13 of 13 sabotages are caught"
+export function gatesSummary({ controls, gates, sabotages, profile }) {
+  const held = gates.filter((gate) => gate.verdict === 'pass').length;
+  const bad = controls.filter((control) => control.verdict !== 'pass').length;
+  const caught = sabotages.filter((sabotage) => sabotage.caught).length;
+  return [`${held} of ${gates.length} gates hold (profile ${profile})`,
+    bad ? `${bad} of ${controls.length} controls fail` : null,
+    sabotages.length ? `${caught} of ${sabotages.length} sabotages are caught` : null].filter(Boolean).join(', ');
+}
+
 export function headerPart(data) {
   const report = data.reports[0];
   const { summary } = report;
@@ -69,7 +79,8 @@ export function headerPart(data) {
     el('p', { class: 'kicker' }, data.reports.map((each) => each.name).join(' and '),
       ` · sequence ${summary.sequence} · frames ${summary.first_frame} to ${summary.last_frame}`),
     el('h1', {}, 'What does a map keep of what it can no longer see?'),
-    el('div', { class: 'verdict' }, settingsOf(data.runs).map((runs) => verdictLine(data, runs))));
+    el('div', { class: 'verdict' }, settingsOf(data.runs).map((runs) => verdictLine(data, runs))),
+    data.gates ? el('p', { class: 'quiet' }, el('a', { href: '#gates' }, `${gatesSummary(data.gates)}.`)) : null);
 }
 
 function card(data, column, runs, dark) {

@@ -9,8 +9,13 @@ function csvCell(value) {
   return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-// columns: [{ title, about, unit, decimals }], the first of words; rows: lists of words or numbers.
+// columns: [{ title, about, unit, decimals, long, draw }], the first of words; rows: lists of words or
+// numbers. `long` words may break into lines; `draw` makes an element of a cell.
 export function sortableTable(name, columns, rows) {
+  const cellOf = (column, cell) => {
+    if (column.draw) return column.draw(cell);
+    return typeof cell === 'number' ? cell.toFixed(column.decimals ?? 0) : cell ?? '–';
+  };
   const body = el('tbody');
   let order = { column: -1, up: true };
   const draw = () => {
@@ -26,13 +31,13 @@ export function sortableTable(name, columns, rows) {
     }
     body.replaceChildren(...list.map((row) => el('tr', {}, row.map((cell, c) => (c === 0
       ? el('th', { scope: 'row' }, cell)
-      : el('td', {}, typeof cell === 'number' ? cell.toFixed(columns[c].decimals ?? 0) : cell ?? '–'))))));
+      : el('td', { class: columns[c].long ? 'long' : null }, cellOf(columns[c], cell)))))));
     heads.forEach((head, c) => {
       if (c === order.column) head.setAttribute('aria-sort', order.up ? 'ascending' : 'descending');
       else head.removeAttribute('aria-sort');
     });
   };
-  const heads = columns.map((column, c) => el('th', { scope: 'col', title: column.about },
+  const heads = columns.map((column, c) => el('th', { scope: 'col', title: column.about, class: column.long ? 'long' : null },
     el('button', {
       type: 'button',
       onclick: () => {

@@ -3,7 +3,7 @@
 // --update writes the reference pictures in references/ anew.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { cpSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, join, resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -17,6 +17,28 @@ const scenes = resolve(dirname(fileURLToPath(import.meta.url)), '../../scenes');
 const kSlow_ms = 240000;  // a loaded machine with a software renderer
 const kBad = '<img src=x onerror="window.pwned=1"></script><script>window.pwned=1</script>';
 
+// What `tsdfpp gate` writes, as far as the page reads it.
+const gate = (name, verdict, more = {}) => ({
+  name, verdict, why: '', experiment: 'mini', metric: 'm', of: 'movers_accuracy_rmse_mm - reference', cells: 'method tsdf++/anchored',
+  bounds: { min: -0.1, max: 0.1 }, bounds_because: 'A twentieth of a pixel.', confidence: 1, replicates: ['seed=1;'],
+  values: [0], mean: 0, interval: [0, 0], ...more,
+});
+const kGates = {
+  schema: 1, profile: 'quick', sabotage: 'none', program: '0.1.0 abc', renderer: 'llvmpipe', mujoco: '3.17.0', machine: 'a processor',
+  exit_code: 1,
+  controls: [{ name: 'static', verdict: 'pass', why: '', metric: 'completion', methods: ['tsdf', 'open3d'], greatest_spread: 0.004, allowed_spread: 0.03 }],
+  gates: [
+    gate('hidden-table', 'pass', { bounds: { min: 0.99 }, mean: 0.99861, interval: [0.9981, 0.9992] }),
+    gate('car-distance', 'fail', {
+      mean: 0.2345678, interval: [0.2345678, 0.2345678], why: '0.234568 to 0.234568, expected from -0.1 to 0.1',
+      explanation: { replicate: 'seed=1;', frame: 16, object: 'car', picture: 'car-distance.png' },
+    }),
+    gate('size', 'invalid', { mean: { value: null, why: 'no reference' }, interval: undefined, why: 'there is no reference' }),
+  ],
+  sabotages: [{ name: 'frozen-object', words: 'objects keep the first pose', caught: true, gates: [gate('car-distance', 'fail')] },
+    { name: 'depth-scale', words: 'depth times 1.005', caught: false, gates: [gate('size', 'inconclusive')] }],
+};
+
 function command(...parts) {
   execFileSync(tsdfpp, parts, { stdio: ['ignore', 'ignore', 'inherit'] });
 }
@@ -28,6 +50,9 @@ function makeRuns() {
   const run = join(folder, 'run');
   command('compare', join(scenes, 'mini.toml'), '--out', run, '--until', '16', '--every', '8', '--profiles', 'paper',
           '--methods', 'tsdf,tsdf++/anchored', '--record');
+  writeFileSync(join(run, 'gates.json'), JSON.stringify(kGates));
+  mkdirSync(join(run, 'pictures'));
+  cpSync(join(run, readdirSync(run).find((name) => /^table-.*png$/.test(name))), join(run, 'pictures', 'car-distance.png'));
   command('report', run);
   const plain = join(folder, 'plain');
   cpSync(run, plain, { recursive: true });
@@ -48,6 +73,11 @@ function makeRuns() {
       each.examined.objects.forEach((object) => { object.name = kBad; });
       each.settings[kBad] = kBad;
     });
+  });
+  edit('gates.json', (gates) => {
+    gates.gates.forEach((each) => { each.name = `${each.name} ${kBad}`; each.why = kBad; each.bounds_because = kBad; each.of = kBad; });
+    gates.sabotages.forEach((each) => { each.words = kBad; });
+    gates.controls.forEach((each) => { each.metric = kBad; });
   });
   edit('record/record.json', (record) => record.objects.forEach((object) => { object.name = kBad; }));
   command('report', bad);
@@ -263,6 +293,23 @@ test('tables sort and leave as CSV', async (browser) => {
   const lines = readFileSync(path, 'utf8').trim().split('\n');
   assert.equal(lines.length, 3);
   assert.match(lines[0], /^Map,Hidden table kept \(%\),/);
+  return page;
+});
+
+test('the verdicts of the gates stand in words, with the picture behind a failure', async (browser) => {
+  const page = await open(browser, report('run'));
+  assert.match(await page.locator('header a[href="#gates"]').textContent(), /^1 of 3 gates hold \(profile quick\), 1 of 2 sabotages are caught\.$/);
+  const table = page.locator('[data-table="gates"]');
+  assert.deepEqual(await table.locator('tbody .badge').allTextContents(), ['✓ pass', '✓ pass', '✗ fail', '! invalid']);
+  const row = table.locator('tbody tr', { hasText: 'car-distance' });
+  assert.deepEqual((await row.locator('td').allTextContents()).slice(1, 3), ['0.2346', '-0.1 to 0.1']);
+  await table.locator('thead button', { hasText: 'Verdict' }).click();
+  assert.equal(await table.locator('tbody .badge').first().textContent(), '✗ fail');
+  assert.match(await page.locator('.behind').first().textContent(), /car-distance is fail: 0\.234568.*Worst at seed=1; frame 16 car\./);
+  assert.equal(await page.locator('.behind img').count(), 1);
+  assert.deepEqual(await page.locator('[data-table="sabotages"] .badge').allTextContents(), ['✓ caught', '✗ not caught']);
+  const colours = await page.locator('[data-table="gates"] .badge').evaluateAll((all) => all.map((each) => getComputedStyle(each).color));
+  assert.equal(new Set(colours).size, 3);
   return page;
 });
 
