@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# What does not fit in CI's time: the full gates with every sabotage, the audit of the quick ones, and the long experiments.
+# What does not fit in CI's time: the full gates with every sabotage, the audit of the quick ones, the mapper's tests under
+# ASan with UBSan and under TSan, and the long experiments.
 # All cells are kept below OUT (out/nightly by default), so a run that was stopped goes on from there.
-# Usage: bash scripts/nightly.sh [--gates-only] [OUT]; --gates-only leaves out the audit and the experiments.
+# Usage: bash scripts/nightly.sh [--gates-only] [OUT]; --gates-only leaves out all but the gates.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 gates_only=no
@@ -13,6 +14,7 @@ status=0
 "$tsdfpp" gate results/gates.toml --profile full --sabotages --out "$out/gates" || status=$?
 if [ "$gates_only" = yes ]; then exit "$status"; fi
 "$tsdfpp" gate results/gates.toml --profile quick --audit --out "$out/gates" || status=$?
+for preset in asan tsan; do SHORT=1 bash scripts/sanitizers.sh "$preset" || status=$?; done
 for experiment in eval/experiments/*.toml; do
   "$tsdfpp" sweep "$experiment" --out "$out/experiments/$(basename "$experiment" .toml)" || status=$?
 done
