@@ -74,8 +74,8 @@ struct Projected {
 constexpr std::size_t kLanes = hn::MaxLanes(Floats());
 
 // False where none is to be looked at.
-bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock* next,
-             Projected& out) {
+template <bool kAllInView>
+bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
   const Floats df;
   const Ints di;
   std::array<float, 12> m;
@@ -110,10 +110,6 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
                             hn::Set(df, m[10] * pz)};
     for (std::size_t k = 0; k < kSlice; k += hn::Lanes(df)) {
       const std::size_t i = kSlice * z + k;
-      if (next != nullptr) {
-        if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
-        if (k == 0 && next->full[z] != ~0ULL) hwy::Prefetch(&next->weight[i]);
-      }
       const auto row = [&](std::size_t r) {
         const auto fixed =
             hn::Add(hn::Add(hn::Load(df, &y_term[r][k]), z_term[r]), hn::Set(df, m[4 * r + 3]));
@@ -127,21 +123,34 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
       const auto v = hn::Add(hn::Add(hn::Mul(hn::Mul(fy, cam_y), iz), cy), half);
       const auto ray = hn::Sqrt(
           hn::Add(hn::Add(hn::Mul(cam_x, cam_x), hn::Mul(cam_y, cam_y)), hn::Mul(cam_z, cam_z)));
-      const auto in_view = hn::And(hn::And(hn::Ge(cam_z, hn::Set(df, kNearest_m)),
-                                           hn::And(hn::Ge(u, zero), hn::Lt(u, width))),
-                                   hn::And(hn::Ge(v, zero), hn::Lt(v, height)));
-      // Non-negative here, so truncation is the floor.
-      const auto column = hn::ConvertTo(di, hn::IfThenElseZero(in_view, u));
-      const auto line = hn::ConvertTo(di, hn::IfThenElseZero(in_view, v));
-      hn::Store(hn::Add(hn::Mul(line, stride), column), di, &out.pixel[i]);
-      hn::Store(hn::IfThenElse(in_view, cam_z, far_away), df, &out.z[i]);
       hn::Store(hn::Mul(ray, iz), df, &out.scale[i]);
-      const auto look = hn::And(in_view, hn::Le(cam_z, behind));
+      auto look = hn::Le(cam_z, behind);
+      // Non-negative in view, so truncation is the floor.
+      const auto store = [&](auto seen_u, auto seen_v, auto seen_z) {
+        const auto line = hn::Mul(hn::ConvertTo(di, seen_v), stride);
+        hn::Store(hn::Add(line, hn::ConvertTo(di, seen_u)), di, &out.pixel[i]);
+        hn::Store(seen_z, df, &out.z[i]);
+      };
+      if constexpr (kAllInView) {
+        store(u, v, cam_z);
+      } else {
+        const auto in_view = hn::And(hn::And(hn::Ge(cam_z, hn::Set(df, kNearest_m)),
+                                             hn::And(hn::Ge(u, zero), hn::Lt(u, width))),
+                                     hn::And(hn::Ge(v, zero), hn::Lt(v, height)));
+        store(hn::IfThenElseZero(in_view, u), hn::IfThenElseZero(in_view, v),
+              hn::IfThenElse(in_view, cam_z, far_away));
+        look = hn::And(in_view, look);
+      }
       out.look[i] = hn::AllFalse(df, look) ? 0 : 1;
       any = hn::Or(any, look);
     }
   }
   return !hn::AllFalse(df, any);
+}
+
+bool Project(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
+  return place.all_in_view ? ProjectWith<true>(frame, place, out)
+                           : ProjectWith<false>(frame, place, out);
 }
 
 // s of the lanes i ... and whether they are observed, labels apart: s >= -back.
@@ -165,7 +174,7 @@ Measured<V> Measure(const Projected& projected, const float* depth_of, std::size
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
   Projected projected;
-  if (!Project(frame, place, nullptr, projected)) return false;
+  if (!Project(frame, place, projected)) return false;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
@@ -266,7 +275,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
                       TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
   FusionResult result;
   Projected projected;
-  if (!Project(frame, place, next, projected)) return result;
+  if (!Project(frame, place, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
@@ -303,7 +312,20 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   HWY_ALIGN Bytes cleared{};
   bool any_coloured = false;
   bool any_cleared = false;
+  if (next != nullptr) {
+    hwy::Prefetch(&next->observed);
+    hwy::Prefetch(&next->negative);
+    hwy::Prefetch(&next->band);
+    hwy::Prefetch(&next->cover);
+    hwy::Prefetch(&next->coloured);
+    hwy::Prefetch(&next->full);
+  }
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    // A line at a time: many at once would wait for each other.
+    if (next != nullptr) {
+      if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
+      if (i % 64 == 32) hwy::Prefetch(&next->weight[i]);
+    }
     if (projected.look[i] == 0) continue;
     const auto measured = Measure(projected, depth.data(), i, minus_back);
     const auto s = measured.s;

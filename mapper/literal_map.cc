@@ -50,7 +50,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   for (const PlannedBlock& planned :
        PlanBlocks(view, sorted.size(), config_.voxel(), config_.back(), candidate_at)) {
     const auto* entry = sorted[planned.number];
-    tasks.push_back({entry->index, entry->block.get(), planned.behind_m, {}});
+    tasks.push_back({entry->index, entry->block.get(), planned, {}});
   }
   const auto for_each_task = [&](const auto& function) {
     tbb::parallel_for(
@@ -72,7 +72,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
   BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.behind_m);
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const std::int32_t pixel = observation.pixel[i];
@@ -96,7 +96,7 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
 void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW,
                             const Task& task) {
   BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.behind_m);
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   const auto weight_cap = static_cast<float>(config_.weight_cap);
   for (auto& [id, volume] : volumes_) {

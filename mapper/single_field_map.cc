@@ -59,7 +59,7 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
           const auto& [index, block] = blocks[planned[k].number];
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : blocks[planned[k + 1].number].block.get();
-          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel(), planned[k].behind_m),
+          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel(), planned[k]),
                     planned[k].label, next, *block, *labels_.Find(index));
         }
       },

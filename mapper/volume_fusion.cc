@@ -91,7 +91,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].entry->block.get();
           const BlockPlace place =
-              PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k].behind_m);
+              PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();
