@@ -40,7 +40,6 @@ class AnchoredMap final : public LayeredMap {
   // a function of volumes and poses.
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
-  bool MayListSeveral(const Index3& index) const;
   void ComputeBlock(const Index3& index, const Participants& participants, IndexBlock& ids) const;
 
   int layers_;

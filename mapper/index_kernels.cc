@@ -49,6 +49,15 @@ VotesCounted Votes(const BlockMask& votes, InstanceId id, int confidence_cap, Li
   return counted;
 }
 
+void Alone(const BlockMask& covered, InstanceId id, InstanceId* ids) {
+  const hn::CappedTag<std::uint16_t, 32> d;
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(covered.data());
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(d)) {
+    const auto listed = hn::IfThenElse(MaskAt(d, bits, i), hn::Set(d, id), hn::Set(d, kNoInstance));
+    hn::StoreU(listed, d, ids + i);
+  }
+}
+
 void Insert(const BlockMask& covered, const float* distance, InstanceId id,
             const OrderedLists& lists) {
   const Ints di;
@@ -83,11 +92,16 @@ HWY_AFTER_NAMESPACE();
 namespace tsdfpp {
 
 HWY_EXPORT(Votes);
+HWY_EXPORT(Alone);
 HWY_EXPORT(Insert);
 
 VotesCounted VoteForActive(const BlockMask& votes, InstanceId id, int confidence_cap,
                            ListEntry* active) {
   return HWY_DYNAMIC_DISPATCH(Votes)(votes, id, confidence_cap, active);
+}
+
+void ListAlone(const BlockMask& covered, InstanceId id, InstanceId* ids) {
+  HWY_DYNAMIC_DISPATCH(Alone)(covered, id, ids);
 }
 
 void InsertByDistance(const BlockMask& covered, const float* distance, InstanceId id,

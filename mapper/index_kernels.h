@@ -17,6 +17,9 @@ struct VotesCounted {
 VotesCounted VoteForActive(const BlockMask& votes, InstanceId id, int confidence_cap,
                            ListEntry* active);
 
+// Lists of the object alone where `covered` marks a voxel, empty ones elsewhere.
+void ListAlone(const BlockMask& covered, InstanceId id, InstanceId* ids);
+
 // The lists of a block while they are ordered: entry k of voxel i at [k * kBlockVoxels + i], the
 // distance being infinite where there is no entry.
 struct OrderedLists {

@@ -75,6 +75,10 @@ struct alignas(64) TsdfBlock {
   // it.
   std::uint64_t revision = 0;
 
+  // Kept by AnchoredMap where the object's lattice is the world's: other objects are listed in the
+  // index's block as well.
+  bool is_listed_with_others = false;
+
   // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
   // true where one of observed, negative and band changed. `back` in metres. Frees the colours
   // where none is left.

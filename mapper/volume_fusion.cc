@@ -90,13 +90,16 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           TsdfBlock& block = *of.entry->block;
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].entry->block.get();
-          const BlockPlace place =
-              PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k]);
+          const BlockPlace place = PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();
-          fused[k] = {of.id, of.entry->index, &block, result.in_band,
-                      AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U)};
+          fused[k] = {of.id,
+                      of.entry->index,
+                      &block,
+                      result.in_band,
+                      AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U),
+                      block.is_listed_with_others};
         }
       },
       tbb::simple_partitioner());
