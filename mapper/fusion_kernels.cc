@@ -18,10 +18,18 @@
 namespace tsdfpp {
 namespace {
 
-// table[pixel], `kLanes` at a time, where these are to be looked at. Plain loads: from a frame,
-// which no cache holds, gathers took longer.
+// One load after the other: from a frame, which no cache holds, gathers took longer, and so did
+// what GCC made of the loops by itself.
+#if defined(__GNUC__) && !defined(__clang__)
+#define TSDFPP_PLAIN_LOADS __attribute__((noinline, optimize("no-tree-slp-vectorize")))
+#else
+#define TSDFPP_PLAIN_LOADS
+#endif
+
+// table[pixel], `kLanes` at a time, where these are to be looked at.
 template <std::size_t kLanes, typename From, typename To>
-void Read(const From* table, const Lanes& pixel, const std::uint8_t* look, To* out) {
+TSDFPP_PLAIN_LOADS void Read(const From* table, const Lanes& pixel, const std::uint8_t* look,
+                             To* out) {
   for (std::size_t i = 0; i < kBlockVoxels; i += kLanes) {
     if (look[i] == 0) continue;
     for (std::size_t k = i; k < i + kLanes; ++k) out[k] = table[pixel[k]];

@@ -32,12 +32,11 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   active_.is_current = false;
   const FrameView view(frame, labels);
-  const auto world = [](InstanceId) { return Pose::Identity(); };
-  const auto is_known = [&](InstanceId, const Index3& index) {
-    return lists_.Find(index) != nullptr;
+  const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
+    return {Pose::Identity(), &lists_.directory()};
   };
   const std::size_t blocks_before = lists_.size();
-  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
+  for (const auto& [id, indices] : BlocksAlongRays(view, config_, lattice_of)) {
     for (const Index3& index : indices) lists_.FindOrAdd(index);
   }
   const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);

@@ -7,6 +7,7 @@
 
 #include "core/types.h"
 #include "mapper/block_grid.h"
+#include "mapper/block_pool.h"
 #include "mapper/half.h"
 
 namespace tsdfpp {
@@ -39,7 +40,16 @@ std::uint64_t NewRevision();
 struct alignas(64) BlockColours {
   std::array<std::array<std::uint16_t, kBlockVoxels>, 3> channel{};  // 8.8 fixed point
   std::array<std::uint8_t, kBlockVoxels> count{};
+
+  static void* operator new(std::size_t);
+  static void operator delete(void* block);
 };
+inline void* BlockColours::operator new(std::size_t) {
+  return ObjectPool<sizeof(BlockColours), alignof(BlockColours)>::Take();
+}
+inline void BlockColours::operator delete(void* block) {
+  ObjectPool<sizeof(BlockColours), alignof(BlockColours)>::Give(block);
+}
 
 // A unique_ptr that copies what it points at.
 template <typename T>
@@ -79,6 +89,9 @@ struct alignas(64) TsdfBlock {
   // index's block as well.
   bool is_listed_with_others = false;
 
+  static void* operator new(std::size_t);
+  static void operator delete(void* block);
+
   // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
   // true where one of observed, negative and band changed. `back` in metres. Frees the colours
   // where none is left.
@@ -117,6 +130,13 @@ struct alignas(64) TsdfBlock {
     return static_cast<std::uint8_t>(std::min(255, (fixed + 128) >> 8));
   }
 };
+
+inline void* TsdfBlock::operator new(std::size_t) {
+  return ObjectPool<sizeof(TsdfBlock), alignof(TsdfBlock)>::Take();
+}
+inline void TsdfBlock::operator delete(void* block) {
+  ObjectPool<sizeof(TsdfBlock), alignof(TsdfBlock)>::Give(block);
+}
 
 using TsdfGrid = BlockGrid<TsdfBlock>;
 

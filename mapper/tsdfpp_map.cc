@@ -258,15 +258,31 @@ void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
 
 void TsdfppMap::Activate(InstanceId id) {
   const TsdfGrid& grid = volumes_.at(id).grid;
-  for (const auto& entry : grid.entries()) {
+  const auto in_parallel = [&](const auto& function) {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, grid.size(), kBlocksPerTask),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
+        },
+        tbb::simple_partitioner());
+  };
+  in_parallel([&](std::size_t i) {
+    const TsdfGrid::Entry& entry = grid.entries()[i];
     entry.block->cover = FindCover(grid, entry.index);
+  });
+  std::vector<ListBlock*> lists(grid.size(), nullptr);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const TsdfGrid::Entry& entry = grid.entries()[i];
     if (!Any(entry.block->cover)) continue;
-    ListBlock& lists = ListsOf(entry.index);
+    lists[i] = &ListsOf(entry.index);
     NoteIndexChange(entry.index);
-    ForEachVoxel(entry.block->cover, [&](int place) {
-      ListWithRoom(lists, place).PushFront(id, config_.moved_confidence);
-    });
   }
+  in_parallel([&](std::size_t i) {
+    if (lists[i] == nullptr) return;
+    ForEachVoxel(grid.entries()[i].block->cover, [&](int place) {
+      ListWithRoom(*lists[i], place).PushFront(id, config_.moved_confidence);
+    });
+  });
 }
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {

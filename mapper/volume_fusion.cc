@@ -11,15 +11,12 @@ namespace {
 constexpr std::size_t kBlocksPerTask = 16;
 
 void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolumes& volumes) {
-  const auto T_WL_of = [&](InstanceId id) {
+  const auto lattice_of = [&](InstanceId id) -> LatticeOfLabel {
     const auto volume = volumes.find(id);
-    return volume == volumes.end() ? Pose::Identity() : volume->second.T_WL;
+    if (volume == volumes.end()) return {};
+    return {volume->second.T_WL, &volume->second.grid.directory()};
   };
-  const auto is_known = [&](InstanceId id, const Index3& index) {
-    const auto volume = volumes.find(id);
-    return volume != volumes.end() && volume->second.grid.Find(index) != nullptr;
-  };
-  for (const auto& [id, indices] : BlocksAlongRays(frame, config, T_WL_of, is_known)) {
+  for (const auto& [id, indices] : BlocksAlongRays(frame, config, lattice_of)) {
     TsdfGrid& grid = volumes[id].grid;
     for (const Index3& index : indices) grid.FindOrAdd(index);
   }
