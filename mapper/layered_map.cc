@@ -13,7 +13,8 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 64;
-constexpr std::size_t kCoversPerTask = 16;
+constexpr std::size_t kCoversPerTask = 64;
+constexpr std::size_t kCoversAhead = 3;  // more than a few do not stay in the cache
 
 }  // namespace
 
@@ -269,12 +270,16 @@ std::vector<BlockMask> LayeredMap::NewCovers(const std::vector<StaleCover>& stal
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, stale.size(), kCoversPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        std::array<Surroundings, kCoversPerTask> around;
+        // What is found is fetched while the ones before are worked on.
+        std::array<Surroundings, kCoversAhead> around;
+        const auto find = [&](std::size_t i) {
+          if (i >= range.end()) return;
+          around[i % kCoversAhead] = FindSurroundings(*stale[i].grid, stale[i].index);
+        };
+        for (std::size_t i = range.begin(); i < range.begin() + kCoversAhead; ++i) find(i);
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          around[i - range.begin()] = FindSurroundings(*stale[i].grid, stale[i].index);
-        }
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          covers[i] = CoverOf(around[i - range.begin()]);
+          covers[i] = CoverOf(around[i % kCoversAhead]);
+          find(i + kCoversAhead);
         }
       },
       tbb::simple_partitioner());

@@ -70,15 +70,17 @@ class Copied : public std::unique_ptr<T> {
 struct alignas(64) TsdfBlock {
   std::array<Half, kBlockVoxels> distance{};        // metres, positive in front of the surface
   std::array<std::uint8_t, kBlockVoxels> weight{};  // observations; 0 is unobserved
-  // Only while a voxel has a colour: most blocks lie too far from a surface.
-  Copied<BlockColours> colours;
 
+  // Each fills a cache line.
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
   BlockMask coloured{};  // the number of colours is above 0
   BlockMask full{};      // of these it is known that the weight is at its cap
+
+  // Only while a voxel has a colour: most blocks lie too far from a surface.
+  Copied<BlockColours> colours;
 
   // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
   // changes values gives the block a new one (UpdateMasks does), which is how the cached meshes see
