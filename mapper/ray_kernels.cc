@@ -8,6 +8,8 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/half_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace tsdfpp::HWY_NAMESPACE {
 namespace {
@@ -42,6 +44,22 @@ void FillRays(const LatticeRays& lattice, int u0, int v0, TileRays& rays) {
                          hn::IfThenElse(hn::Lt(d, hn::Zero(df)), hn::Neg(least), least));
       hn::StoreU(off_zero, df, rays.direction[axis].data() + i);
       hn::StoreU(hn::Div(hn::Set(df, 1.0F), off_zero), df, rays.inverse[axis].data() + i);
+    }
+  }
+}
+
+void FillCorners(const std::array<const Half*, 8>& from, RayBlock& block) {
+  const hn::CappedTag<float, kBlockSide> d8;
+  float* to = block.distance.data();
+  for (std::size_t z = 0; z < kCorners; ++z) {
+    for (std::size_t y = 0; y < kCorners; ++y) {
+      const std::size_t place = (y >> 3U) * 2 + (z >> 3U) * 4;
+      const std::size_t row = 64 * (z & 7U) + 8 * (y & 7U);
+      for (std::size_t x = 0; x < kBlockSide; x += hn::Lanes(d8)) {
+        hn::StoreU(LoadHalves(d8, from[place] + row + x), d8, to + x);
+      }
+      to[kBlockSide] = from[place + 1][row];
+      to += kCorners;
     }
   }
 }
@@ -293,15 +311,13 @@ namespace tsdfpp {
 
 HWY_EXPORT(FillRays);
 HWY_EXPORT(Cast);
+HWY_EXPORT(FillCorners);
 
 TileOrder::TileOrder() {
   for (unsigned i = 0; i < kTilePixels; ++i) {
-    unsigned column = 0;
-    unsigned row = 0;
-    for (unsigned k = 0; k < 4; ++k) {
-      column |= (i >> (2 * k) & 1U) << k;
-      row |= (i >> (2 * k + 1) & 1U) << k;
-    }
+    const unsigned square = i / 16;
+    const unsigned column = 4 * ((square & 1U) | (square >> 1U & 2U)) + i % 4;
+    const unsigned row = 4 * ((square >> 1U & 1U) | (square >> 2U & 2U)) + i / 4 % 4;
     x[i] = static_cast<std::uint8_t>(column);
     y[i] = static_cast<std::uint8_t>(row);
     place[kTileSide * row + column] = static_cast<std::uint8_t>(i);
@@ -315,6 +331,10 @@ const TileOrder& OrderOfTile() {
 
 void FillTileRays(const LatticeRays& lattice, int u, int v, TileRays& rays) {
   HWY_DYNAMIC_DISPATCH(FillRays)(lattice, u, v, rays);
+}
+
+void CopyCorners(const std::array<const Half*, 8>& from, RayBlock& block) {
+  HWY_DYNAMIC_DISPATCH(FillCorners)(from, block);
 }
 
 void PrefetchBlock(const RayBlock& block) {
