@@ -13,9 +13,9 @@ inline constexpr int kTileSide = 16;
 inline constexpr int kTilePixels = kTileSide * kTileSide;
 using TileValues = std::array<float, kTilePixels>;
 
-// Column and row of a tile's i-th pixel: squares of 4x4 pixels, these in squares of squares, so that
-// neighbours in the order are neighbours in the image, and pixels 4 k ... 4 k + 3 one after another
-// in a row of it.
+// Column and row of a tile's i-th pixel: squares of 4x4 pixels, these in squares of squares, so
+// that neighbours in the order are neighbours in the image, and pixels 4 k ... 4 k + 3 one after
+// another in a row of it.
 struct TileOrder {
   TileOrder();
   std::array<std::uint8_t, kTilePixels> x{};

@@ -429,17 +429,35 @@ class Caster::Tile {
   }
 
   void WriteLabels(const TileHits& hits, int columns, int rows, cv::Mat& ids) {
-    // Where nothing was hit, the voxel of one before: it is not read.
-    Index3 voxel;
+    // PointAt() and NearestVoxel(), an axis at a time. Where nothing was hit the voxel is not read.
+    const TileOrder& order = OrderOfTile();
+    const LatticeRays& rays = c_.world_rays_;
+    const int first_u = u_;
+    const int first_v = v_;
+    const float voxel = voxel_;
+    const float farthest = 0x1p25F * voxel;  // beyond all blocks, and the voxel's index is a number
+    std::array<std::array<int, kTilePixels>, 3> along;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto origin = static_cast<float>(rays.origin[a]);
+      const float at_0 = rays.at_pixel_0[a];
+      const float per_row = rays.per_row[a];
+      const float per_column = rays.per_column[a];
+      for (std::size_t i = 0; i < kTilePixels; ++i) {
+        const auto u = static_cast<float>(first_u + order.x[i]);
+        const auto v = static_cast<float>(first_v + order.y[i]);
+        const float direction = (at_0 + per_row * v) + per_column * u;
+        const float depth = std::min(hits.depth[i], farthest);
+        along[a][i] = NearestAlong(origin + depth * direction, voxel);
+      }
+    }
     for (std::size_t i = 0; i < kTilePixels; ++i) {
-      if (hits.block[i] >= 0) voxel = NearestVoxel(PointAt(i, hits.depth[i]), voxel_);
-      voxels_[i] = voxel;
+      voxels_[i] = {along[0][i], along[1][i], along[2][i]};
     }
     labels_(voxels_, labelled_);
     for (int y = 0; y < rows; ++y) {
       std::uint16_t* out = ids.ptr<std::uint16_t>(v_ + y) + u_;
       for (int x = 0; x < columns; ++x) {
-        const std::size_t i = OrderOfTile().place[At(kTileSide * y + x)];
+        const std::size_t i = order.place[At(kTileSide * y + x)];
         if (hits.block[i] >= 0) out[x] = labelled_[i];
       }
     }
