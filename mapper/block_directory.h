@@ -53,6 +53,23 @@ class BlockDirectory {
     return cell == nullptr ? kNone : cell->number[PlaceOf(block)];
   }
 
+  // The numbers of a block and of the seven further along x, y, z (bits 0, 1, 2 of the place).
+  std::array<std::int32_t, 8> FindUpper(const Index3& block) const {
+    // Along each axis the two lie in one cell but at its end.
+    const unsigned leaves = ((block.x & 3) == 3 ? 1U : 0U) | ((block.y & 3) == 3 ? 2U : 0U) |
+                            ((block.z & 3) == 3 ? 4U : 0U);
+    std::array<const Cell*, 8> cells{};
+    std::array<std::int32_t, 8> numbers;
+    for (unsigned i = 0; i < 8; ++i) {
+      const Index3 at = block + Index3{static_cast<int>(i & 1U), static_cast<int>((i >> 1U) & 1U),
+                                       static_cast<int>(i >> 2U)};
+      if ((i & leaves) == i) cells[i] = CellOf(at);
+      const Cell* of = cells[i & leaves];
+      numbers[i] = of == nullptr ? kNone : of->number[PlaceOf(at)];
+    }
+    return numbers;
+  }
+
   // The numbers of a block (13) and of the 26 around it, x fastest, then y, then z.
   std::array<std::int32_t, 27> FindAround(const Index3& block) const {
     // Along each axis the three lie in one cell or in two.

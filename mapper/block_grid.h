@@ -64,6 +64,15 @@ class BlockGrid {
   // The block, or nullptr.
   Block* Find(const Index3& index) const { return BlockOrNone(directory_.Find(index)); }
 
+  // A block and the seven further along x, y, z (bits 0, 1, 2 of the place); nullptr where there is
+  // none.
+  std::array<const Block*, 8> FindUpper(const Index3& index) const {
+    const std::array<std::int32_t, 8> numbers = directory_.FindUpper(index);
+    std::array<const Block*, 8> blocks;
+    for (std::size_t i = 0; i < numbers.size(); ++i) blocks[i] = BlockOrNone(numbers[i]);
+    return blocks;
+  }
+
   // A block (13) and the 26 around it, x fastest, then y, then z; nullptr where there is none.
   std::array<const Block*, 27> FindAround(const Index3& index) const {
     const std::array<std::int32_t, 27> numbers = directory_.FindAround(index);

@@ -8,7 +8,6 @@
 
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
-#include "mapper/last_block.h"
 #include "mapper/layered_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
@@ -256,18 +255,13 @@ void LiteralMap::UpdateActiveField() const {
 MeshWork LiteralMap::UpdateMeshes() const {
   UpdateActiveField();
   const MeshWork work = active_.mesh.Update(active_.field, config_.voxel());
-  LabelTriangles(active_.mesh, [&] { return ActiveAtPoints(); });
+  LabelTriangles(active_.mesh, config_.voxel(), [&] { return ActiveAtVoxels(); });
   return work;
 }
 
-PointLabel LiteralMap::ActiveAtPoints() const {
-  // One point after another is in the same block.
-  return [this, last = LastBlock(lists_)](const Eigen::Vector3f& point) mutable {
-    const Index3 v = NearestVoxel(point, config_.voxel());
-    const ListBlock* lists = last.Find(BlockOf(v));
-    const InstanceId id = lists == nullptr ? kNoInstance : lists->active[At(PlaceInBlock(v))].id;
-    return id == kNoInstance ? kBackground : id;
-  };
+VoxelLabels LiteralMap::ActiveAtVoxels() const {
+  return LabelsOf(lists_,
+                  [](const ListBlock& block, std::size_t place) { return block.active[place].id; });
 }
 
 std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
@@ -276,7 +270,7 @@ std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pos
   RayPass pass;
   pass.voxel_m = config_.voxel_m;
   pass.volumes.push_back({kBackground, &active_.field, Pose::Identity(), true});
-  pass.make_label = [&] { return ActiveAtPoints(); };
+  pass.make_labels = [&] { return ActiveAtVoxels(); };
   RayCastOptions first = options;
   first.surfaces = 1;
   return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "mapper/map_representation.h"
-#include "mapper/point_label.h"
 #include "mapper/volume_fusion.h"
+#include "mapper/voxel_labels.h"
 
 namespace tsdfpp {
 
@@ -70,7 +70,7 @@ class LiteralMap final : public MapRepresentation {
   void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
   // Gives the active object of the voxel nearest to a point (metres), the background where there is
   // none.
-  PointLabel ActiveAtPoints() const;
+  VoxelLabels ActiveAtVoxels() const;
   void UpdateActiveField() const;
   // The list blocks in which the object was listed.
   std::vector<Index3> Unlist(InstanceId id);

@@ -3,24 +3,17 @@
 #include <algorithm>
 #include <bit>
 
+#include "mapper/cube_masks.h"
 #include "mapper/marching_cubes.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr BlockMask kNone{};
-constexpr std::uint64_t kFirstColumn = 0x0101010101010101ULL;  // x = 0
 constexpr FixedColour kUncoloured{128U << 8U, 128U << 8U, 128U << 8U};
 
 std::size_t At(int i) { return static_cast<std::size_t>(i); }
 
-// Slices moved by one voxel; `next` and `last` are the same slice of the neighbouring block.
-std::uint64_t AtNextX(std::uint64_t slice, std::uint64_t next) {
-  return ((slice >> 1U) & ~(kFirstColumn << 7U)) | ((next & kFirstColumn) << 7U);
-}
-std::uint64_t AtNextY(std::uint64_t slice, std::uint64_t next) {
-  return (slice >> 8U) | (next << 56U);
-}
+// Slices moved by one voxel down; `last` is the same slice of the neighbouring block.
 std::uint64_t AtLastX(std::uint64_t slice, std::uint64_t last) {
   return ((slice << 1U) & ~kFirstColumn) | ((last >> 7U) & kFirstColumn);
 }
@@ -29,29 +22,13 @@ std::uint64_t AtLastY(std::uint64_t slice, std::uint64_t last) {
 }
 
 // One mask of a part and of the seven upper ones.
-using UpperMasks = std::array<const BlockMask*, 8>;
 UpperMasks UpperMasksOf(const MeshPart& part, BlockMask MeshPart::*mask) {
   UpperMasks masks{};
   for (std::size_t i = 0; i < 8; ++i) {
     const MeshPart* of = part.around[UpperPlace(i)];
-    masks[i] = of == nullptr ? &kNone : &(of->*mask);
+    masks[i] = of == nullptr ? &kNoVoxels : &(of->*mask);
   }
   return masks;
-}
-
-// Slice z, 0 ... 8, of the block at offset bit x, y of `which`.
-std::uint64_t SliceOf(const UpperMasks& masks, std::size_t which, std::size_t z) {
-  return z < kBlockSide ? (*masks[which])[z] : (*masks[which + 4])[0];
-}
-
-// For the cubes named by the voxels of slice z: the four lower corners' bits, joined.
-template <typename Join>
-std::uint64_t JoinFour(const UpperMasks& masks, std::size_t z, const Join& join) {
-  const std::uint64_t here = SliceOf(masks, 0, z);
-  const std::uint64_t next_y = SliceOf(masks, 2, z);
-  const std::uint64_t rows = join(here, AtNextX(here, SliceOf(masks, 1, z)));
-  const std::uint64_t next_rows = join(next_y, AtNextX(next_y, SliceOf(masks, 3, z)));
-  return join(rows, AtNextY(rows, next_rows));
 }
 
 constexpr auto kBitCounts = [] {
@@ -106,33 +83,18 @@ const std::array<FlatTriangles, 256>& FlatTable() {
 }  // namespace
 
 bool FindCubes(MeshPart& part) {
-  const UpperMasks observed = UpperMasksOf(part, &MeshPart::observed);
-  const UpperMasks negative = UpperMasksOf(part, &MeshPart::negative);
-  const auto both = [](std::uint64_t a, std::uint64_t b) { return a & b; };
-  const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
-  BlockMask complete{};
-  std::uint64_t lower_complete = JoinFour(observed, 0, both);
-  std::uint64_t lower_any = JoinFour(negative, 0, either);
-  std::uint64_t lower_all = JoinFour(negative, 0, both);
-  for (std::size_t z = 0; z < kBlockSide; ++z) {
-    const std::uint64_t upper_complete = JoinFour(observed, z + 1, both);
-    const std::uint64_t upper_any = JoinFour(negative, z + 1, either);
-    const std::uint64_t upper_all = JoinFour(negative, z + 1, both);
-    complete[z] = lower_complete & upper_complete;
-    part.crossed[z] = complete[z] & (lower_any | upper_any) & ~(lower_all & upper_all);
-    lower_complete = upper_complete;
-    lower_any = upper_any;
-    lower_all = upper_all;
-  }
+  const auto [complete, crossed] = FindCubeMasks(UpperMasksOf(part, &MeshPart::observed),
+                                                 UpperMasksOf(part, &MeshPart::negative));
   const bool changed = complete != part.complete;
   part.complete = complete;
+  part.crossed = crossed;
   return changed;
 }
 
 bool FindEdges(MeshPart& part) {
   const auto mask_at = [&](int x, int y, int z, BlockMask MeshPart::*mask) {
     const MeshPart* of = part.around[AroundPlace(x, y, z)];
-    return of == nullptr ? &kNone : &(of->*mask);
+    return of == nullptr ? &kNoVoxels : &(of->*mask);
   };
   const auto complete_at = [&](int x, int y, int z) {
     return mask_at(x, y, z, &MeshPart::complete);

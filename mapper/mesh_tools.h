@@ -13,15 +13,16 @@ namespace tsdfpp {
 TriangleMesh KeepFaces(const TriangleMesh& mesh, const std::vector<std::uint8_t>& keep);
 // Appends a coloured mesh without face ids as faces of `id`.
 void Append(TriangleMesh& scene, const TriangleMesh& mesh, InstanceId id);
-// The voxel whose centre is nearest to a point; both in metres.
+// The voxel whose centre is nearest to a point, along an axis; both in metres.
+inline int NearestAlong(float x, float voxel) {
+  // The floor, without a call.
+  const float place = x / voxel + 0.5F;
+  const int cut = static_cast<int>(place);
+  return cut - static_cast<int>(static_cast<float>(cut) > place);
+}
 inline Index3 NearestVoxel(const Eigen::Vector3f& point, float voxel) {
-  const auto nearest = [&](float x) {
-    // The floor, without a call.
-    const float place = x / voxel + 0.5F;
-    const int cut = static_cast<int>(place);
-    return cut - static_cast<int>(static_cast<float>(cut) > place);
-  };
-  return {nearest(point.x()), nearest(point.y()), nearest(point.z())};
+  return {NearestAlong(point.x(), voxel), NearestAlong(point.y(), voxel),
+          NearestAlong(point.z(), voxel)};
 }
 
 }  // namespace tsdfpp

@@ -8,80 +8,59 @@
 #include <cmath>
 #include <memory>
 
-#include "mapper/cube_rows.h"
+#include "mapper/cube_masks.h"
+#include "mapper/ray_kernels.h"
 
 namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 64;
 
-std::size_t At(int i) { return static_cast<std::size_t>(i); }
-
 // The block and those one further along x, y, z (bits 0, 1, 2 of the place).
-using UpperNeighbours = std::array<const TsdfBlock*, 8>;
+using UpperBlocks = std::array<const TsdfBlock*, 8>;
 
-// Nine bits: the row's eight voxels and the first one of the next block.
-using CornerRows = std::array<std::array<std::uint32_t, kCorners>, kCorners>;
-
-CornerRows RowsOf(const UpperNeighbours& blocks, BlockMask TsdfBlock::*mask) {
-  CornerRows rows{};
-  for (int z = 0; z < kCorners; ++z) {
-    for (int y = 0; y < kCorners; ++y) {
-      const int place = (y >> 3) * 2 + (z >> 3) * 4;
-      const auto row = [&](int upper) -> std::uint32_t {
-        const TsdfBlock* block = blocks[At(place + upper)];
-        if (block == nullptr) return 0;
-        return static_cast<std::uint32_t>((block->*mask)[At(z & 7)] >>
-                                          static_cast<unsigned>(8 * (y & 7))) &
-               0xFFU;
-      };
-      rows[At(z)][At(y)] = row(0) | (row(1) & 1U) << 8U;
-    }
+UpperMasks MasksOf(const UpperBlocks& blocks, BlockMask TsdfBlock::*mask) {
+  UpperMasks masks;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    masks[i] = blocks[i] == nullptr ? &kNoVoxels : &(blocks[i]->*mask);
   }
-  return rows;
+  return masks;
 }
 
 // Fills `crossed` and its box; false where no cube is crossed.
-bool FindCrossed(const UpperNeighbours& blocks, CrossedCubes& out) {
-  const CornerRows negative = RowsOf(blocks, &TsdfBlock::negative);
-  const CornerRows observed = RowsOf(blocks, &TsdfBlock::observed);
-  out.bits = {};
-  out.low = {kBlockSide, kBlockSide, kBlockSide};
-  out.high = {0, 0, 0};
-  std::uint32_t columns = 0;
+bool FindCrossed(const UpperBlocks& blocks, CrossedCubes& out) {
+  const BlockMask crossed =
+      FindCubeMasks(MasksOf(blocks, &TsdfBlock::observed), MasksOf(blocks, &TsdfBlock::negative))
+          .crossed;
+  std::uint64_t any = 0;
+  std::uint32_t slices = 0;
   for (std::size_t z = 0; z < kBlockSide; ++z) {
-    for (std::size_t y = 0; y < kBlockSide; ++y) {
-      const std::uint32_t row = CubeRowOf(observed, negative, z, y).crossed() & 0xFFU;
-      if (row == 0) continue;
-      columns |= row;
-      out.bits[2 * z + (y >> 2U)] |= row << (8 * (y & 3U));
-      out.low[1] = std::min(out.low[1], static_cast<std::uint8_t>(y));
-      out.high[1] = std::max(out.high[1], static_cast<std::uint8_t>(y + 1));
-      out.low[2] = std::min(out.low[2], static_cast<std::uint8_t>(z));
-      out.high[2] = std::max(out.high[2], static_cast<std::uint8_t>(z + 1));
-    }
+    out.bits[2 * z] = static_cast<std::uint32_t>(crossed[z]);
+    out.bits[2 * z + 1] = static_cast<std::uint32_t>(crossed[z] >> 32U);
+    any |= crossed[z];
+    if (crossed[z] != 0) slices |= 1U << z;
   }
-  if (columns == 0) return false;
-  out.low[0] = static_cast<std::uint8_t>(std::countr_zero(columns));
-  out.high[0] = static_cast<std::uint8_t>(std::bit_width(columns));
+  if (any == 0) return false;
+  std::uint64_t columns = any | any >> 32U;
+  columns |= columns >> 16U;
+  columns = (columns | columns >> 8U) & 0xFFU;
+  const auto set = [&](std::size_t axis, int low, int high) {
+    out.low[axis] = static_cast<std::uint8_t>(low);
+    out.high[axis] = static_cast<std::uint8_t>(high);
+  };
+  set(0, std::countr_zero(columns), static_cast<int>(std::bit_width(columns)));
+  set(1, std::countr_zero(any) / 8, static_cast<int>(std::bit_width(any) + 7) / 8);
+  set(2, std::countr_zero(slices), static_cast<int>(std::bit_width(slices)));
   return true;
 }
 
-void CopyDistances(const UpperNeighbours& blocks, RayBlock& out) {
-  for (int z = 0; z < kCorners; ++z) {
-    for (int y = 0; y < kCorners; ++y) {
-      const int place = (y >> 3) * 2 + (z >> 3) * 4;
-      const std::size_t from = At(PlaceInBlock({0, y, z}));
-      float* to = &out.distance[At((z * kCorners + y) * kCorners)];
-      if (const TsdfBlock* block = blocks[At(place)]) {
-        ToFloats(&block->distance[from], kBlockSide, to);
-      } else {
-        std::fill(to, to + kBlockSide, 0.0F);
-      }
-      const TsdfBlock* next = blocks[At(place + 1)];
-      to[kBlockSide] = next == nullptr ? 0.0F : float{next->distance[from]};
-    }
+void CopyDistances(const UpperBlocks& blocks, RayBlock& out) {
+  static constexpr std::array<Half, kBlockVoxels> kZeros{};
+  std::array<const Half*, 8> from;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    from[i] = (blocks[i] == nullptr ? kZeros : blocks[i]->distance).data();
   }
+  CopyCorners(from, out);
 }
 
 // A camera before one lattice, lengths in voxels.
@@ -189,14 +168,6 @@ RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& 
         [](const Candidate& a, const Candidate& b) { return a.entry->index < b.entry->index; });
   }
   // First the crossed cubes, then, for the blocks that have some, the distances.
-  const auto neighbours_of = [&](const Candidate& candidate) {
-    UpperNeighbours blocks{candidate.entry->block.get()};
-    for (int k = 1; k < 8; ++k) {
-      blocks[At(k)] = volumes[candidate.volume].grid->Find(candidate.entry->index +
-                                                           Index3{k & 1, (k >> 1) & 1, k >> 2});
-    }
-    return blocks;
-  };
   const auto for_each_candidate = [&](const auto& function) {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, candidates.size(), kBlocksPerTask),
@@ -205,15 +176,14 @@ RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& 
         },
         tbb::simple_partitioner());
   };
+  std::vector<UpperBlocks> upper(candidates.size());
   std::vector<CrossedCubes> crossed(candidates.size());
   std::vector<BlockFootprint> footprints(candidates.size());
   for_each_candidate([&](std::size_t i) {
-    const UpperNeighbours blocks = neighbours_of(candidates[i]);
-    const bool any_negative = std::any_of(blocks.begin(), blocks.end(), [](const TsdfBlock* b) {
-      return b != nullptr && b->AnyNegative();
-    });
-    if (!any_negative || !FindCrossed(blocks, crossed[i])) return;
-    footprints[i] = views[candidates[i].volume].FootprintOf(candidates[i].entry->index, crossed[i]);
+    const auto& [volume, entry] = candidates[i];
+    upper[i] = volumes[volume].grid->FindUpper(entry->index);
+    if (!FindCrossed(upper[i], crossed[i])) return;
+    footprints[i] = views[volume].FootprintOf(entry->index, crossed[i]);
   });
   constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
   RayBlocks found;
@@ -237,7 +207,7 @@ RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& 
     block.contested =
         contested && contested(volumes[volume], first + Index3{low[0], low[1], low[2]},
                                first + Index3{high[0], high[1], high[2]});
-    CopyDistances(neighbours_of(candidates[i]), block);
+    CopyDistances(upper[i], block);
   });
   return found;
 }

@@ -24,9 +24,11 @@ struct RayVolume {
 inline constexpr int kCorners = kBlockSide + 1;
 
 struct CrossedCubes {
-  std::array<std::uint8_t, 3> low{};     // the box that holds them, x, y, z
-  std::array<std::uint8_t, 3> high{};    // one above
-  std::array<std::uint32_t, 16> bits{};  // 64 z + 8 y + x: the cube named by that voxel is crossed
+  std::array<std::uint8_t, 3> low{};   // the box that holds them, x, y, z
+  std::array<std::uint8_t, 3> high{};  // one above
+  // Two words a slice, the lower one first: bit 64 z + 8 y + x is set where the cube named by that
+  // voxel is crossed.
+  std::array<std::uint32_t, 16> bits{};
 };
 
 struct RayBlock {

@@ -8,6 +8,8 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/half_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace tsdfpp::HWY_NAMESPACE {
 namespace {
@@ -46,6 +48,22 @@ void FillRays(const LatticeRays& lattice, int u0, int v0, TileRays& rays) {
   }
 }
 
+void FillCorners(const std::array<const Half*, 8>& from, RayBlock& block) {
+  const hn::CappedTag<float, kBlockSide> d8;
+  float* to = block.distance.data();
+  for (std::size_t z = 0; z < kCorners; ++z) {
+    for (std::size_t y = 0; y < kCorners; ++y) {
+      const std::size_t place = (y >> 3U) * 2 + (z >> 3U) * 4;
+      const std::size_t row = 64 * (z & 7U) + 8 * (y & 7U);
+      for (std::size_t x = 0; x < kBlockSide; x += hn::Lanes(d8)) {
+        hn::StoreU(LoadHalves(d8, from[place] + row + x), d8, to + x);
+      }
+      to[kBlockSide] = from[place + 1][row];
+      to += kCorners;
+    }
+  }
+}
+
 // One ray a lane along one axis.
 struct Axis {
   VF origin;     // of the ray, voxels from the block's first
@@ -53,6 +71,7 @@ struct Axis {
   VF inverse;
   VF cell;   // the cube that the ray is in, a whole number
   VF step;   // +1 or -1
+  VI pace;   // what a step adds to the cube's place in the block
   VF ahead;  // 1 where the next plane is the cube's upper one, 0 where its lower one
   VF low;    // of the crossed cubes
   VF last;
@@ -84,6 +103,8 @@ float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattic
   for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<float>(lattice.origin[a] - first[a]);
   const auto* words = reinterpret_cast<const std::int32_t*>(block.cubes.bits.data());
   const float* distance = block.distance.data();
+  HWY_ALIGN std::array<std::int32_t, HWY_MAX_BYTES / sizeof(std::int32_t)> place_of_lane;
+  std::int32_t* places = place_of_lane.data();
   VF farthest = zero;
 
   for (std::size_t i = 0; i < kTilePixels; i += hn::Lanes(df)) {
@@ -110,15 +131,20 @@ float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattic
       farthest = hn::Max(farthest, best);
       continue;
     }
+    VI place = hn::Zero(di);  // of the cube in the block
     const auto begin = [&](Axis& axis, std::size_t a) {
       axis.low = hn::Set(df, block.cubes.low[a]);
       axis.last = hn::Set(df, static_cast<float>(block.cubes.high[a]) - 1.0F);
       const VF at = hn::Add(axis.origin, hn::Mul(axis.direction, hn::IfThenElse(active, t, zero)));
       const VF inside = hn::Min(hn::Max(at, axis.low), axis.last);
-      axis.cell = hn::ConvertTo(df, hn::ConvertTo(di, inside));
+      const VI cell = hn::ConvertTo(di, inside);
+      axis.cell = hn::ConvertTo(df, cell);
+      place = hn::Add(place, hn::ShiftLeftSame(cell, static_cast<int>(3 * a)));
       const MF up = hn::Gt(axis.direction, zero);
       axis.step = hn::IfThenElse(up, one, hn::Neg(one));
       axis.ahead = hn::IfThenElse(up, one, zero);
+      const VI pace = hn::Set(di, 1 << (3 * a));
+      axis.pace = hn::IfThenElse(hn::RebindMask(di, up), pace, hn::Neg(pace));
     };
     begin(x, 0);
     begin(y, 1);
@@ -131,9 +157,6 @@ float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattic
       const VF plane_y = to_plane(y);
       const VF plane_z = to_plane(z);
       const VF leave = hn::Min(hn::Min(plane_x, plane_y), plane_z);
-      const VI place = hn::ConvertTo(di, hn::Add(hn::Add(hn::Mul(z.cell, hn::Set(df, 64.0F)),
-                                                         hn::Mul(y.cell, hn::Set(df, 8.0F))),
-                                                 x.cell));
       const VI word = WordsAt(words, hn::ShiftRight<5>(place));
       const VI bit = hn::And(hn::Shr(word, hn::And(place, hn::Set(di, 31))), hn::Set(di, 1));
       const MF crossed = hn::And(active, hn::RebindMask(df, hn::Ne(bit, hn::Zero(di))));
@@ -152,18 +175,37 @@ float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattic
         const VF dx = hn::Mul(x.direction, length);
         const VF dy = hn::Mul(y.direction, length);
         const VF dz = hn::Mul(z.direction, length);
-        const VI corner = hn::ConvertTo(di, hn::Add(hn::Add(hn::Mul(z.cell, hn::Set(df, 81.0F)),
-                                                            hn::Mul(y.cell, hn::Set(df, 9.0F))),
-                                                    x.cell));
-        const auto at = [&](int offset) { return hn::GatherIndex(df, distance + offset, corner); };
-        const VF c000 = at(0);
-        const VF c100 = at(1);
-        const VF c010 = at(kCorners);
-        const VF c110 = at(kCorners + 1);
-        const VF c001 = at(kCorners * kCorners);
-        const VF c101 = at(kCorners * kCorners + 1);
-        const VF c011 = at(kCorners * kCorners + kCorners);
-        const VF c111 = at(kCorners * kCorners + kCorners + 1);
+        VF c000 = zero;
+        VF c100 = zero;
+        VF c010 = zero;
+        VF c110 = zero;
+        VF c001 = zero;
+        VF c101 = zero;
+        VF c011 = zero;
+        VF c111 = zero;
+        // Neighbours are mostly in the same few cubes, so that the corners of one cube after the
+        // other are read: far less than a gather for each lane.
+        hn::Store(place, di, places);
+        for (MF left = crossed;;) {
+          const intptr_t lane = hn::FindFirstTrue(df, left);
+          if (lane < 0) break;
+          const std::int32_t cube = places[lane];
+          const MF same = hn::And(left, hn::RebindMask(df, hn::Eq(place, hn::Set(di, cube))));
+          left = hn::AndNot(same, left);
+          const float* first_corner = distance + kCorners * kCorners * (cube >> 6) +
+                                      kCorners * ((cube >> 3) & 7) + (cube & 7);
+          const auto read = [&](int offset, VF& corner) {
+            corner = hn::IfThenElse(same, hn::Set(df, first_corner[offset]), corner);
+          };
+          read(0, c000);
+          read(1, c100);
+          read(kCorners, c010);
+          read(kCorners + 1, c110);
+          read(kCorners * kCorners, c001);
+          read(kCorners * kCorners + 1, c101);
+          read(kCorners * kCorners + kCorners, c011);
+          read(kCorners * kCorners + kCorners + 1, c111);
+        }
         const VF kx = hn::Sub(c100, c000);
         const VF ky = hn::Sub(c010, c000);
         const VF kz = hn::Sub(c001, c000);
@@ -271,7 +313,9 @@ float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattic
         const VF next = hn::Add(axis.cell, axis.step);
         const MF left = hn::And(passes, hn::Or(hn::Lt(next, axis.low), hn::Gt(next, axis.last)));
         active = hn::AndNot(left, active);
-        axis.cell = hn::IfThenElse(hn::AndNot(left, passes), next, axis.cell);
+        const MF stays = hn::AndNot(left, passes);
+        axis.cell = hn::IfThenElse(stays, next, axis.cell);
+        place = hn::Add(place, hn::IfThenElseZero(hn::RebindMask(di, stays), axis.pace));
       };
       step(x, plane_x);
       step(y, plane_y);
@@ -293,15 +337,13 @@ namespace tsdfpp {
 
 HWY_EXPORT(FillRays);
 HWY_EXPORT(Cast);
+HWY_EXPORT(FillCorners);
 
 TileOrder::TileOrder() {
   for (unsigned i = 0; i < kTilePixels; ++i) {
-    unsigned column = 0;
-    unsigned row = 0;
-    for (unsigned k = 0; k < 4; ++k) {
-      column |= (i >> (2 * k) & 1U) << k;
-      row |= (i >> (2 * k + 1) & 1U) << k;
-    }
+    const unsigned square = i / 16;
+    const unsigned column = 4 * ((square & 1U) | (square >> 1U & 2U)) + i % 4;
+    const unsigned row = 4 * ((square >> 1U & 1U) | (square >> 2U & 2U)) + i / 4 % 4;
     x[i] = static_cast<std::uint8_t>(column);
     y[i] = static_cast<std::uint8_t>(row);
     place[kTileSide * row + column] = static_cast<std::uint8_t>(i);
@@ -315,6 +357,10 @@ const TileOrder& OrderOfTile() {
 
 void FillTileRays(const LatticeRays& lattice, int u, int v, TileRays& rays) {
   HWY_DYNAMIC_DISPATCH(FillRays)(lattice, u, v, rays);
+}
+
+void CopyCorners(const std::array<const Half*, 8>& from, RayBlock& block) {
+  HWY_DYNAMIC_DISPATCH(FillCorners)(from, block);
 }
 
 void PrefetchBlock(const RayBlock& block) {

@@ -13,8 +13,9 @@ inline constexpr int kTileSide = 16;
 inline constexpr int kTilePixels = kTileSide * kTileSide;
 using TileValues = std::array<float, kTilePixels>;
 
-// Column and row of a tile's i-th pixel: in squares of squares, so that neighbours in the order are
-// neighbours in the image.
+// Column and row of a tile's i-th pixel: squares of 4x4 pixels, these in squares of squares, so
+// that neighbours in the order are neighbours in the image, and pixels 4 k ... 4 k + 3 one after
+// another in a row of it.
 struct TileOrder {
   TileOrder();
   std::array<std::uint8_t, kTilePixels> x{};
@@ -48,6 +49,10 @@ struct TileHits {
   std::array<TileValues, 3> normal;
   std::array<std::int32_t, kTilePixels> block;  // its number, -1 for none
 };
+
+// Fills a block's distances from those of the block and of the seven further along x, y, z (bits 0,
+// 1, 2 of the place).
+void CopyCorners(const std::array<const Half*, 8>& from, RayBlock& block);
 
 // Starts to bring a block into the cache: most are met by one tile only once.
 void PrefetchBlock(const RayBlock& block);

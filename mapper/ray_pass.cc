@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "mapper/mesh_tools.h"
 #include "mapper/object_volume.h"
 #include "mapper/ray_kernels.h"
 
@@ -16,6 +17,7 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kTilesPerTask = 16;
+constexpr int kRun = 4;  // pixels of a row that TileOrder keeps together
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 std::size_t At(int i) { return static_cast<std::size_t>(i); }
@@ -84,7 +86,13 @@ TileLists ListTiles(const RayBlocks& blocks, const Intrinsics& camera) {
   return lists;
 }
 
-float Farthest(const TileValues& depth) { return *std::max_element(depth.begin(), depth.end()); }
+// Depths are not negative, so their order is that of their bits, which a compiler can compare
+// several at a time.
+float Farthest(const TileValues& depth) {
+  std::int32_t most = 0;
+  for (const float value : depth) most = std::max(most, std::bit_cast<std::int32_t>(value));
+  return std::bit_cast<float>(most);
+}
 
 class Caster {
  public:
@@ -146,7 +154,7 @@ class Caster::Tile {
         surfaces_(At(caster.options_.surfaces)) {
     from_.fill(static_cast<float>(c_.options_.near_m));
     if (c_.pass_.make_hidden) hidden_ = c_.pass_.make_hidden();
-    if (c_.pass_.make_label) label_ = c_.pass_.make_label();
+    if (c_.pass_.make_labels) labels_ = c_.pass_.make_labels();
   }
 
   void Cast(std::size_t number) {
@@ -394,24 +402,63 @@ class Caster::Tile {
       float* depth = out.depth.ptr<float>(v_ + y) + u_;
       float* normal = out.normal.ptr<float>(v_ + y) + 3 * u_;
       std::uint16_t* id = out.id.ptr<std::uint16_t>(v_ + y) + u_;
-      for (int x = 0; x < columns; ++x) {
+      for (int x = 0; x < columns; x += kRun) {
         const std::size_t i = order.place[At(kTileSide * y + x)];
-        const bool hit = hits.block[i] >= 0;
-        *depth++ = hit ? hits.depth[i] : 0;
-        for (const TileValues& component : hits.normal) *normal++ = component[i];
-        *id++ = hit ? IdOf(hits, i) : kNoInstance;
+        if (x + kRun <= columns) {
+          WritePixels<kRun>(hits, i, kRun, depth + x, normal + 3 * x, id + x);
+        } else {
+          WritePixels<0>(hits, i, columns - x, depth + x, normal + 3 * x, id + x);
+        }
       }
     }
-    if (label_) WriteLabels(hits, columns, rows, out.id);
+    if (labels_) WriteLabels(hits, columns, rows, out.id);
     if (c_.options_.colour) WriteColours(hits, columns, rows, out.colour);
   }
 
+  // From the i-th pixel on, one after another in a row: kCount, or `count` where that is 0.
+  template <int kCount>
+  void WritePixels(const TileHits& hits, std::size_t i, int count, float* depth, float* normal,
+                   std::uint16_t* id) const {
+    const std::size_t end = i + At(kCount == 0 ? count : kCount);
+    for (; i < end; ++i) {
+      const bool hit = hits.block[i] >= 0;
+      *depth++ = hit ? hits.depth[i] : 0;
+      for (const TileValues& component : hits.normal) *normal++ = component[i];
+      *id++ = hit ? IdOf(hits, i) : kNoInstance;
+    }
+  }
+
   void WriteLabels(const TileHits& hits, int columns, int rows, cv::Mat& ids) {
+    // PointAt() and NearestVoxel(), an axis at a time. Where nothing was hit the voxel is not read.
+    const TileOrder& order = OrderOfTile();
+    const LatticeRays& rays = c_.world_rays_;
+    const int first_u = u_;
+    const int first_v = v_;
+    const float voxel = voxel_;
+    const float farthest = 0x1p25F * voxel;  // beyond all blocks, and the voxel's index is a number
+    std::array<std::array<int, kTilePixels>, 3> along;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto origin = static_cast<float>(rays.origin[a]);
+      const float at_0 = rays.at_pixel_0[a];
+      const float per_row = rays.per_row[a];
+      const float per_column = rays.per_column[a];
+      for (std::size_t i = 0; i < kTilePixels; ++i) {
+        const auto u = static_cast<float>(first_u + order.x[i]);
+        const auto v = static_cast<float>(first_v + order.y[i]);
+        const float direction = (at_0 + per_row * v) + per_column * u;
+        const float depth = std::min(hits.depth[i], farthest);
+        along[a][i] = NearestAlong(origin + depth * direction, voxel);
+      }
+    }
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      voxels_[i] = {along[0][i], along[1][i], along[2][i]};
+    }
+    labels_(voxels_, labelled_);
     for (int y = 0; y < rows; ++y) {
+      std::uint16_t* out = ids.ptr<std::uint16_t>(v_ + y) + u_;
       for (int x = 0; x < columns; ++x) {
-        const std::size_t i = OrderOfTile().place[At(kTileSide * y + x)];
-        if (hits.block[i] < 0) continue;
-        ids.ptr<std::uint16_t>(v_ + y)[u_ + x] = label_(PointAt(i, hits.depth[i]));
+        const std::size_t i = order.place[At(kTileSide * y + x)];
+        if (hits.block[i] >= 0) out[x] = labelled_[i];
       }
     }
   }
@@ -441,7 +488,9 @@ class Caster::Tile {
   TileValues trial_from_;
   std::vector<InstanceId> without_;
   RayPass::Hidden hidden_;
-  PointLabel label_;
+  VoxelLabels labels_;
+  std::array<Index3, kTilePixels> voxels_;  // by TileOrder
+  std::array<InstanceId, kTilePixels> labelled_;
   std::vector<HiddenQuery> queries_;
 };
 

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "mapper/point_label.h"
 #include "mapper/ray_blocks.h"
 #include "mapper/ray_cast.h"
+#include "mapper/voxel_labels.h"
 
 namespace tsdfpp {
 
@@ -30,9 +30,9 @@ struct RayPass {
   using Hidden =
       std::function<void(std::span<HiddenQuery> queries, std::span<const InstanceId> without)>;
   std::function<Hidden()> make_hidden;
-  // Makes what a worker asks for the object at a surface point (world, metres); empty: the volume's
-  // id.
-  std::function<PointLabel()> make_label;
+  // Makes what a worker asks for the objects at the voxels nearest to surface points (in the
+  // world's lattice); empty: the volume's id.
+  std::function<VoxelLabels()> make_labels;
   // Each volume by rays of its own, which know nothing of the others; the nearest of all wins.
   bool each_alone = false;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "mapper/mesh_tools.h"
 #include "mapper/object_volume.h"
 
 namespace tsdfpp {
@@ -259,16 +260,18 @@ bool BlocksAround::Meets(const BlockBox& box) const {
   return false;
 }
 
-void LabelTriangles(GridMesh& mesh, const std::function<PointLabel()>& make_label) {
+void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels) {
   ForEachPart(mesh.TakeUnsettled(), [&](MeshPart& part) {
     part.is_settled = true;
-    part.face_ids.clear();
+    part.face_ids.resize(part.triangles.size());
     if (part.triangles.empty()) return;
-    const PointLabel label_at = make_label();
+    thread_local std::vector<Index3> voxels;
+    voxels.clear();
     const CornersOf corner(part);
     for (const auto& [a, b, c] : part.triangles) {
-      part.face_ids.push_back(label_at((corner(a) + corner(b) + corner(c)) / 3.0F));
+      voxels.push_back(NearestVoxel((corner(a) + corner(b) + corner(c)) / 3.0F, voxel));
     }
+    make_labels()(voxels, part.face_ids);
   });
 }
 

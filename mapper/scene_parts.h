@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mapper/mesh_cache.h"
-#include "mapper/point_label.h"
+#include "mapper/voxel_labels.h"
 
 namespace tsdfpp {
 
@@ -75,9 +75,9 @@ void HideTriangles(const std::vector<MeshPart*>& parts,
                    const std::function<bool(const MeshPart&)>& in_doubt,
                    const std::function<IsHidden()>& new_test);
 
-// Labels the triangles of the parts whose values changed by what a label of each part's own says of
-// their centroids in the lattice, in metres.
-void LabelTriangles(GridMesh& mesh, const std::function<PointLabel()>& make_label);
+// Labels the triangles of the parts whose values changed by what labels of each part's own say of
+// the voxels nearest to their centroids in the lattice; `voxel` in metres.
+void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels);
 
 // One of the meshes that are put together.
 struct JoinedMesh {

@@ -9,7 +9,6 @@
 
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
-#include "mapper/last_block.h"
 #include "mapper/layered_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
@@ -234,7 +233,7 @@ Pose SingleFieldMap::ObjectLattice(InstanceId) const { return Pose::Identity(); 
 
 MeshWork SingleFieldMap::UpdateMeshes() const {
   const MeshWork work = mesh_.Update(field_, config_.voxel());
-  LabelTriangles(mesh_, [&] { return LabelOfPoints(); });
+  LabelTriangles(mesh_, config_.voxel(), [&] { return LabelOfVoxels(); });
   return work;
 }
 
@@ -248,20 +247,15 @@ std::vector<RaySurface> SingleFieldMap::CastRays(const Intrinsics& camera, const
   RayPass pass;
   pass.voxel_m = config_.voxel_m;
   pass.volumes.push_back({kBackground, &field_, Pose::Identity(), true});
-  pass.make_label = [&] { return LabelOfPoints(); };
+  pass.make_labels = [&] { return LabelOfVoxels(); };
   RayCastOptions first = options;
   first.surfaces = 1;
   return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
 }
 
-PointLabel SingleFieldMap::LabelOfPoints() const {
-  // One point after another is in the same block.
-  return [this, last = LastBlock(labels_)](const Eigen::Vector3f& point) mutable {
-    const Index3 v = NearestVoxel(point, config_.voxel());
-    const LabelBlock* labels = last.Find(BlockOf(v));
-    const InstanceId id = labels == nullptr ? kNoInstance : labels->id[At(PlaceInBlock(v))];
-    return id == kNoInstance ? kBackground : id;
-  };
+VoxelLabels SingleFieldMap::LabelOfVoxels() const {
+  return LabelsOf(labels_,
+                  [](const LabelBlock& block, std::size_t place) { return block.id[place]; });
 }
 
 TriangleMesh SingleFieldMap::ObjectMesh(InstanceId id) const {

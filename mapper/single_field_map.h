@@ -6,9 +6,9 @@
 
 #include "mapper/map_representation.h"
 #include "mapper/mesh_cache.h"
-#include "mapper/point_label.h"
 #include "mapper/tsdf_block.h"
 #include "mapper/volume_fusion.h"
+#include "mapper/voxel_labels.h"
 
 namespace tsdfpp {
 
@@ -65,7 +65,7 @@ class SingleFieldMap final : public MapRepresentation {
   void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
                  const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
   // Gives the label of the voxel nearest to a point (metres), the background's where it has none.
-  PointLabel LabelOfPoints() const;
+  VoxelLabels LabelOfVoxels() const;
   // Makes the object's voxels unobserved and unlabelled; returns their blocks.
   std::vector<Index3> Vacate(InstanceId id);
   // Writes the values of a block that moved here, as `rule_` allows; confidence(i) is what voxel i

@@ -79,6 +79,11 @@ TEST(BlockGrid, FindsWhatIsAround) {
         }
       }
     }
+    const auto upper = grid.FindUpper(index);
+    for (int step = 0; step < 8; ++step) {
+      ASSERT_EQ(upper[static_cast<std::size_t>(step)],
+                grid.Find(index + Index3{step & 1, (step >> 1) & 1, step >> 2}));
+    }
   }
   EXPECT_GT(found, 1000);
 }
