@@ -27,9 +27,8 @@ std::set<InstanceId> LabelsSeen(const FrameView& view, const CameraFromLattice& 
                                 const Index3& block, const MapConfig& config) {
   BlockObservation observation;
   std::set<InstanceId> labels;
-  if (!ObserveVoxels(view.kernel,
-                     PlaceOf(T_CL, block, config.voxel(), kUnplanned),
-                     config.back(), observation)) {
+  if (!ObserveVoxels(view.kernel, PlaceOf(T_CL, block, config.voxel(), kUnplanned), config.back(),
+                     observation)) {
     return labels;
   }
   for (const std::int32_t pixel : observation.pixel) {
@@ -88,9 +87,10 @@ TEST_P(PlanBlocksTest, AllInViewIsSaidOfBlocksWithoutAVoxelOutside) {
   const FrameView view(frame, frame.mask);
   const CameraFromLattice T_CL(frame.T_WC, Pose::Identity(), true);
   const std::vector<Index3> blocks = BlocksOfBox();
-  const auto planned =
-      PlanBlocks(view, blocks.size(), config.voxel(), config.back(),
-                 [&](std::size_t i) -> BlockCandidate { return {blocks[i], &T_CL, 1, true}; });
+  const auto planned = PlanBlocks(view, blocks.size(), config.voxel(), config.back(),
+                                  [&](std::size_t i) -> BlockCandidate {
+                                    return {blocks[i], &T_CL, 1, true};
+                                  });
   std::size_t inside = 0;
   std::size_t in_view = 0;
   for (const PlannedBlock& block : planned) {
