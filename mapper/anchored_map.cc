@@ -257,7 +257,7 @@ MapMemory AnchoredMap::Memory() const {
   for (const auto& entry : index_.entries()) {
     if (entry.block->empty()) continue;
     ++memory.blocks;
-    memory.bytes += entry.block->size() * sizeof(InstanceId);
+    memory.bytes += sizeof(IndexBlock) + entry.block->size() * sizeof(InstanceId);
   }
   memory.bytes += index_.TableBytes();
   return memory;

@@ -313,7 +313,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   HWY_ALIGN auto observed = std::bit_cast<Bytes>(block.observed);
   HWY_ALIGN auto negative = std::bit_cast<Bytes>(block.negative);
   HWY_ALIGN auto band = std::bit_cast<Bytes>(block.band);
-  HWY_ALIGN auto coloured = std::bit_cast<Bytes>(block.coloured);
   HWY_ALIGN auto full = std::bit_cast<Bytes>(block.full);
   HWY_ALIGN Bytes in_band{};
   HWY_ALIGN Bytes to_colour{};
@@ -325,7 +324,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     hwy::Prefetch(&next->negative);
     hwy::Prefetch(&next->band);
     hwy::Prefetch(&next->cover);
-    hwy::Prefetch(&next->coloured);
     hwy::Prefetch(&next->full);
   }
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
@@ -377,12 +375,15 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     if constexpr (kLabels == Labels::kEvery) {
       if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
     }
-    const auto has_colour = MaskAt(df, coloured.data(), i);
-    const auto colours = hn::And(
-        near, hn::Le(hn::Abs(s), hn::IfThenElse(has_colour, colour_band, first_colour_band)));
+    auto may_colour = first_colour_band;
+    if (block.colours != nullptr && !hn::AllFalse(df, near)) {
+      const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
+      const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
+      may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
+    }
+    const auto colours = hn::And(near, hn::Le(hn::Abs(s), may_colour));
     if (!hn::AllFalse(df, colours)) {
       PutBits(df, colours, i, to_colour.data());
-      PutBits(df, hn::Or(has_colour, colours), i, coloured.data());
       if (block.colours != nullptr) {
         for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
         hwy::Prefetch(&block.colours->count[i]);
@@ -422,9 +423,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     for (int i = 0; i < kBlockVoxels; ++i) {
       if (Bit(places, i)) block.SetColour(static_cast<std::size_t>(i), {}, 0);
     }
-    for (std::size_t k = 0; k < cleared.size(); ++k) {
-      coloured[k] = static_cast<std::uint8_t>(coloured[k] & ~cleared[k]);
-    }
+    block.FreeColoursIfNone();
   }
   if (!result.changed) return result;
   result.in_band = std::bit_cast<BlockMask>(in_band);
@@ -437,8 +436,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto new_band = std::bit_cast<BlockMask>(band);
   result.changed_band = block.band != new_band;
   block.band = new_band;
-  block.coloured = std::bit_cast<BlockMask>(coloured);
-  if (any_cleared && !Any(block.coloured)) block.colours.reset();
   return result;
 }
 

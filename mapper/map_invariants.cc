@@ -180,7 +180,6 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
       const bool right = Bit(block->observed, place) == observed &&
                          Bit(block->negative, place) == negative &&
                          Bit(block->band, place) == (negative && distance >= -config.back()) &&
-                         Bit(block->coloured, place) == (block->ColourCount(i) > 0) &&
                          (!Bit(block->full, place) || block->weight[i] == config.weight_cap);
       if (!right) return fmt::format("{}: the masks of voxel {} are wrong", name, Text(voxel));
       const Eigen::Vector3d q(voxel.x, voxel.y, voxel.z);

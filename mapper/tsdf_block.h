@@ -76,7 +76,6 @@ struct alignas(64) TsdfBlock {
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
-  BlockMask coloured{};  // the number of colours is above 0
   BlockMask full{};      // of these it is known that the weight is at its cap
 
   // Only while a voxel has a colour: most blocks lie too far from a surface.
@@ -120,6 +119,11 @@ struct alignas(64) TsdfBlock {
     BlockColours& into = MakeColours();
     for (std::size_t c = 0; c < 3; ++c) into.channel[c][i] = fixed[c];
     into.count[i] = static_cast<std::uint8_t>(count);
+  }
+  void FreeColoursIfNone() {
+    if (colours == nullptr) return;
+    const auto& count = colours->count;
+    if (std::all_of(count.begin(), count.end(), [](auto n) { return n == 0; })) colours.reset();
   }
   std::size_t Bytes() const {
     return sizeof(TsdfBlock) + (colours == nullptr ? 0 : sizeof(BlockColours));

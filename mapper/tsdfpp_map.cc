@@ -436,7 +436,8 @@ MapMemory TsdfppMap::Memory() const {
   memory.blocks += index_.size();
   memory.bytes += index_.TableBytes();
   for (const auto& entry : index_.entries()) {
-    memory.bytes += entry.block->ids.size() * (sizeof(InstanceId) + sizeof(std::uint8_t));
+    memory.bytes +=
+        sizeof(ListBlock) + entry.block->ids.size() * (sizeof(InstanceId) + sizeof(std::uint8_t));
   }
   return memory;
 }
