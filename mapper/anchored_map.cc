@@ -205,10 +205,9 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
 }
 
-LayeredMap::ActiveIds AnchoredMap::ActiveIn(const Index3& block) const {
+const InstanceId* AnchoredMap::ActiveIn(const Index3& block) const {
   const IndexBlock* ids = index_.Find(block);
-  if (ids == nullptr || ids->empty()) return {};
-  return {ids->data(), 1};
+  return ids == nullptr || ids->empty() ? nullptr : ids->data();
 }
 
 MeshWork AnchoredMap::UpdateMeshes() const {

@@ -53,12 +53,6 @@ std::vector<InstanceId> LayeredMap::Objects() const {
   return ids;
 }
 
-void LayeredMap::PlaceLattice(ObjectVolume& volume) {
-  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
-  volume.T_WL =
-      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
-}
-
 Pose LayeredMap::ObjectLattice(InstanceId id) const {
   const auto volume = volumes_.find(id);
   return volume == volumes_.end() ? Pose::Identity() : volume->second.T_WL;
@@ -182,7 +176,7 @@ void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) c
       // Triangles beside each other are looked up in the same block.
       struct Last {
         Index3 block;
-        ActiveIds ids;
+        const InstanceId* ids = nullptr;
         bool is_known = false;
       };
       return [&, id, last = Last{}](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
@@ -192,9 +186,9 @@ void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) c
         const Index3 v = NearestVoxel(outwards, voxel);
         const Index3 block = BlockOf(v);
         if (!last.is_known || block != last.block) last = {block, ActiveIn(block), true};
-        const InstanceId* place = last.ids.Place(PlaceInBlock(v));
-        if (place == nullptr || *place == kNoInstance || *place == id) return false;
-        const auto distance = distance_at(*place, v);
+        const InstanceId active = last.ids == nullptr ? kNoInstance : last.ids[PlaceInBlock(v)];
+        if (active == kNoInstance || active == id) return false;
+        const auto distance = distance_at(active, v);
         return distance && *distance < -voxel;
       };
     };

@@ -392,10 +392,9 @@ void TsdfppMap::Remove(InstanceId id) {
   CheckInDebugBuilds(*this);
 }
 
-LayeredMap::ActiveIds TsdfppMap::ActiveIn(const Index3& block) const {
+const InstanceId* TsdfppMap::ActiveIn(const Index3& block) const {
   const ListBlock* lists = index_.Find(block);
-  if (lists == nullptr || lists->ids.empty()) return {};
-  return {lists->ids.data(), 1};
+  return lists == nullptr || lists->ids.empty() ? nullptr : lists->ids.data();
 }
 
 std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,

@@ -28,7 +28,7 @@ class TsdfppMap final : public LayeredMap {
   Expected<void> Load(const Sections& sections) override;
 
  protected:
-  ActiveIds ActiveIn(const Index3& block) const override;
+  const InstanceId* ActiveIn(const Index3& block) const override;
 
  private:
   struct ListBlock {
