@@ -40,11 +40,21 @@ class RecentlyFound {
 };
 
 struct Lattice {
-  Eigen::Matrix3d R_LC;
-  Eigen::Vector3d camera_L;
+  CameraInLattice camera;
   const BlockDirectory* known = nullptr;
   RecentlyFound recent;
 };
+
+RayPoints PointsOf(const MapConfig& config) {
+  RayPoints points;
+  points.front = config.trunc_front_voxels * config.voxel_m;
+  points.back = config.trunc_back_voxels * config.voxel_m;
+  points.step = 2 * config.voxel_m;
+  // Two more than whole steps fit: the first one, and the last that reaches `back`; one for
+  // rounding.
+  points.points = static_cast<std::size_t>((points.front + points.back) / points.step) + 3;
+  return points;
+}
 
 // Collects the blocks along the rays of one thread's part of the image.
 class Collector {
@@ -55,12 +65,9 @@ class Collector {
       : frame_(frame),
         lattice_of_(lattice_of),
         ray_x_(ray_x),
-        inverse_voxel_(1.0 / config.voxel_m),
-        front_(config.trunc_front_voxels * config.voxel_m),
-        back_(config.trunc_back_voxels * config.voxel_m),
-        step_(2 * config.voxel_m),
-        least_points_(std::max<std::size_t>(1, static_cast<std::size_t>((front_ + back_) / step_))),
-        keys_(least_points_ + 3 + kKeysPerStep) {
+        voxel_m_(config.voxel_m),
+        points_(PointsOf(config)),
+        keys_(kRaysAtOnce * points_.points + kKeysPerStep) {
     const Intrinsics& k = frame.intrinsics;
     for (std::size_t i = 0; i < reach_.size(); ++i) {
       reach_[i] = kSpacing_voxels * config.voxel_m * std::min(k.fx, k.fy) / (1 << i);
@@ -84,6 +91,7 @@ class Collector {
 
   // Each once, in order.
   std::vector<Found> Take() {
+    Flush();
     std::sort(found_.begin(), found_.end());
     found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
     return std::move(found_);
@@ -104,33 +112,26 @@ class Collector {
     const std::size_t grid = GridOf(u, v);
     if (grid + 1 < kGrids && depth <= reach_[grid + 1]) return;
     const InstanceId label = frame_.kernel.label[pixel];
-    if (lattice_ == nullptr || label != last_label_) {
-      last_label_ = label;
-      lattice_ = &LatticeOf(label);
-    }
+    if (label != label_ || rays_.count == kRaysAtOnce) Flush();
+    label_ = label;
     const Intrinsics& k = frame_.intrinsics;
-    Eigen::Vector3d ray(ray_x_[static_cast<std::size_t>(u)], (v - k.cy) / k.fy, 1.0);
-    const double length = ray.norm();
-    const double range = depth * length;
-    ray /= length;
-    const Eigen::Vector3d direction = lattice_->R_LC * ray * inverse_voxel_;
-    const Eigen::Vector3d origin = lattice_->camera_L * inverse_voxel_;
-    const double first = range - front_;
-    const double last = range + back_;
-    std::size_t points = least_points_;  // the last one included
-    while (first + step_ * static_cast<double>(points - 1) < last) ++points;
-    BlocksAtPoints({origin.x(), origin.y(), origin.z()},
-                   {direction.x(), direction.y(), direction.z()}, {first, step_, last}, points,
-                   keys_.data());
-    std::size_t i = 0;
-    while (i < points && std::min(first + step_ * static_cast<double>(i), last) < 0) ++i;
-    for (std::uint64_t last_key = ~0ULL; i < points; ++i) {
-      if (keys_[i] == last_key) continue;
-      last_key = keys_[i];
-      if (!lattice_->recent.Insert(last_key)) continue;
-      if (lattice_->known == nullptr ||
-          lattice_->known->Find(UnpackIndex(last_key)) == BlockDirectory::kNone) {
-        found_.push_back({label, last_key});
+    const std::size_t i = rays_.count++;
+    rays_.x[i] = ray_x_[static_cast<std::size_t>(u)];
+    rays_.y[i] = (v - k.cy) / k.fy;
+    rays_.depth[i] = depth;
+  }
+
+  // Finds the blocks along the rays that were visited.
+  void Flush() {
+    if (rays_.count == 0) return;
+    Lattice& lattice = LatticeOf(label_);
+    const std::size_t found = BlocksAtPoints(lattice.camera, points_, rays_, keys_.data());
+    rays_.count = 0;
+    for (std::size_t i = 0; i < found; ++i) {
+      if (!lattice.recent.Insert(keys_[i])) continue;
+      if (lattice.known == nullptr ||
+          lattice.known->Find(UnpackIndex(keys_[i])) == BlockDirectory::kNone) {
+        found_.push_back({label_, keys_[i]});
       }
     }
   }
@@ -140,8 +141,15 @@ class Collector {
     if (added) {
       const LatticeOfLabel of = lattice_of_(label);
       const Pose T_LC = of.T_WL.inverse() * frame_.T_WC;
-      at->second.R_LC = T_LC.linear();
-      at->second.camera_L = T_LC.translation();
+      CameraInLattice& camera = at->second.camera;
+      camera.inverse_voxel = 1.0 / voxel_m_;
+      for (int r = 0; r < 3; ++r) {
+        const auto row = static_cast<std::size_t>(r);
+        for (int c = 0; c < 3; ++c) {
+          camera.R_LC[row][static_cast<std::size_t>(c)] = T_LC.linear()(r, c);
+        }
+        camera.origin[row] = T_LC.translation()[r] * camera.inverse_voxel;
+      }
       at->second.known = of.known;
     }
     return at->second;
@@ -150,16 +158,13 @@ class Collector {
   const FrameView& frame_;
   const std::function<LatticeOfLabel(InstanceId)>& lattice_of_;
   const std::vector<double>& ray_x_;  // at depth 1, by column
-  double inverse_voxel_;
-  double front_;
-  double back_;
-  double step_;
-  std::size_t least_points_;
+  double voxel_m_;
+  RayPoints points_;
   std::array<double, kGrids> reach_{};  // metres: farther than this, the grid is too coarse
-  std::vector<std::uint64_t> keys_;     // of one ray
+  InstanceId label_ = kNoInstance;      // of the rays
+  RayBatch rays_;
+  std::vector<std::uint64_t> keys_;  // of the blocks along them
   std::map<InstanceId, Lattice> lattices_;
-  InstanceId last_label_ = kNoInstance;
-  Lattice* lattice_ = nullptr;
   std::vector<Found> found_;
 };
 

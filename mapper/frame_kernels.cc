@@ -73,31 +73,58 @@ void Summarise(const KernelFrame& frame, int tile_row, Tile* tiles) {
   }
 }
 
-void RayBlocks(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-               const RayRanges& ranges, std::size_t count, std::uint64_t* keys) {
+std::size_t RayBlocks(const CameraInLattice& camera, const RayPoints& where, const RayBatch& rays,
+                      std::uint64_t* keys) {
   const hn::CappedTag<double, kKeysPerStep> dd;
   const hn::Rebind<std::int64_t, decltype(dd)> dl;
   const hn::Rebind<std::int32_t, decltype(dd)> di;
+  const auto zero = hn::Zero(dd);
+  const auto one = hn::Set(dd, 1.0);
   const auto half = hn::Set(dd, 0.5);
   // As PackIndex().
   const auto offset = hn::Set(di, 1 << 20);
   const auto in_range = hn::Set(di, (1 << 21) - 1);
-  auto number = hn::Iota(dd, 0);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(dd)) {
-    const auto range =
-        hn::Min(hn::Add(hn::Set(dd, ranges.first), hn::Mul(hn::Set(dd, ranges.step), number)),
-                hn::Set(dd, ranges.last));
-    const auto block = [&](std::size_t axis) {
-      const auto point =
-          hn::Add(hn::Set(dd, origin[axis]), hn::Mul(hn::Set(dd, direction[axis]), range));
-      const auto voxel = hn::DemoteTo(di, hn::Floor(hn::Add(point, half)));
-      return hn::PromoteTo(dl, hn::And(hn::Add(hn::ShiftRight<3>(voxel), offset), in_range));
+  const auto nothing = hn::Set(dl, -1);
+  auto* out = reinterpret_cast<std::int64_t*>(keys);
+  for (std::size_t ray = 0; ray < rays.count; ray += hn::Lanes(dd)) {
+    const auto is_ray = hn::RebindMask(dd, hn::FirstN(dl, rays.count - ray));
+    const auto x = hn::Load(dd, &rays.x[ray]);
+    const auto y = hn::Load(dd, &rays.y[ray]);
+    const auto length = hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Add(hn::Mul(y, y), one)));
+    const auto range = hn::Mul(hn::Load(dd, &rays.depth[ray]), length);
+    const std::array unit{hn::Div(x, length), hn::Div(y, length), hn::Div(one, length)};
+    const auto along = [&](std::size_t axis) {
+      const auto& row = camera.R_LC[axis];
+      const auto sum = hn::Add(
+          hn::Add(hn::Mul(hn::Set(dd, row[0]), unit[0]), hn::Mul(hn::Set(dd, row[1]), unit[1])),
+          hn::Mul(hn::Set(dd, row[2]), unit[2]));
+      return hn::Mul(sum, hn::Set(dd, camera.inverse_voxel));
     };
-    const auto key =
-        hn::Or(block(0), hn::Or(hn::ShiftLeft<21>(block(1)), hn::ShiftLeft<42>(block(2))));
-    hn::StoreU(key, dl, reinterpret_cast<std::int64_t*>(keys + i));
-    number = hn::Add(number, hn::Set(dd, static_cast<double>(hn::Lanes(dd))));
+    const std::array direction{along(0), along(1), along(2)};
+    const auto first = hn::Sub(range, hn::Set(dd, where.front));
+    const auto last = hn::Add(range, hn::Set(dd, where.back));
+    auto last_key = nothing;
+    for (std::size_t i = 0; i < where.points; ++i) {
+      const auto at =
+          hn::Min(hn::Add(first, hn::Set(dd, where.step * static_cast<double>(i))), last);
+      const auto block = [&](std::size_t axis) {
+        const auto point = hn::Add(hn::Set(dd, camera.origin[axis]), hn::Mul(direction[axis], at));
+        const auto voxel = hn::DemoteTo(di, hn::Floor(hn::Add(point, half)));
+        return hn::PromoteTo(dl, hn::And(hn::Add(hn::ShiftRight<3>(voxel), offset), in_range));
+      };
+      const auto packed =
+          hn::Or(block(0), hn::Or(hn::ShiftLeft<21>(block(1)), hn::ShiftLeft<42>(block(2))));
+      const auto before_camera = hn::RebindMask(dl, hn::And(is_ray, hn::Ge(at, zero)));
+      const auto key = hn::IfThenElse(before_camera, packed, nothing);
+      // What its last point, or the ray beside it, has is there already.
+      const auto beside = hn::OddEven(hn::DupEven(key), nothing);
+      const auto is_new =
+          hn::And(hn::And(hn::Ne(key, last_key), hn::Ne(key, beside)), hn::Ne(key, nothing));
+      out += hn::CompressStore(key, is_new, dl, out);
+      last_key = key;
+    }
   }
+  return static_cast<std::size_t>(out - reinterpret_cast<std::int64_t*>(keys));
 }
 
 }  // namespace
@@ -114,9 +141,9 @@ void SummariseTiles(const KernelFrame& frame, int row, Tile* tiles) {
   HWY_DYNAMIC_DISPATCH(Summarise)(frame, row, tiles);
 }
 
-void BlocksAtPoints(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-                    const RayRanges& ranges, std::size_t count, std::uint64_t* keys) {
-  HWY_DYNAMIC_DISPATCH(RayBlocks)(origin, direction, ranges, count, keys);
+std::size_t BlocksAtPoints(const CameraInLattice& camera, const RayPoints& where,
+                           const RayBatch& rays, std::uint64_t* keys) {
+  return HWY_DYNAMIC_DISPATCH(RayBlocks)(camera, where, rays, keys);
 }
 
 }  // namespace tsdfpp

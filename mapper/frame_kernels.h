@@ -25,18 +25,37 @@ struct Tile {
 // The tiles of row `row` of tiles, from left to right.
 void SummariseTiles(const KernelFrame& frame, int row, Tile* tiles);
 
-// Points at the ranges min(first + step * i, last), in the units of the ray's direction.
-struct RayRanges {
-  double first = 0;
-  double step = 0;
-  double last = 0;
+// Rays of the camera, each through a pixel: (x, y, 1) and the pixel's depth in metres.
+inline constexpr std::size_t kRaysAtOnce = 64;
+struct RayBatch {
+  alignas(64) std::array<double, kRaysAtOnce> x{};
+  alignas(64) std::array<double, kRaysAtOnce> y{};
+  alignas(64) std::array<double, kRaysAtOnce> depth{};
+  std::size_t count = 0;
 };
 
-// The blocks, as PackIndex() packs them, of the voxels nearest to `count` points of a ray,
-// origin + direction * range in voxels of the lattice. Whole vectors are written: `keys` has room
-// for `count` + kKeysPerStep.
+// Where along its ray each is to be looked at: `points` ranges from `front` before the depth in
+// steps of `step`, none farther than `back` behind it, which the last one reaches; metres.
+struct RayPoints {
+  double front = 0;
+  double back = 0;
+  double step = 0;
+  std::size_t points = 0;
+};
+
+// The camera in a lattice of voxels.
+struct CameraInLattice {
+  std::array<std::array<double, 3>, 3> R_LC{};  // rows
+  std::array<double, 3> origin{};               // voxels
+  double inverse_voxel = 0;                     // 1 / m
+};
+
+// The blocks, as PackIndex() packs them, of the voxels nearest to the points of the rays that are
+// not behind the camera: each at least once, though not for each of its points. Returns how many
+// there are; whole vectors are written: `keys` has room for the points of the whole batch and
+// kKeysPerStep more.
 inline constexpr std::size_t kKeysPerStep = 8;
-void BlocksAtPoints(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
-                    const RayRanges& ranges, std::size_t count, std::uint64_t* keys);
+std::size_t BlocksAtPoints(const CameraInLattice& camera, const RayPoints& where,
+                           const RayBatch& rays, std::uint64_t* keys);
 
 }  // namespace tsdfpp

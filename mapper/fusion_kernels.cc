@@ -282,6 +282,9 @@ template <Labels kLabels>
 FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                       TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
   FusionResult result;
+  if (block.colours != nullptr) {
+    for (std::size_t i = 0; i < kBlockVoxels; i += 64) hwy::Prefetch(&block.colours->count[i]);
+  }
   Projected projected;
   if (!Project(frame, place, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
@@ -304,6 +307,8 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto minus_back = hn::Set(df, -rule.back);
   const auto colour_band = hn::Set(df, rule.colour_band);
   const auto first_colour_band = hn::Set(df, rule.first_colour_band);
+  const auto least_colour_band = hn::Min(colour_band, first_colour_band);
+  const auto most_colour_band = hn::Max(colour_band, first_colour_band);
   const auto cap = hn::Set(df, rule.weight_cap);
   const auto full_share = hn::Div(one, hn::Add(cap, one));
   const auto minus_half = hn::Set(df, -0.5F * place.voxel);
@@ -325,6 +330,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     hwy::Prefetch(&next->band);
     hwy::Prefetch(&next->cover);
     hwy::Prefetch(&next->full);
+    hwy::Prefetch(&next->colours);
   }
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
     // A line at a time: many at once would wait for each other.
@@ -375,13 +381,19 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     if constexpr (kLabels == Labels::kEvery) {
       if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
     }
-    auto may_colour = first_colour_band;
-    if (block.colours != nullptr && !hn::AllFalse(df, near)) {
-      const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
-      const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
-      may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
+    const auto off_surface = hn::Abs(s);
+    auto colours = hn::And(near, hn::Le(off_surface, least_colour_band));
+    // Only between the two bands does it matter whether there is a colour.
+    const auto in_doubt = hn::And(hn::AndNot(colours, near), hn::Le(off_surface, most_colour_band));
+    if (!hn::AllFalse(df, in_doubt)) {
+      auto may_colour = first_colour_band;
+      if (block.colours != nullptr) {
+        const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
+        const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
+        may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
+      }
+      colours = hn::Or(colours, hn::And(in_doubt, hn::Le(off_surface, may_colour)));
     }
-    const auto colours = hn::And(near, hn::Le(hn::Abs(s), may_colour));
     if (!hn::AllFalse(df, colours)) {
       PutBits(df, colours, i, to_colour.data());
       if (block.colours != nullptr) {

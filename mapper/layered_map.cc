@@ -238,11 +238,12 @@ std::vector<LayeredMap::StaleCover> LayeredMap::StaleCovers(
           const FusedBlock& from = fused[i];
           const auto of = marks.find(from.id);
           if (from.touched == 0 || of == marks.end()) continue;
+          const auto numbers = of->second.grid->directory().FindAround(from.index);
           for (std::uint32_t bits = from.touched; bits != 0; bits &= bits - 1) {
-            const int k = std::countr_zero(bits);
-            const Index3 index = from.index + Index3{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
-            const auto number = of->second.grid->NumberOf(index);
-            if (number) of->second.of_entry[*number].store(true, std::memory_order_relaxed);
+            const std::int32_t number = numbers[static_cast<std::size_t>(std::countr_zero(bits))];
+            if (number == BlockDirectory::kNone) continue;
+            of->second.of_entry[static_cast<std::size_t>(number)].store(true,
+                                                                        std::memory_order_relaxed);
           }
         }
       },

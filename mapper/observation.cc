@@ -137,7 +137,11 @@ Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, 
     verdict.behind_m = seen.farthest + back + slack_m;
     if (seen.farthest <= 0 || verdict.behind_m < extent.z.low) return verdict;
     const bool has_label = seen.least_label <= block.id && block.id <= seen.greatest_label;
-    if (!block.of_any_label && !has_label) return verdict;
+    const auto any_label = [&] {
+      const TsdfBlock* values = block.of_any_label_if_negative;
+      return block.of_any_label || (values != nullptr && values->AnyNegative());
+    };
+    if (!has_label && !any_label()) return verdict;
     if (seen.least_label == seen.greatest_label) verdict.label = seen.least_label;
   }
   const auto bin = [](float pixel, int size) {

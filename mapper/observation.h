@@ -50,6 +50,8 @@ struct BlockCandidate {
   const CameraFromLattice* T_CL = nullptr;
   InstanceId id = kNoInstance;  // of the object whose block it is
   bool of_any_label = false;    // whether other labels' pixels matter as well
+  // Or where they do if one of its voxels is negative.
+  const TsdfBlock* of_any_label_if_negative = nullptr;
 };
 
 struct PlannedBlock {

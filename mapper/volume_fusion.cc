@@ -42,8 +42,9 @@ std::uint32_t AroundVoxels(const BlockMask& voxels) {
 }
 
 struct Candidate {
+  Index3 index;
   InstanceId id = kNoInstance;
-  const TsdfGrid::Entry* entry = nullptr;
+  TsdfBlock* block = nullptr;
   const CameraFromLattice* T_CL = nullptr;
 };
 
@@ -59,16 +60,15 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
     const auto camera =
         cameras.emplace(id, CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world));
     for (const TsdfGrid::Entry& entry : volume.grid.entries()) {
-      candidates.push_back({id, &entry, &camera.first->second});
+      candidates.push_back({entry.index, id, entry.block.get(), &camera.first->second});
     }
   }
-  const std::vector<PlannedBlock> planned =
-      PlanBlocks(frame, candidates.size(), config.voxel(), config.back(),
-                 [&](std::size_t i) -> BlockCandidate {
-                   const Candidate& of = candidates[i];
-                   return {of.entry->index, of.T_CL, of.id,
-                           config.contradiction && of.entry->block->AnyNegative()};
-                 });
+  const std::vector<PlannedBlock> planned = PlanBlocks(
+      frame, candidates.size(), config.voxel(), config.back(),
+      [&](std::size_t i) -> BlockCandidate {
+        const Candidate& of = candidates[i];
+        return {of.index, of.T_CL, of.id, false, config.contradiction ? of.block : nullptr};
+      });
   std::vector<FusedBlock> fused(planned.size());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, planned.size(), kBlocksPerTask),
@@ -84,15 +84,15 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           rule.colour_band = config.colour_band();
           rule.first_colour_band = config.first_colour_band();
           rule.weight_cap = static_cast<float>(config.weight_cap);
-          TsdfBlock& block = *of.entry->block;
+          TsdfBlock& block = *of.block;
           const TsdfBlock* next =
-              k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].entry->block.get();
-          const BlockPlace place = PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k]);
+              k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].block;
+          const BlockPlace place = PlaceOf(*of.T_CL, of.index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();
           fused[k] = {of.id,
-                      of.entry->index,
+                      of.index,
                       &block,
                       result.in_band,
                       AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U),
