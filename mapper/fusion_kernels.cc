@@ -415,9 +415,9 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       PutBits(df, against, i, cleared.data());
       any_cleared = true;
     }
-    // Free space and full weights stay what they are: then the memory need not be written.
-    if (!hn::AllTrue(df, hn::Eq(d, old_d))) StoreHalves(df, d, &block.distance[i]);
-    if (!hn::AllTrue(df, hn::Eq(w, old_w))) {
+    StoreHalves(df, d, &block.distance[i]);
+    // Full weights stay what they are: then the memory need not be written.
+    if (!all_full || any_cleared) {
       hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
     }
     if (!all_full || any_cleared) PutBits(df, hn::Eq(w, cap), i, full.data());
