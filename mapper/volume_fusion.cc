@@ -1,5 +1,6 @@
 #include "mapper/volume_fusion.h"
 
+#include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -9,6 +10,7 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 16;
+constexpr std::size_t kAhead = 4;
 
 void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolumes& volumes) {
   const auto lattice_of = [&](InstanceId id) -> LatticeOfLabel {
@@ -87,6 +89,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           TsdfBlock& block = *of.block;
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].block;
+          if (k + kAhead < range.end()) hwy::Prefetch(&candidates[planned[k + kAhead].number]);
           const BlockPlace place = PlaceOf(*of.T_CL, of.index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
