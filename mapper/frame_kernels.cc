@@ -40,7 +40,10 @@ void Summarise(const KernelFrame& frame, int tile_row, Tile* tiles) {
           const float depth = frame.depth[pixel];
           tile.least_label = std::min(tile.least_label, frame.label[pixel]);
           tile.greatest_label = std::max(tile.greatest_label, frame.label[pixel]);
-          if (!IsValidDepth(depth)) continue;
+          if (!IsValidDepth(depth)) {
+            tile.has_invalid = true;
+            continue;
+          }
           tile.nearest = std::min(tile.nearest, depth);
           tile.farthest = std::max(tile.farthest, depth);
         }
@@ -52,12 +55,14 @@ void Summarise(const KernelFrame& frame, int tile_row, Tile* tiles) {
     auto farthest = zero;
     auto least = hn::Set(di, kNoInstance);
     auto greatest = hn::Zero(di);
+    auto all_valid = hn::Eq(zero, zero);
     for (int line = first_line; line < last_line; ++line) {
       const auto pixel = static_cast<std::size_t>(line) * static_cast<std::size_t>(width) +
                          static_cast<std::size_t>(left);
       for (std::size_t k = pixel; k < pixel + kTile_px; k += hn::Lanes(df)) {
         const auto depth = hn::LoadU(df, frame.depth + k);
         const auto valid = hn::And(hn::Gt(depth, zero), hn::Le(depth, farthest_valid));
+        all_valid = hn::And(all_valid, valid);
         nearest = hn::IfThenElse(valid, hn::Min(nearest, depth), nearest);
         farthest = hn::IfThenElse(valid, hn::Max(farthest, depth), farthest);
         const auto label = hn::PromoteTo(di, hn::LoadU(du, frame.label + k));
@@ -67,6 +72,7 @@ void Summarise(const KernelFrame& frame, int tile_row, Tile* tiles) {
     }
     tile.nearest = hn::GetLane(hn::MinOfLanes(df, nearest));
     tile.farthest = hn::GetLane(hn::MaxOfLanes(df, farthest));
+    tile.has_invalid = !hn::AllTrue(df, all_valid);
     tile.least_label = static_cast<std::uint16_t>(hn::GetLane(hn::MinOfLanes(di, least)));
     tile.greatest_label = static_cast<std::uint16_t>(hn::GetLane(hn::MaxOfLanes(di, greatest)));
     *tiles = tile;

@@ -18,6 +18,7 @@ inline constexpr int kTile_px = 16;
 struct Tile {
   float nearest = std::numeric_limits<float>::infinity();  // metres, of the valid depths
   float farthest = 0;
+  bool has_invalid = false;                 // whether a depth is not valid
   std::uint16_t least_label = kNoInstance;  // of all pixels
   std::uint16_t greatest_label = 0;
 };

@@ -131,7 +131,7 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
       const auto v = hn::Add(hn::Add(hn::Mul(hn::Mul(fy, cam_y), iz), cy), half);
       const auto ray = hn::Sqrt(
           hn::Add(hn::Add(hn::Mul(cam_x, cam_x), hn::Mul(cam_y, cam_y)), hn::Mul(cam_z, cam_z)));
-      hn::Store(hn::Mul(ray, iz), df, &out.scale[i]);
+      auto scale = hn::Mul(ray, iz);
       auto look = hn::Le(cam_z, behind);
       // Non-negative in view, so truncation is the floor.
       const auto store = [&](auto seen_u, auto seen_v, auto seen_z) {
@@ -147,8 +147,11 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
                                      hn::And(hn::Ge(v, zero), hn::Lt(v, height)));
         store(hn::IfThenElseZero(in_view, u), hn::IfThenElseZero(in_view, v),
               hn::IfThenElse(in_view, cam_z, far_away));
+        // Behind the camera it would make the nearest of what is farthest.
+        scale = hn::IfThenElse(in_view, scale, hn::Set(df, 1.0F));
         look = hn::And(in_view, look);
       }
+      hn::Store(scale, df, &out.scale[i]);
       out.look[i] = hn::AllFalse(df, look) ? 0 : 1;
       any = hn::Or(any, look);
     }
@@ -161,23 +164,11 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, Projected& out) 
                            : ProjectWith<false>(frame, place, out);
 }
 
-// s of the lanes i ... and whether they are observed, labels apart: s >= -back.
-template <class V>
-struct Measured {
-  V s;
-  MaskOf<Floats> yes;
-};
-
-template <class V>
-Measured<V> Measure(const Projected& projected, const float* depth_of, std::size_t i,
-                    V minus_back) {
+// s of the lanes i ...; less than -back where nothing is observed.
+hn::VFromD<Floats> Measure(const Projected& projected, const float* depth_of, std::size_t i) {
   const Floats df;
-  const V depth = hn::Load(df, depth_of + i);
-  const V s =
-      hn::Mul(hn::Sub(depth, hn::Load(df, &projected.z[i])), hn::Load(df, &projected.scale[i]));
-  const auto valid =
-      hn::And(hn::Gt(depth, hn::Zero(df)), hn::Le(depth, hn::Set(df, kMaxValidDepth_m)));
-  return {s, hn::And(valid, hn::Ge(s, minus_back))};
+  return hn::Mul(hn::Sub(hn::Load(df, depth_of + i), hn::Load(df, &projected.z[i])),
+                 hn::Load(df, &projected.scale[i]));
 }
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
@@ -196,10 +187,10 @@ bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, Bloc
       hn::StoreU(hn::Set(di, -1), di, &out.pixel[i]);
       continue;
     }
-    const auto measured = Measure(projected, depth.data(), i, minus_back);
+    const auto s = Measure(projected, depth.data(), i);
     const auto labelled = hn::Ne(hn::Load(di, &label[i]), hn::Set(di, kNoInstance));
-    const auto observed = hn::And(hn::RebindMask(di, measured.yes), labelled);
-    hn::StoreU(measured.s, df, &out.distance[i]);
+    const auto observed = hn::And(hn::RebindMask(di, hn::Ge(s, minus_back)), labelled);
+    hn::StoreU(s, df, &out.distance[i]);
     const auto pixel = hn::Load(di, &projected.pixel[i]);
     hn::StoreU(hn::IfThenElse(observed, pixel, hn::Set(di, -1)), di, &out.pixel[i]);
     any = hn::Or(any, observed);
@@ -307,7 +298,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto minus_back = hn::Set(df, -rule.back);
   const auto colour_band = hn::Set(df, rule.colour_band);
   const auto first_colour_band = hn::Set(df, rule.first_colour_band);
-  const auto least_colour_band = hn::Min(colour_band, first_colour_band);
   const auto most_colour_band = hn::Max(colour_band, first_colour_band);
   const auto cap = hn::Set(df, rule.weight_cap);
   const auto full_share = hn::Div(one, hn::Add(cap, one));
@@ -315,10 +305,11 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const bool contradiction = kLabels == Labels::kSome && rule.contradiction;
 
   using Bytes = std::array<std::uint8_t, sizeof(BlockMask)>;
-  HWY_ALIGN auto observed = std::bit_cast<Bytes>(block.observed);
   HWY_ALIGN auto negative = std::bit_cast<Bytes>(block.negative);
   HWY_ALIGN auto band = std::bit_cast<Bytes>(block.band);
   HWY_ALIGN auto full = std::bit_cast<Bytes>(block.full);
+  HWY_ALIGN Bytes taken_here{};
+  HWY_ALIGN Bytes lost{};  // no longer observed
   HWY_ALIGN Bytes in_band{};
   HWY_ALIGN Bytes to_colour{};
   HWY_ALIGN Bytes cleared{};
@@ -339,10 +330,10 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       if (i % 64 == 32) hwy::Prefetch(&next->weight[i]);
     }
     if (projected.look[i] == 0) continue;
-    const auto measured = Measure(projected, depth.data(), i, minus_back);
-    const auto s = measured.s;
-    auto taken = measured.yes;
-    auto against = hn::MaskFromVec(hn::Zero(df));
+    const auto s = Measure(projected, depth.data(), i);
+    auto taken = hn::Ge(s, minus_back);
+    auto touched = taken;
+    [[maybe_unused]] auto against = hn::MaskFromVec(zero);
     const auto old_d = LoadHalves(df, &block.distance[i]);
     // Where all weights are known, they need not be read.
     const auto is_full = MaskAt(df, full.data(), i);
@@ -357,75 +348,74 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
         taken = hn::And(taken, hn::RebindMask(df, hn::Eq(seen, id)));
         if (contradiction) {
           const auto claims = hn::And(hn::Gt(old_w, zero), hn::Lt(old_d, minus_half));
-          against = hn::And(hn::AndNot(taken, hn::And(measured.yes, labelled)),
+          against = hn::And(hn::AndNot(taken, hn::And(touched, labelled)),
                             hn::And(claims, hn::Ge(s, minus_half)));
         }
+        touched = hn::Or(taken, against);
       } else {
         taken = hn::And(taken, labelled);
+        touched = taken;
       }
     }
-    const auto touched = hn::Or(taken, against);
     if (hn::AllFalse(df, touched)) continue;
-    const auto clamped = hn::Min(s, front);
-    // Free space seen once more, that no longer counts observations, stays what it is.
-    const auto settled = hn::And(hn::Eq(old_d, front), hn::And(is_full, hn::Gt(s, front)));
-    if (hn::AllTrue(df, hn::Or(hn::Not(touched), settled))) continue;
+    const auto near = hn::And(taken, hn::Le(s, front));
+    if (hn::AllFalse(df, near)) {
+      // Free space seen once more, that no longer counts observations, stays what it is.
+      const auto settled = hn::And(hn::Eq(old_d, front), hn::And(is_full, hn::Gt(s, front)));
+      if (hn::AllTrue(df, hn::Or(hn::Not(touched), settled))) continue;
+    } else {
+      PutBits(df, near, i, in_band.data());
+      if constexpr (kLabels == Labels::kEvery) {
+        if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
+      }
+      const auto off_surface = hn::Abs(s);
+      auto colours = hn::And(near, hn::Le(off_surface, most_colour_band));
+      if (!hn::AllFalse(df, colours)) {
+        // Only between the two bands does it matter whether there is a colour.
+        auto may_colour = first_colour_band;
+        if (block.colours != nullptr) {
+          const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
+          const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
+          may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
+          for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
+        }
+        colours = hn::And(colours, hn::Le(off_surface, may_colour));
+        PutBits(df, colours, i, to_colour.data());
+        // The ends of the rows; what lies between is near.
+        for (std::size_t k = i; k < i + hn::Lanes(df); k += std::min<std::size_t>(8, kLanes)) {
+          const std::size_t last = k + std::min<std::size_t>(8, kLanes) - 1;
+          hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[k]));
+          hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[last]));
+        }
+        any_coloured = true;
+      }
+    }
     result.changed = true;
+    const auto clamped = hn::Min(s, front);
     const auto more = hn::Add(old_w, one);
     const auto share = all_full ? full_share : hn::Div(one, more);
     const auto fused = hn::Add(old_d, hn::Mul(hn::Sub(clamped, old_d), share));
     auto d = hn::IfThenElse(taken, RoundLanesToHalf(df, fused), old_d);
-    auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
-    const auto near = hn::And(taken, hn::Le(s, front));
-    PutBits(df, near, i, in_band.data());
-    if constexpr (kLabels == Labels::kEvery) {
-      if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
-    }
-    const auto off_surface = hn::Abs(s);
-    auto colours = hn::And(near, hn::Le(off_surface, least_colour_band));
-    // Only between the two bands does it matter whether there is a colour.
-    const auto in_doubt = hn::And(hn::AndNot(colours, near), hn::Le(off_surface, most_colour_band));
-    if (!hn::AllFalse(df, in_doubt)) {
-      auto may_colour = first_colour_band;
-      if (block.colours != nullptr) {
-        const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
-        const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
-        may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
-      }
-      colours = hn::Or(colours, hn::And(in_doubt, hn::Le(off_surface, may_colour)));
-    }
-    if (!hn::AllFalse(df, colours)) {
-      PutBits(df, colours, i, to_colour.data());
-      if (block.colours != nullptr) {
-        for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
-        hwy::Prefetch(&block.colours->count[i]);
-      }
-      // The ends of the rows; what lies between is near.
-      for (std::size_t k = i; k < i + hn::Lanes(df); k += std::min<std::size_t>(8, kLanes)) {
-        const std::size_t last = k + std::min<std::size_t>(8, kLanes) - 1;
-        hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[k]));
-        hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[last]));
-      }
-      any_coloured = true;
-    }
+    PutBits(df, taken, i, taken_here.data());
     if (contradiction && !hn::AllFalse(df, against)) {
       const auto free = hn::And(against, hn::Gt(s, hn::Set(df, place.voxel)));
       d = hn::IfThenElse(against, hn::IfThenElseZero(free, RoundLanesToHalf(df, clamped)), d);
-      w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), w);
+      const auto taken_w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
+      const auto w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), taken_w);
+      hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
+      PutBits(df, hn::Eq(w, cap), i, full.data());
       PutBits(df, against, i, cleared.data());
+      PutBits(df, hn::AndNot(free, against), i, lost.data());
       any_cleared = true;
+    } else if (!all_full) {
+      // Full weights stay what they are: then the memory need not be written.
+      const auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
+      hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
+      PutBits(df, hn::Eq(w, cap), i, full.data());
     }
     StoreHalves(df, d, &block.distance[i]);
-    // Full weights stay what they are: then the memory need not be written.
-    if (!all_full || any_cleared) {
-      hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
-    }
-    if (!all_full || any_cleared) PutBits(df, hn::Eq(w, cap), i, full.data());
-    const auto known = hn::Gt(w, zero);
-    const auto inside = hn::And(known, hn::Lt(d, zero));
-    PutBits(df, known, i, observed.data());
-    PutBits(df, inside, i, negative.data());
-    PutBits(df, hn::And(inside, hn::Ge(d, minus_back)), i, band.data());
+    PutBits(df, hn::Lt(d, zero), i, negative.data());
+    PutBits(df, hn::Ge(d, minus_back), i, band.data());
   }
   if (any_coloured) {
     FuseColours(frame, projected.pixel, to_colour.data(), rule.weight_cap, block.MakeColours());
@@ -440,12 +430,19 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   if (!result.changed) return result;
   result.in_band = std::bit_cast<BlockMask>(in_band);
   block.full = std::bit_cast<BlockMask>(full);
-  const auto new_observed = std::bit_cast<BlockMask>(observed);
-  const auto new_negative = std::bit_cast<BlockMask>(negative);
+  const auto now_taken = std::bit_cast<BlockMask>(taken_here);
+  const auto now_lost = std::bit_cast<BlockMask>(lost);
+  auto new_observed = block.observed;
+  auto new_negative = std::bit_cast<BlockMask>(negative);
+  auto new_band = std::bit_cast<BlockMask>(band);
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    new_observed[z] = (new_observed[z] | now_taken[z]) & ~now_lost[z];
+    new_negative[z] &= new_observed[z];
+    new_band[z] &= new_negative[z];
+  }
   result.changed_signs = ChangedSigns(block.observed, block.negative, new_observed, new_negative);
   block.observed = new_observed;
   block.negative = new_negative;
-  const auto new_band = std::bit_cast<BlockMask>(band);
   result.changed_band = block.band != new_band;
   block.band = new_band;
   return result;

@@ -14,7 +14,7 @@ inline constexpr float kNearest_m = 0.05F;  // voxels closer to the camera's pla
 
 // A frame as the kernels read it: row-major images.
 struct KernelFrame {
-  const float* depth = nullptr;          // metres
+  const float* depth = nullptr;          // metres, -infinity where it is not valid
   const std::uint16_t* label = nullptr;  // kNoInstance where the pixel is not to be used
   const std::uint8_t* colour = nullptr;  // three bytes a pixel
   float width = 0;                       // pixels

@@ -27,13 +27,14 @@ hwy::HWY_NAMESPACE::VFromD<D> LoadHalves(D df, const Half* from) {
 template <class D>
 hwy::HWY_NAMESPACE::VFromD<D> RoundLanesToHalf(D df, hwy::HWY_NAMESPACE::VFromD<D> v) {
   namespace hn = hwy::HWY_NAMESPACE;
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+  const hn::Rebind<hwy::float16_t, D> dh;
+  // What rounds to zero is +0, as it is after this sum.
+  return hn::Add(hn::PromoteTo(df, hn::DemoteTo(dh, v)), hn::Zero(df));
+#else
   const auto size = hn::Abs(v);
   // What rounds to zero is +0.
   v = hn::IfThenZeroElse(hn::Le(size, hn::Set(df, 0x1p-25F)), v);
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-  const hn::Rebind<hwy::float16_t, D> dh;
-  return hn::PromoteTo(df, hn::DemoteTo(dh, v));
-#else
   // There Highway cuts off what is too much, so it is rounded first.
   const hn::RebindToUnsigned<D> du;
   const auto bits = hn::BitCast(du, v);

@@ -187,6 +187,12 @@ FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
         }
       },
       tbb::simple_partitioner());
+  if (std::none_of(tiles.begin(), tiles.end(), [](const Tile& t) { return t.has_invalid; })) return;
+  depth_ = depth_.clone();
+  for (float& depth : cv::Mat_<float>(depth_)) {
+    if (!IsValidDepth(depth)) depth = -std::numeric_limits<float>::infinity();
+  }
+  kernel.depth = depth_.ptr<float>();
 }
 
 CameraFromLattice::CameraFromLattice(const Pose& T_WC, const Pose& T_WL, bool lattice_is_world) {
