@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <numbers>
 #include <string>
 #include <tuple>
 
@@ -63,6 +64,19 @@ TEST_P(ReferenceTest, StaticScene) {
     EXPECT_GT(maps.map().ObservedVoxels(id).size(), 200U) << "the scene shows too little of " << id;
   }
   maps.CompareWholeBox();
+}
+
+// The camera stands among blocks that are there, so that some of a block's voxels lie before it and
+// some behind; upside down, so that the image's first pixel sees the table.
+TEST_P(ReferenceTest, CameraAmongItsBlocks) {
+  const Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  const Pose T_WC = reference::LookAt({0.03, 0.03, kTableTop_m + 0.06}, {0.3, 0.05, kTableTop_m});
+  const Pose upside_down = MakePose(std::numbers::pi, Eigen::Vector3d::UnitZ(), {0, 0, 0});
+  const Frame frame = reference::Render(scene, T_WC * upside_down, 2);
+  ASSERT_TRUE(IsValidDepth(frame.depth.at<float>(0, 0)));
+  maps.SetPosesAndFuse(frame);
 }
 
 TEST_P(ReferenceTest, WeightsAndConfidencesSaturate) {
