@@ -70,6 +70,17 @@ using Shorts = hn::Rebind<std::uint16_t, Floats>;
 using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
 constexpr std::size_t kSlice = 64;
 
+// Towards zero, of numbers that fit; hn::ConvertTo() also looks after those that do not.
+inline hn::VFromD<Ints> Truncated(hn::VFromD<Floats> v) {
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+  return hn::VFromD<Ints>{_mm512_cvttps_epi32(v.raw)};
+#elif HWY_TARGET == HWY_AVX2
+  return hn::VFromD<Ints>{_mm256_cvttps_epi32(v.raw)};
+#else
+  return hn::ConvertTo(Ints(), v);
+#endif
+}
+
 // The voxels of a block as the camera sees them; what is out of view is infinitely far away, at
 // pixel 0.
 struct Projected {
@@ -135,8 +146,8 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
       auto look = hn::Le(cam_z, behind);
       // Non-negative in view, so truncation is the floor.
       const auto store = [&](auto seen_u, auto seen_v, auto seen_z) {
-        const auto line = hn::Mul(hn::ConvertTo(di, seen_v), stride);
-        hn::Store(hn::Add(line, hn::ConvertTo(di, seen_u)), di, &out.pixel[i]);
+        const auto line = hn::Mul(Truncated(seen_v), stride);
+        hn::Store(hn::Add(line, Truncated(seen_u)), di, &out.pixel[i]);
         hn::Store(seen_z, df, &out.z[i]);
       };
       if constexpr (kAllInView) {
@@ -235,14 +246,13 @@ void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_
       const auto change =
           hn::Mul(hn::Sub(hn::Mul(hn::Set(df, 256.0F), hn::ConvertTo(df, level)), old), share);
       const auto mean = hn::Add(hn::Add(old, change), half);
-      hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElse(take, mean, old))), du, stored);
+      hn::StoreU(hn::DemoteTo(du, Truncated(hn::IfThenElse(take, mean, old))), du, stored);
     };
     fuse(&colours.channel[0][i], hn::And(seen, low_byte));
     fuse(&colours.channel[1][i], hn::And(hn::ShiftRight<8>(seen), low_byte));
     fuse(&colours.channel[2][i], hn::And(hn::ShiftRight<16>(seen), low_byte));
     const auto capped = hn::Min(more, hn::Set(df, weight_cap));
-    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, hn::IfThenElse(take, capped, count))), d8,
-               counts);
+    hn::StoreU(hn::DemoteTo(d8, Truncated(hn::IfThenElse(take, capped, count))), d8, counts);
   }
 }
 
@@ -402,7 +412,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       d = hn::IfThenElse(against, hn::IfThenElseZero(free, RoundLanesToHalf(df, clamped)), d);
       const auto taken_w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
       const auto w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), taken_w);
-      hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
+      hn::StoreU(hn::DemoteTo(d8, Truncated(w)), d8, &block.weight[i]);
       PutBits(df, hn::Eq(w, cap), i, full.data());
       PutBits(df, against, i, cleared.data());
       PutBits(df, hn::AndNot(free, against), i, lost.data());
@@ -410,7 +420,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     } else if (!all_full) {
       // Full weights stay what they are: then the memory need not be written.
       const auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
-      hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, w)), d8, &block.weight[i]);
+      hn::StoreU(hn::DemoteTo(d8, Truncated(w)), d8, &block.weight[i]);
       PutBits(df, hn::Eq(w, cap), i, full.data());
     }
     StoreHalves(df, d, &block.distance[i]);
