@@ -68,7 +68,6 @@ using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 using Shorts = hn::Rebind<std::uint16_t, Floats>;
 using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
-constexpr std::size_t kSlice = 64;
 
 // Towards zero, of numbers that fit; hn::ConvertTo() also looks after those that do not.
 inline hn::VFromD<Ints> Truncated(hn::VFromD<Floats> v) {
@@ -101,7 +100,7 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
   std::copy(place.T_CL, place.T_CL + 12, m.begin());
   // The terms of x, by place in two rows, and of y, by place in a slice.
   HWY_ALIGN std::array<std::array<float, 16>, 3> x_term;
-  HWY_ALIGN std::array<std::array<float, kSlice>, 3> y_term;
+  HWY_ALIGN std::array<std::array<float, kSliceVoxels>, 3> y_term;
   for (std::size_t r = 0; r < 3; ++r) {
     for (std::size_t k = 0; k < kBlockSide; ++k) {
       const auto step = static_cast<int>(k);
@@ -127,8 +126,8 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
     const float pz = static_cast<float>(place.first.z + static_cast<int>(z)) * place.voxel;
     const std::array z_term{hn::Set(df, m[2] * pz), hn::Set(df, m[6] * pz),
                             hn::Set(df, m[10] * pz)};
-    for (std::size_t k = 0; k < kSlice; k += hn::Lanes(df)) {
-      const std::size_t i = kSlice * z + k;
+    for (std::size_t k = 0; k < kSliceVoxels; k += hn::Lanes(df)) {
+      const std::size_t i = kSliceVoxels * z + k;
       const auto row = [&](std::size_t r) {
         const auto fixed =
             hn::Add(hn::Add(hn::Load(df, &y_term[r][k]), z_term[r]), hn::Set(df, m[4 * r + 3]));
@@ -209,32 +208,29 @@ bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, Bloc
   return !hn::AllFalse(di, any);
 }
 
-// docs/map.md: the colours of the voxels that `bits` marks.
-void FuseColours(const KernelFrame& frame, const Lanes& pixel, const std::uint8_t* bits,
-                 float weight_cap, BlockColours& colours) {
+// docs/map.md: the colours of the voxels of a slice that `wanted` marks; `pixel` is of the slice.
+void FuseColours(const KernelFrame& frame, const std::int32_t* pixel, std::uint64_t wanted,
+                 float weight_cap, ColourSlice& colours) {
   const Floats df;
   const Ints di;
   const Shorts du;
   const std::size_t lanes = hn::Lanes(df);
-  const auto wanted = [&](std::size_t i) {
-    const unsigned byte = lanes > 8 ? static_cast<unsigned>(bits[i / 8] | bits[i / 8 + 1])
-                                    : static_cast<unsigned>(bits[i / 8]);
-    return lanes >= 8 ? byte != 0 : (byte >> (i & 7U) & ((1U << lanes) - 1U)) != 0;
-  };
+  const std::uint64_t of_lanes = (1ULL << lanes) - 1;
   // All loads before their first use: they are stored singly and read as vectors.
-  HWY_ALIGN Lanes colour;
-  for (std::size_t i = 0; i < kBlockVoxels; i += lanes) {
-    if (!wanted(i)) continue;
+  HWY_ALIGN std::array<std::int32_t, kSliceVoxels> colour;
+  for (std::size_t i = 0; i < kSliceVoxels; i += lanes) {
+    if ((wanted >> i & of_lanes) == 0) continue;
     for (std::size_t k = i; k < i + lanes; ++k) colour[k] = BytesOfColour(frame, pixel[k]);
   }
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(&wanted);
   const auto low_byte = hn::Set(di, 255);
   const auto half = hn::Set(df, 0.5F);
   const auto one = hn::Set(df, 1.0F);
-  for (std::size_t i = 0; i < kBlockVoxels; i += lanes) {
-    if (!wanted(i)) continue;
+  for (std::size_t i = 0; i < kSliceVoxels; i += lanes) {
+    if ((wanted >> i & of_lanes) == 0) continue;
     const auto take = MaskAt(df, bits, i);
     const auto bytes = hn::Load(di, &colour[i]);
-    const auto at_zero = hn::Eq(hn::Load(di, &pixel[i]), hn::Zero(di));
+    const auto at_zero = hn::Eq(hn::Load(di, pixel + i), hn::Zero(di));
     const auto seen = hn::IfThenElse(at_zero, bytes, hn::ShiftRight<8>(bytes));
     const Bytes8 d8;
     std::uint8_t* counts = &colours.count[i];
@@ -283,8 +279,8 @@ template <Labels kLabels>
 FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                       TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
   FusionResult result;
-  if (block.colours != nullptr) {
-    for (std::size_t i = 0; i < kBlockVoxels; i += 64) hwy::Prefetch(&block.colours->count[i]);
+  for (const auto& slice : block.colours) {
+    if (slice != nullptr) hwy::Prefetch(slice->count.data());
   }
   Projected projected;
   if (!Project(frame, place, projected)) return result;
@@ -323,7 +319,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   HWY_ALIGN Bytes in_band{};
   HWY_ALIGN Bytes to_colour{};
   HWY_ALIGN Bytes cleared{};
-  bool any_coloured = false;
   bool any_cleared = false;
   if (next != nullptr) {
     hwy::Prefetch(&next->observed);
@@ -383,11 +378,12 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       if (!hn::AllFalse(df, colours)) {
         // Only between the two bands does it matter whether there is a colour.
         auto may_colour = first_colour_band;
-        if (block.colours != nullptr) {
-          const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
+        if (const ColourSlice* slice = block.colours[i / kSliceVoxels].get()) {
+          const std::size_t k = i % kSliceVoxels;
+          const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &slice->count[k]));
           const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
           may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
-          for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
+          for (const auto& channel : slice->channel) hwy::Prefetch(&channel[k]);
         }
         colours = hn::And(colours, hn::Le(off_surface, may_colour));
         PutBits(df, colours, i, to_colour.data());
@@ -397,7 +393,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
           hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[k]));
           hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[last]));
         }
-        any_coloured = true;
       }
     }
     result.changed = true;
@@ -427,8 +422,11 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     PutBits(df, hn::Lt(d, zero), i, negative.data());
     PutBits(df, hn::Ge(d, minus_back), i, band.data());
   }
-  if (any_coloured) {
-    FuseColours(frame, projected.pixel, to_colour.data(), rule.weight_cap, block.MakeColours());
+  const auto colour_at = std::bit_cast<BlockMask>(to_colour);
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    if (colour_at[z] == 0) continue;
+    FuseColours(frame, &projected.pixel[z * kSliceVoxels], colour_at[z], rule.weight_cap,
+                block.MakeColours(z));
   }
   if (any_cleared) {
     const auto places = std::bit_cast<BlockMask>(cleared);

@@ -188,6 +188,14 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
       }
     }
     if (!any) return fmt::format("{}: block {} is empty", name, Text(index));
+    for (std::size_t z = 0; z < block->colours.size(); ++z) {
+      if (block->colours[z] == nullptr) continue;
+      const auto& count = block->colours[z]->count;
+      if (std::all_of(count.begin(), count.end(), [](auto n) { return n == 0; })) {
+        return fmt::format("{}: block {} keeps slice {} of colours with no voxel with a colour",
+                           name, Text(index), z);
+      }
+    }
   }
   return std::nullopt;
 }

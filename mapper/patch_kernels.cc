@@ -211,7 +211,7 @@ void Values(const PatchBlocks& blocks, const PulledPoints& points, const Has& ha
 void FieldValues(const PatchBlocks& blocks, const PulledPoints& points, PatchField field,
                  PatchValues& values) {
   const auto any = [](const TsdfBlock&) { return true; };
-  const auto coloured = [](const TsdfBlock& block) { return block.colours != nullptr; };
+  const auto coloured = [](const TsdfBlock& block) { return block.HasColours(); };
   const auto bytes = [](auto d, const std::uint8_t* from) {
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
     const hn::Rebind<std::int32_t, decltype(d)> di;
@@ -236,7 +236,8 @@ void FieldValues(const PatchBlocks& blocks, const PulledPoints& points, PatchFie
       Values(
           blocks, points, coloured,
           [&](auto d, const TsdfBlock& block, std::size_t i) {
-            return bytes(d, &block.colours->count[i]);
+            const auto& slice = block.colours[i / kSliceVoxels];
+            return slice == nullptr ? hn::Zero(d) : bytes(d, &slice->count[i % kSliceVoxels]);
           },
           values);
       return;
@@ -251,8 +252,10 @@ void FieldValues(const PatchBlocks& blocks, const PulledPoints& points, PatchFie
       [channel](auto d, const TsdfBlock& block, std::size_t i) {
         const hn::Rebind<std::uint16_t, decltype(d)> d16;
         const hn::Rebind<std::int32_t, decltype(d)> di;
-        return hn::ConvertTo(
-            d, hn::PromoteTo(di, hn::LoadU(d16, &block.colours->channel[channel][i])));
+        const auto& slice = block.colours[i / kSliceVoxels];
+        if (slice == nullptr) return hn::Zero(d);
+        const std::uint16_t* from = &slice->channel[channel][i % kSliceVoxels];
+        return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(d16, from)));
       },
       values);
 }

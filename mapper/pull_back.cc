@@ -113,7 +113,7 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
   std::array<float, kBlockVoxels> weight;
   at_points(PatchField::kWeight, values, weight.data());
   PutValues(wanted, distance.data(), weight.data(), out);
-  if (!AnyOf(blocks, [](const TsdfBlock& block) { return block.colours != nullptr; })) return true;
+  if (!AnyOf(blocks, [](const TsdfBlock& block) { return block.HasColours(); })) return true;
   PatchValues counts;
   std::array<float, kBlockVoxels> count;
   at_points(PatchField::kColourCount, counts, count.data());
@@ -121,7 +121,7 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
   PatchValuesOf(blocks, points, PatchField::kRed, channels[0]);
   PatchValuesOf(blocks, points, PatchField::kGreen, channels[1]);
   PatchValuesOf(blocks, points, PatchField::kBlue, channels[2]);
-  PutColours(channels, counts, points, wanted, count.data(), out.MakeColours());
+  PutColours(channels, counts, points, wanted, count.data(), out);
   return true;
 }
 

@@ -175,7 +175,7 @@ void Observed(const PatchValues& values, const PulledPoints& points, const Block
 
 void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
              const PulledPoints& points, const BlockMask& wanted, const float* points_count,
-             BlockColours& colours) {
+             TsdfBlock& block) {
   const hn::ScalableTag<float> df;
   const hn::RebindToSigned<decltype(df)> di;
   const hn::Rebind<std::uint16_t, decltype(df)> du;
@@ -209,12 +209,14 @@ void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& coun
     const auto has = hn::And(take, hn::Gt(total, zero));
     const auto counted = hn::IfThenElseZero(has, hn::LoadU(df, points_count + i));
     const auto rounded = hn::ConvertTo(di, hn::Add(counted, half));
-    hn::StoreU(hn::DemoteTo(d8, rounded), d8, &colours.count[i]);
+    ColourSlice& colours = block.MakeColours(i / kSliceVoxels);
+    const std::size_t in_slice = i % kSliceVoxels;
+    hn::StoreU(hn::DemoteTo(d8, rounded), d8, &colours.count[in_slice]);
     const auto is_coloured = hn::RebindMask(df, hn::Gt(rounded, hn::Zero(di)));
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const V mean = hn::Add(hn::Div(sum[channel], total), half);
       hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElseZero(is_coloured, mean))), du,
-                 &colours.channel[channel][i]);
+                 &colours.channel[channel][in_slice]);
     }
   }
 }
@@ -299,8 +301,8 @@ void PutValues(const BlockMask& wanted, const float* distance, const float* weig
 
 void PutColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
                 const PulledPoints& points, const BlockMask& wanted, const float* points_count,
-                BlockColours& colours) {
-  HWY_DYNAMIC_DISPATCH(Colours)(channels, count, points, wanted, points_count, colours);
+                TsdfBlock& block) {
+  HWY_DYNAMIC_DISPATCH(Colours)(channels, count, points, wanted, points_count, block);
 }
 
 }  // namespace tsdfpp

@@ -42,6 +42,6 @@ void PutValues(const BlockMask& wanted, const float* distance, const float* weig
 // interpolated counts. 0 where a rounded count is 0 or no corner is coloured.
 void PutColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
                 const PulledPoints& points, const BlockMask& wanted, const float* points_count,
-                BlockColours& colours);
+                TsdfBlock& block);
 
 }  // namespace tsdfpp

@@ -1,6 +1,7 @@
 // A block of signed distances, weights and colours, and the bit masks derived from them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -37,18 +38,20 @@ using FixedColour = std::array<std::uint16_t, 3>;  // 8.8 fixed point
 // anything: it depends on threads.
 std::uint64_t NewRevision();
 
-struct alignas(64) BlockColours {
-  std::array<std::array<std::uint16_t, kBlockVoxels>, 3> channel{};  // 8.8 fixed point
-  std::array<std::uint8_t, kBlockVoxels> count{};
+// The colours of one slice z of a block.
+inline constexpr std::size_t kSliceVoxels = kBlockVoxels / kBlockSide;
+struct alignas(64) ColourSlice {
+  std::array<std::array<std::uint16_t, kSliceVoxels>, 3> channel{};  // 8.8 fixed point
+  std::array<std::uint8_t, kSliceVoxels> count{};
 
   static void* operator new(std::size_t);
-  static void operator delete(void* block);
+  static void operator delete(void* slice);
 };
-inline void* BlockColours::operator new(std::size_t) {
-  return ObjectPool<sizeof(BlockColours), alignof(BlockColours)>::Take();
+inline void* ColourSlice::operator new(std::size_t) {
+  return ObjectPool<sizeof(ColourSlice), alignof(ColourSlice)>::Take();
 }
-inline void BlockColours::operator delete(void* block) {
-  ObjectPool<sizeof(BlockColours), alignof(BlockColours)>::Give(block);
+inline void ColourSlice::operator delete(void* slice) {
+  ObjectPool<sizeof(ColourSlice), alignof(ColourSlice)>::Give(slice);
 }
 
 // A unique_ptr that copies what it points at.
@@ -78,8 +81,8 @@ struct alignas(64) TsdfBlock {
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
   BlockMask full{};      // of these it is known that the weight is at its cap
 
-  // Only while a voxel has a colour: most blocks lie too far from a surface.
-  Copied<BlockColours> colours;
+  // Each slice only while a voxel in it has a colour: most lie too far from a surface.
+  std::array<Copied<ColourSlice>, kBlockSide> colours;
 
   // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
   // changes values gives the block a new one (UpdateMasks does), which is how the cached meshes see
@@ -105,28 +108,41 @@ struct alignas(64) TsdfBlock {
     weight[i] = 0;
     SetColour(i, {}, 0);
   }
-  int ColourCount(std::size_t i) const { return colours == nullptr ? 0 : colours->count[i]; }
-  FixedColour FixedColourAt(std::size_t i) const {
-    if (colours == nullptr) return {};
-    return {colours->channel[0][i], colours->channel[1][i], colours->channel[2][i]};
+  bool HasColours() const {
+    return std::any_of(colours.begin(), colours.end(), [](const auto& s) { return s != nullptr; });
   }
-  BlockColours& MakeColours() {
-    if (colours == nullptr) colours.reset(new BlockColours);
-    return *colours;
+  int ColourCount(std::size_t i) const {
+    const auto& slice = colours[i / kSliceVoxels];
+    return slice == nullptr ? 0 : slice->count[i % kSliceVoxels];
+  }
+  FixedColour FixedColourAt(std::size_t i) const {
+    const auto& slice = colours[i / kSliceVoxels];
+    if (slice == nullptr) return {};
+    const std::size_t k = i % kSliceVoxels;
+    return {slice->channel[0][k], slice->channel[1][k], slice->channel[2][k]};
+  }
+  ColourSlice& MakeColours(std::size_t z) {
+    if (colours[z] == nullptr) colours[z].reset(new ColourSlice);
+    return *colours[z];
   }
   void SetColour(std::size_t i, const FixedColour& fixed, int count) {
-    if (count == 0 && colours == nullptr) return;
-    BlockColours& into = MakeColours();
-    for (std::size_t c = 0; c < 3; ++c) into.channel[c][i] = fixed[c];
-    into.count[i] = static_cast<std::uint8_t>(count);
+    if (count == 0 && colours[i / kSliceVoxels] == nullptr) return;
+    ColourSlice& into = MakeColours(i / kSliceVoxels);
+    const std::size_t k = i % kSliceVoxels;
+    for (std::size_t c = 0; c < 3; ++c) into.channel[c][k] = fixed[c];
+    into.count[k] = static_cast<std::uint8_t>(count);
   }
   void FreeColoursIfNone() {
-    if (colours == nullptr) return;
-    const auto& count = colours->count;
-    if (std::all_of(count.begin(), count.end(), [](auto n) { return n == 0; })) colours.reset();
+    for (auto& slice : colours) {
+      if (slice == nullptr) continue;
+      const auto& count = slice->count;
+      if (std::all_of(count.begin(), count.end(), [](auto n) { return n == 0; })) slice.reset();
+    }
   }
   std::size_t Bytes() const {
-    return sizeof(TsdfBlock) + (colours == nullptr ? 0 : sizeof(BlockColours));
+    const auto slices =
+        std::count_if(colours.begin(), colours.end(), [](const auto& s) { return s != nullptr; });
+    return sizeof(TsdfBlock) + static_cast<std::size_t>(slices) * sizeof(ColourSlice);
   }
   Colour ColourAt(int place) const {
     const FixedColour c = FixedColourAt(static_cast<std::size_t>(place));

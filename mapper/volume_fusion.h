@@ -22,15 +22,16 @@ inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std
   block.distance[i] = old_distance + (distance - old_distance) * (1 / (weight + 1));
   block.weight[i] = static_cast<std::uint8_t>(std::min(weight + 1, weight_cap));
   if (colour == nullptr) return;
-  BlockColours& colours = block.MakeColours();
-  const auto count = static_cast<float>(colours.count[i]);
+  ColourSlice& colours = block.MakeColours(i / kSliceVoxels);
+  const std::size_t k = i % kSliceVoxels;
+  const auto count = static_cast<float>(colours.count[k]);
   const float share = 1 / (count + 1);
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto old = static_cast<float>(colours.channel[channel][i]);
+    const auto old = static_cast<float>(colours.channel[channel][k]);
     const float mean = old + (256.0F * static_cast<float>(colour[channel]) - old) * share;
-    colours.channel[channel][i] = static_cast<std::uint16_t>(mean + 0.5F);
+    colours.channel[channel][k] = static_cast<std::uint16_t>(mean + 0.5F);
   }
-  colours.count[i] = static_cast<std::uint8_t>(std::min(count + 1, weight_cap));
+  colours.count[k] = static_cast<std::uint8_t>(std::min(count + 1, weight_cap));
 }
 
 // A block that the frame changed.

@@ -54,10 +54,16 @@ TEST_P(Invariants, ValuesOutOfRangeAreNoticed) {
   });
   ExpectFault("has weight", [](Place& p) { p.block->weight[p.observed] = 51; });
   ExpectFault("has weight", [](Place& p) { p.block->weight[p.observed] = 255; });
-  ExpectFault("colours", [](Place& p) { p.block->MakeColours().count[p.observed] = 200; });
+  ExpectFault("colours", [](Place& p) { p.block->SetColour(p.observed, {}, 200); });
   ExpectFault("is unobserved and holds", [](Place& p) { p.block->distance[p.unobserved] = 0.01F; });
-  ExpectFault("is unobserved and holds",
-              [](Place& p) { p.block->MakeColours().channel[1][p.unobserved] = 1; });
+  ExpectFault("is unobserved and holds", [](Place& p) {
+    p.block->SetColour(p.unobserved, {0, 1, 0}, 1);
+  });
+  ExpectFault("no voxel with a colour", [](Place& p) {
+    const std::size_t z = p.observed / kSliceVoxels;
+    p.block->colours[z].reset();
+    p.block->MakeColours(z);
+  });
 }
 
 TEST_P(Invariants, MasksThatAreNotOfTheValuesAreNoticed) {
