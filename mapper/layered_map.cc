@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
+#include <iterator>
+#include <tuple>
+#include <utility>
 
 #include "mapper/mesh_tools.h"
 
@@ -83,8 +86,13 @@ void LayeredMap::NoteIndexChange(const Index3& block) const {
 }
 
 MeshWork LayeredMap::UpdateMeshes() const {
-  const std::size_t gone =
-      std::erase_if(meshes_, [&](const auto& mesh) { return !volumes_.contains(mesh.first); });
+  const std::size_t gone = std::erase_if(meshes_, [&](auto& mesh) {
+    if (volumes_.contains(mesh.first)) return false;
+    for (const Index3& block : mesh.second.mesh.ShownBlocks()) {
+      gone_.parts.push_back({mesh.first, block, {}});
+    }
+    return true;
+  });
   anything_may_be_hidden_ = anything_may_be_hidden_ || gone > 0 || meshes_.size() < volumes_.size();
   MeshWork work;
   bool is_same = !anything_may_be_hidden_ && index_changes_.empty();
@@ -173,9 +181,9 @@ void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) c
       }
     }
     const auto in_doubt = [&, id = self, is_world = object.lattice_is_world](const MeshPart& part) {
-      return std::any_of(objects.begin(), objects.end(), [&](const auto& other) {
-        return other.first != id && (!is_world || other.second.reach.Holds(part.index));
-      });
+      return HasIndex() && std::any_of(objects.begin(), objects.end(), [&](const auto& other) {
+               return other.first != id && (!is_world || other.second.reach.Holds(part.index));
+             });
     };
     const auto new_test = [&, id = self]() -> IsHidden {
       // Triangles beside each other are looked up in the same block.
@@ -197,7 +205,8 @@ void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) c
         return distance && *distance < -voxel;
       };
     };
-    HideTriangles(parts, in_doubt, new_test);
+    object.mesh.NoteChanges(HideTriangles(parts, in_doubt, new_test));
+    if (object.has_moved) object.mesh.NoteChanges(object.mesh.parts());
   }
 }
 
@@ -206,6 +215,28 @@ TriangleMesh LayeredMap::SceneMesh() const {
   std::vector<JoinedMesh> visible;
   for (const auto& [id, object] : meshes_) visible.push_back({&object.mesh, id, true});
   return Join(visible);
+}
+
+SceneChanges LayeredMap::TakeSceneChanges() const {
+  SceneChanges changes;
+  changes.work = UpdateMeshes();
+  std::vector<ScenePiece>& parts = changes.parts;
+  parts = std::exchange(gone_.parts, {});
+  const bool any_gone = !parts.empty();
+  for (auto& [id, object] : meshes_) {
+    std::vector<ScenePiece> more = TakeScenePieces(object.mesh, {&object.mesh, id, true});
+    std::move(more.begin(), more.end(), std::back_inserter(parts));
+  }
+  if (!any_gone) return changes;
+  // An object of the same id may have come since, to the same blocks: the last word counts.
+  const auto place = [](const ScenePiece& part) { return std::tie(part.id, part.block); };
+  std::stable_sort(parts.begin(), parts.end(),
+                   [&](const ScenePiece& a, const ScenePiece& b) { return place(a) < place(b); });
+  const auto last =
+      std::unique(parts.rbegin(), parts.rend(),
+                  [&](const ScenePiece& a, const ScenePiece& b) { return place(a) == place(b); });
+  parts.erase(parts.begin(), last.base());
+  return changes;
 }
 
 const TsdfGrid* LayeredMap::GridOf(InstanceId id) const {

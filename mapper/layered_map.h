@@ -14,6 +14,7 @@ class LayeredMap : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  SceneChanges TakeSceneChanges() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
   MeshWork UpdateMeshes() const override;
@@ -46,6 +47,8 @@ class LayeredMap : public MapRepresentation {
     }
   };
   virtual ActiveIds ActiveIn(const Index3& block) const = 0;
+  // Whether anybody is active anywhere, so that triangles may be hidden.
+  virtual bool HasIndex() const { return true; }
   // The active object of a global voxel, or kNoInstance.
   InstanceId ActiveAt(const Index3& voxel) const {
     const InstanceId* place = ActiveIn(BlockOf(voxel)).Place(PlaceInBlock(voxel));
@@ -86,7 +89,15 @@ class LayeredMap : public MapRepresentation {
   std::optional<BlocksAround> WhereVisibilityChanged() const;
   void FindHiddenTriangles(const std::optional<BlocksAround>& where) const;
 
+  // Shown parts of objects that are gone. A copy starts empty, as its meshes do.
+  struct GoneParts {
+    GoneParts() = default;
+    GoneParts(const GoneParts&) {}
+    std::vector<ScenePiece> parts;
+  };
+
   mutable std::map<InstanceId, PlacedMesh> meshes_;
+  mutable GoneParts gone_;
   mutable std::vector<Index3> index_changes_;  // since the last update
   mutable bool anything_may_be_hidden_ = true;
 };

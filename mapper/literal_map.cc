@@ -282,6 +282,11 @@ TriangleMesh LiteralMap::SceneMesh() const {
   return Join({{&active_.mesh}});
 }
 
+SceneChanges LiteralMap::TakeSceneChanges() const {
+  const MeshWork work = UpdateMeshes();
+  return {TakeScenePieces(active_.mesh, {&active_.mesh}), work};
+}
+
 const TsdfGrid* LiteralMap::GridOf(InstanceId id) const {
   const auto volume = volumes_.find(id);
   return volume == volumes_.end() ? nullptr : &volume->second.grid;

@@ -55,6 +55,42 @@ void GridMesh::Unsettle(MeshPart& part) {
 
 std::vector<MeshPart*> GridMesh::TakeUnsettled() { return std::exchange(unsettled_, {}); }
 
+void GridMesh::NoteChanges(const std::vector<MeshPart*>& parts) {
+  if (!is_followed_) return;
+  for (MeshPart* part : parts) {
+    if (!std::exchange(part->is_pending, true)) pending_.push_back(part);
+  }
+}
+
+GridMesh::Changes GridMesh::TakeChanges() {
+  if (!std::exchange(is_followed_, true)) return {order_, {}};
+  Changes changes;
+  for (const Index3& index : std::exchange(gone_, {})) {
+    // A block may be there again.
+    MeshPart* part = PartAt(index);
+    if (part == nullptr) {
+      changes.gone.push_back(index);
+      continue;
+    }
+    part->is_shown = true;
+    NoteChanges({part});
+  }
+  changes.parts = std::exchange(pending_, {});
+  for (MeshPart* part : changes.parts) part->is_pending = false;
+  std::sort(changes.parts.begin(), changes.parts.end(),
+            [](const MeshPart* a, const MeshPart* b) { return a->index < b->index; });
+  std::sort(changes.gone.begin(), changes.gone.end());
+  return changes;
+}
+
+std::vector<Index3> GridMesh::ShownBlocks() const {
+  std::vector<Index3> blocks = gone_;
+  for (const MeshPart* part : order_) {
+    if (part->is_shown) blocks.push_back(part->index);
+  }
+  return blocks;
+}
+
 MeshPart* GridMesh::PartAt(const Index3& block) const {
   const std::uint64_t key = PackIndex(block);
   const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
@@ -72,7 +108,7 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   const auto& entries = grid.entries();
   std::size_t same = 0;
   while (same < owned_.size() && same < entries.size() &&
-         owned_[same]->index == entries[same].index) {
+         owned_index_[same] == entries[same].index) {
     ++same;
   }
   if (same == owned_.size() && same == entries.size()) return 0;
@@ -84,14 +120,16 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   };
   std::vector<Spare> spares;
   for (std::size_t i = same; i < owned_.size(); ++i) {
-    const std::uint64_t key = PackIndex(owned_[i]->index);
+    const std::uint64_t key = PackIndex(owned_index_[i]);
     spares.push_back({key, std::move(owned_[i])});
   }
   std::sort(spares.begin(), spares.end(),
             [](const Spare& a, const Spare& b) { return a.key < b.key; });
   owned_.resize(entries.size());
+  owned_index_.resize(entries.size());
   ForEachInParallel(entries.size() - same, [&](std::size_t k) {
     const Index3& index = entries[same + k].index;
+    owned_index_[same + k] = index;
     const std::uint64_t key = PackIndex(index);
     const auto spare =
         std::lower_bound(spares.begin(), spares.end(), key,
@@ -114,6 +152,7 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
     if (spare.part == nullptr) continue;
     ++erased;
     changed_.push_back(spare.part->index);
+    if (spare.part->is_shown) gone_.push_back(spare.part->index);
     for (MeshPart* part : spare.part->around) {
       if (part == nullptr || part->revision == kGone) continue;
       Mark(part, kCubes, cubes_todo_);
@@ -122,7 +161,9 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   }
 
   if (erased > 0) {
-    std::erase_if(unsettled_, [](const MeshPart* part) { return part->revision == kGone; });
+    for (Parts* list : {&unsettled_, &pending_}) {
+      std::erase_if(*list, [](const MeshPart* part) { return part->revision == kGone; });
+    }
   }
 
   std::vector<std::pair<std::uint64_t, MeshPart*>> sorted(owned_.size());
@@ -256,9 +297,11 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
 }
 
 std::size_t GridMesh::Bytes() const {
-  std::size_t bytes = order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
-                      (remade_.capacity() + unsettled_.capacity()) * sizeof(MeshPart*) +
-                      changed_.capacity() * sizeof(Index3) + owned_.capacity() * sizeof(owned_[0]);
+  std::size_t bytes =
+      order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
+      (remade_.capacity() + unsettled_.capacity() + pending_.capacity()) * sizeof(MeshPart*) +
+      (changed_.capacity() + gone_.capacity()) * sizeof(Index3) +
+      owned_.capacity() * (sizeof(owned_[0]) + sizeof(Index3));
   for (const MeshPart* part : order_) {
     bytes += sizeof(MeshPart) + part->positions.capacity() * sizeof(part->positions[0]) +
              part->colours.capacity() * sizeof(part->colours[0]) +

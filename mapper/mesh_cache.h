@@ -49,6 +49,19 @@ class GridMesh {
   // scene adds to them is to be found again, and noted by `is_settled`.
   std::vector<MeshPart*> TakeUnsettled();
 
+  // For somebody who follows the scene: notes that parts look different now, or where they are is
+  // different. Costs nothing until changes were taken once.
+  void NoteChanges(const std::vector<MeshPart*>& parts);
+  // The parts noted since the last time, all the first time, in Index3's order, and the blocks of
+  // those that were shown and are no more. The caller keeps MeshPart::is_shown.
+  struct Changes {
+    std::vector<MeshPart*> parts;
+    std::vector<Index3> gone;
+  };
+  Changes TakeChanges();
+  // The blocks of which the follower has triangles, those that are gone among them.
+  std::vector<Index3> ShownBlocks() const;
+
   // The part of a block, nullptr where there is none.
   MeshPart* PartAt(const Index3& block) const;
 
@@ -67,6 +80,7 @@ class GridMesh {
   void Unsettle(MeshPart& part);
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i
+  std::vector<Index3> owned_index_;               // of owned_
   Parts order_;
   std::vector<std::uint64_t> keys_;  // PackIndex of order_
   Parts cubes_todo_;
@@ -76,6 +90,9 @@ class GridMesh {
   Parts remade_;
   Parts unsettled_;
   std::vector<Index3> changed_;
+  bool is_followed_ = false;
+  Parts pending_;
+  std::vector<Index3> gone_;  // shown when they were erased
 };
 
 }  // namespace tsdfpp

@@ -36,7 +36,9 @@ struct MeshPart {
   bool any_negative = false;
 
   // What the scene adds (mapper/scene_parts.h).
-  bool is_settled = true;  // `face_ids` and `hidden` belong to triangles and values as they are
+  bool is_settled = true;   // `face_ids` and `hidden` belong to triangles and values as they are
+  bool is_pending = false;  // somebody who follows the scene has not been told how it is now
+  bool is_shown = false;    // somebody who follows the scene has triangles of it
   std::vector<Eigen::Vector3f> placed;  // in the world; empty where the lattice is the world's
   std::vector<InstanceId> face_ids;     // labels of the triangles, of one field
   std::vector<std::uint8_t> hidden;     // 1 for triangles that are not visible; empty where all are

@@ -3,8 +3,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <cmath>
-#include <cstring>
+#include <algorithm>
+#include <utility>
 
 #include "mapper/mesh_tools.h"
 #include "mapper/object_volume.h"
@@ -135,7 +135,70 @@ void WriteTriangles(const Piece& piece, TriangleMesh& mesh) {
   }
 }
 
+// The part's triangles with vertices of their own, in the order in which they are named.
+TriangleMesh MeshAlone(const MeshPart& part, const JoinedMesh& of) {
+  constexpr std::uint32_t kNotYet = ~0U;
+  thread_local std::vector<std::uint32_t> number(std::size_t{8} << kLocalVertexBits, kNotYet);
+  TriangleMesh mesh;
+  const std::size_t visible = of.visible_only ? VisibleTriangles(part) : part.triangles.size();
+  if (visible == 0) return mesh;
+  // A closed surface has half as many vertices as triangles; a part has a border.
+  mesh.vertices.reserve(visible / 2 + 64);
+  mesh.colours.reserve(visible / 2 + 64);
+  mesh.triangles.reserve(visible);
+  mesh.face_ids.reserve(visible);
+  const CornersOf position(part);
+  const bool all = visible == part.triangles.size();
+  for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+    if (!all && part.hidden[t] != 0) continue;
+    std::array<std::uint32_t, 3> corners{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint16_t name = part.triangles[t][i];
+      std::uint32_t& vertex = number[name];
+      if (vertex == kNotYet) {
+        vertex = static_cast<std::uint32_t>(mesh.vertices.size());
+        const MeshPart& near = *part.around[UpperPlace(name >> kLocalVertexBits)];
+        mesh.vertices.push_back(position(name));
+        mesh.colours.push_back(near.colours[name & kLocalVertexMask]);
+      }
+      corners[i] = vertex;
+    }
+    mesh.triangles.push_back(corners);
+    mesh.face_ids.push_back(of.id != kNoInstance ? of.id : part.face_ids[t]);
+  }
+  for (const auto& triangle : part.triangles) {
+    for (const std::uint16_t name : triangle) number[name] = kNotYet;
+  }
+  return mesh;
+}
+
 }  // namespace
+
+std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of) {
+  const GridMesh::Changes changes = mesh.TakeChanges();
+  std::vector<ScenePiece> parts(changes.parts.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, parts.size(), kPartsPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          parts[i] = {of.id, changes.parts[i]->index, MeshAlone(*changes.parts[i], of)};
+        }
+      },
+      tbb::simple_partitioner());
+  // Nobody needs to hear of what was empty and is.
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const bool shows = !parts[i].mesh.triangles.empty();
+    if (!std::exchange(changes.parts[i]->is_shown, shows) && !shows) continue;
+    if (kept != i) parts[kept] = std::move(parts[i]);
+    ++kept;
+  }
+  parts.resize(kept);
+  for (const Index3& block : changes.gone) parts.push_back({of.id, block, {}});
+  std::sort(parts.begin(), parts.end(),
+            [](const ScenePiece& a, const ScenePiece& b) { return a.block < b.block; });
+  return parts;
+}
 
 MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now,
                             bool is_world_now) {
@@ -261,7 +324,9 @@ bool BlocksAround::Meets(const BlockBox& box) const {
 }
 
 void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels) {
-  ForEachPart(mesh.TakeUnsettled(), [&](MeshPart& part) {
+  const std::vector<MeshPart*> unsettled = mesh.TakeUnsettled();
+  mesh.NoteChanges(unsettled);
+  ForEachPart(unsettled, [&](MeshPart& part) {
     part.is_settled = true;
     part.face_ids.resize(part.triangles.size());
     if (part.triangles.empty()) return;
@@ -275,9 +340,9 @@ void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels
   });
 }
 
-void HideTriangles(const std::vector<MeshPart*>& parts,
-                   const std::function<bool(const MeshPart&)>& in_doubt,
-                   const std::function<IsHidden()>& new_test) {
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
+                                     const std::function<bool(const MeshPart&)>& in_doubt,
+                                     const std::function<IsHidden()>& new_test) {
   // Vertices are named by the triangles of the part and of the lower ones around it: where these
   // are others, or others are hidden, the part's vertices are numbered again.
   constexpr std::uint32_t kNamesChanged = 1;
@@ -300,9 +365,11 @@ void HideTriangles(const std::vector<MeshPart*>& parts,
     part.hidden.assign(hidden.begin(), hidden.end());
     part.todo = kNamesChanged;
   });
+  std::vector<MeshPart*> changed;
   std::vector<MeshPart*> to_name;
   for (MeshPart* part : parts) {
     if ((part->todo & kNamesChanged) == 0) continue;
+    changed.push_back(part);
     for (std::size_t which = 0; which < 8; ++which) {
       MeshPart* named = part->around[UpperPlace(which)];
       if (named == nullptr || (named->todo & kToBeNamed) != 0) continue;
@@ -315,6 +382,7 @@ void HideTriangles(const std::vector<MeshPart*>& parts,
     part.todo = 0;
     RenameVertices(part);
   });
+  return changed;
 }
 
 TriangleMesh Join(const std::vector<JoinedMesh>& meshes) {

@@ -11,6 +11,21 @@
 
 namespace tsdfpp {
 
+// What one block of one volume adds to the visible scene.
+struct ScenePiece {
+  InstanceId id = kNoInstance;  // of the volume; kNoInstance where the map has one field for all
+  Index3 block;                 // of the volume's lattice
+  // In the world, with face_ids, the triangles of the cubes that the block's voxels name and the
+  // vertices that they use. Vertices at a border are in the parts on both sides.
+  TriangleMesh mesh;
+};
+
+// What changed of the visible scene (MapRepresentation::TakeSceneChanges).
+struct SceneChanges {
+  std::vector<ScenePiece> parts;
+  MeshWork work;  // of bringing the kept meshes up to date
+};
+
 // Blocks of a lattice, both ends included.
 struct BlockBox {
   Index3 low;
@@ -71,9 +86,11 @@ using IsHidden =
 
 // Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names,
 // by a test of their own each; no others are.
-void HideTriangles(const std::vector<MeshPart*>& parts,
-                   const std::function<bool(const MeshPart&)>& in_doubt,
-                   const std::function<IsHidden()>& new_test);
+// Returns the parts of which other triangles are visible than before, or whose triangles were made
+// again.
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
+                                     const std::function<bool(const MeshPart&)>& in_doubt,
+                                     const std::function<IsHidden()>& new_test);
 
 // Labels the triangles of the parts whose values changed by what labels of each part's own say of
 // the voxels nearest to their centroids in the lattice; `voxel` in metres.
@@ -85,6 +102,10 @@ struct JoinedMesh {
   InstanceId id = kNoInstance;  // of all its faces; kNoInstance: those of its parts, where labelled
   bool visible_only = false;    // as HideTriangles found
 };
+
+// What changed of a mesh since this was last asked of it, everything the first time: by block, the
+// parts that are no longer there among them, without triangles. They have the id of `of`.
+std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of);
 
 // The meshes one after the other, block after block; vertices that no triangle names are left out.
 TriangleMesh Join(const std::vector<JoinedMesh>& meshes);
