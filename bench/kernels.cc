@@ -42,9 +42,8 @@ void BlocksAlongRays(benchmark::State& state) {
   const Frame frame = WallAndBox();
   const FrameView view(frame, frame.mask);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(tsdfpp::BlocksAlongRays(
-        view, PaperConfig(), [](InstanceId) { return Pose::Identity(); },
-        [](InstanceId, const Index3&) { return false; }));
+    benchmark::DoNotOptimize(
+        tsdfpp::BlocksAlongRays(view, PaperConfig(), [](InstanceId) { return LatticeOfLabel(); }));
   }
 }
 BENCHMARK(BlocksAlongRays)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -25,11 +25,11 @@ struct SideBySideOptions {
 std::vector<std::string> CaseNames();
 
 // For each case: milliseconds a frame (median, 99th percentile, worst) of pose update and fusion of
-// each method, with given poses, and of integration with colour of Open3D's two volumes, each for
-// the numbers of threads; their ratio to the faster of Open3D's; and memory. Open3D runs in a
-// process of its own, once with OpenMP threads that sleep while they wait and once with threads
-// that spin; the faster counts. Errors: those of the source; kUsage for names that there are not;
-// kEnvironment where that process fails.
+// each method, with given poses, the median of fusion alone, and those of integration with colour
+// of Open3D's two volumes, each for the numbers of threads; their ratio to the faster of Open3D's;
+// and memory. Open3D runs in a process of its own, once with OpenMP threads that sleep while they
+// wait and once with threads that spin; the faster counts. Errors: those of the source; kUsage for
+// names that there are not; kEnvironment where that process fails.
 Expected<void> RunSideBySide(const SideBySideOptions& options);
 
 // What that process does: for each number of threads, a line with a volume's name, its bytes and

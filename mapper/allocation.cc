@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 #include "mapper/frame_kernels.h"
 
@@ -26,34 +27,34 @@ struct Found {
 // Remembers what was met lately, so that most repetitions are dropped before they are looked up.
 class RecentlyFound {
  public:
-  RecentlyFound() : slots_(kSlots) {}
-  bool Insert(const Found& found) {
-    Found& slot = slots_[((found.key + found.label) * 0x9E3779B97F4A7C15ULL) >> kShift];
-    if (slot == found) return false;
-    slot = found;
-    return true;
+  RecentlyFound() : slots_(kSlots, kNothing) {}
+  bool Insert(std::uint64_t key) {
+    return std::exchange(slots_[(key * 0x9E3779B97F4A7C15ULL) >> kShift], key) != key;
   }
 
  private:
   static constexpr unsigned kShift = 53;
   static constexpr std::size_t kSlots = 1U << (64U - kShift);
-  std::vector<Found> slots_;
+  static constexpr std::uint64_t kNothing = ~0ULL;  // no block's key
+  std::vector<std::uint64_t> slots_;
 };
 
 struct Lattice {
   Eigen::Matrix3d R_LC;
   Eigen::Vector3d camera_L;
+  const BlockDirectory* known = nullptr;
+  RecentlyFound recent;
 };
 
 // Collects the blocks along the rays of one thread's part of the image.
 class Collector {
  public:
   Collector(const FrameView& frame, const MapConfig& config,
-            const std::function<Pose(InstanceId)>& T_WL_of,
-            const std::function<bool(InstanceId, const Index3&)>& is_known)
+            const std::function<LatticeOfLabel(InstanceId)>& lattice_of,
+            const std::vector<double>& ray_x)
       : frame_(frame),
-        T_WL_of_(T_WL_of),
-        is_known_(is_known),
+        lattice_of_(lattice_of),
+        ray_x_(ray_x),
         inverse_voxel_(1.0 / config.voxel_m),
         front_(config.trunc_front_voxels * config.voxel_m),
         back_(config.trunc_back_voxels * config.voxel_m),
@@ -108,7 +109,7 @@ class Collector {
       lattice_ = &LatticeOf(label);
     }
     const Intrinsics& k = frame_.intrinsics;
-    Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0);
+    Eigen::Vector3d ray(ray_x_[static_cast<std::size_t>(u)], (v - k.cy) / k.fy, 1.0);
     const double length = ray.norm();
     const double range = depth * length;
     ray /= length;
@@ -126,25 +127,29 @@ class Collector {
     for (std::uint64_t last_key = ~0ULL; i < points; ++i) {
       if (keys_[i] == last_key) continue;
       last_key = keys_[i];
-      const Found found{label, last_key};
-      if (recent_.Insert(found) && !is_known_(label, UnpackIndex(last_key))) {
-        found_.push_back(found);
+      if (!lattice_->recent.Insert(last_key)) continue;
+      if (lattice_->known == nullptr ||
+          lattice_->known->Find(UnpackIndex(last_key)) == BlockDirectory::kNone) {
+        found_.push_back({label, last_key});
       }
     }
   }
 
-  const Lattice& LatticeOf(InstanceId label) {
+  Lattice& LatticeOf(InstanceId label) {
     const auto [at, added] = lattices_.try_emplace(label);
     if (added) {
-      const Pose T_LC = T_WL_of_(label).inverse() * frame_.T_WC;
-      at->second = {T_LC.linear(), T_LC.translation()};
+      const LatticeOfLabel of = lattice_of_(label);
+      const Pose T_LC = of.T_WL.inverse() * frame_.T_WC;
+      at->second.R_LC = T_LC.linear();
+      at->second.camera_L = T_LC.translation();
+      at->second.known = of.known;
     }
     return at->second;
   }
 
   const FrameView& frame_;
-  const std::function<Pose(InstanceId)>& T_WL_of_;
-  const std::function<bool(InstanceId, const Index3&)>& is_known_;
+  const std::function<LatticeOfLabel(InstanceId)>& lattice_of_;
+  const std::vector<double>& ray_x_;  // at depth 1, by column
   double inverse_voxel_;
   double front_;
   double back_;
@@ -154,24 +159,27 @@ class Collector {
   std::vector<std::uint64_t> keys_;     // of one ray
   std::map<InstanceId, Lattice> lattices_;
   InstanceId last_label_ = kNoInstance;
-  const Lattice* lattice_ = nullptr;
-  RecentlyFound recent_;
+  Lattice* lattice_ = nullptr;
   std::vector<Found> found_;
 };
 
 }  // namespace
 
 std::map<InstanceId, std::vector<Index3>> BlocksAlongRays(
-    const FrameView& frame, const MapConfig& config, const std::function<Pose(InstanceId)>& T_WL_of,
-    const std::function<bool(InstanceId, const Index3&)>& is_known) {
+    const FrameView& frame, const MapConfig& config,
+    const std::function<LatticeOfLabel(InstanceId)>& lattice_of) {
   const int rows = static_cast<int>(frame.tiles.size()) / frame.tiles_per_row;
   const int tasks = (rows + kTileRowsPerTask - 1) / kTileRowsPerTask;
   std::vector<std::vector<Found>> found(static_cast<std::size_t>(tasks));
+  std::vector<double> ray_x;
+  for (int u = 0; u < frame.width; ++u) {
+    ray_x.push_back((u - frame.intrinsics.cx) / frame.intrinsics.fx);
+  }
   tbb::parallel_for(
       tbb::blocked_range<int>(0, tasks, 1),
       [&](const tbb::blocked_range<int>& range) {
         for (int task = range.begin(); task != range.end(); ++task) {
-          Collector collector(frame, config, T_WL_of, is_known);
+          Collector collector(frame, config, lattice_of, ray_x);
           const int end = std::min(rows, (task + 1) * kTileRowsPerTask);
           for (int row = task * kTileRowsPerTask; row < end; ++row) {
             for (int column = 0; column < frame.tiles_per_row; ++column) {

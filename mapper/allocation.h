@@ -5,16 +5,22 @@
 #include <map>
 #include <vector>
 
+#include "mapper/block_directory.h"
 #include "mapper/map_config.h"
 #include "mapper/observation.h"
 
 namespace tsdfpp {
 
+// Where an object's blocks lie.
+struct LatticeOfLabel {
+  Pose T_WL = Pose::Identity();
+  const BlockDirectory* known = nullptr;  // the blocks that are there; nullptr where none is
+};
+
 // For each label in the frame, the blocks of that object's lattice along the pixels' rays, in the
-// order of Index3, but for those that `is_known`. `T_WL_of` gives the lattice of an object in the
-// world (the identity where it is the world's).
+// order of Index3, but for those that are known.
 std::map<InstanceId, std::vector<Index3>> BlocksAlongRays(
-    const FrameView& frame, const MapConfig& config, const std::function<Pose(InstanceId)>& T_WL_of,
-    const std::function<bool(InstanceId, const Index3&)>& is_known);
+    const FrameView& frame, const MapConfig& config,
+    const std::function<LatticeOfLabel(InstanceId)>& lattice_of);
 
 }  // namespace tsdfpp

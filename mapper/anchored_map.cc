@@ -17,7 +17,6 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 8;
-constexpr std::size_t kLookUpsPerTask = 512;
 
 }  // namespace
 
@@ -86,32 +85,12 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   }
   // Where one object alone is listed, its distances do not matter; where several are, they order
   // the list.
-  std::vector<std::uint8_t> shared(fused.size(), 0);
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, fused.size(), kLookUpsPerTask),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const FusedBlock& block = fused[i];
-          shared[i] = volumes_.at(block.id).lattice_is_world && Any(block.block->cover) &&
-                              MayListSeveral(block.index)
-                          ? 1
-                          : 0;
-        }
-      },
-      tbb::simple_partitioner());
-  for (std::size_t i = 0; i < fused.size(); ++i) {
-    if (shared[i] != 0) dirty_.push_back(fused[i].index);
+  for (const FusedBlock& block : fused) {
+    if (block.is_listed_with_others) dirty_.push_back(block.index);
   }
   freeing.FreeEmpty(fused, volumes_);
   RefreshIndex();
   CheckInDebugBuilds(*this);
-}
-
-// Of a block of the index that is not dirty; a dirty one is computed anew in any case.
-bool AnchoredMap::MayListSeveral(const Index3& index) const {
-  if (layers_ == 1) return true;  // the one that is listed does not tell
-  const IndexBlock* ids = index_.Find(index);
-  return ids != nullptr && ids->size() > kBlockVoxels;
 }
 
 void AnchoredMap::Remove(InstanceId id) {
@@ -182,13 +161,13 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
     InstanceId id;
     BlockMask cover;
     const float* distance;
-    const TsdfBlock* block;  // which the distances are still to be taken from
+    TsdfBlock* block;  // which the distances are still to be taken from
   };
   std::vector<Listed> listed;
   std::list<PulledCover> pulled;
   for (const Participants::Object& object : participants.objects) {
     if (!object.moved) {
-      const TsdfBlock* block = object.grid->Find(index);
+      TsdfBlock* block = object.grid->Find(index);
       if (block == nullptr || !Any(block->cover)) continue;
       listed.push_back({object.id, block->cover, nullptr, block});
       continue;
@@ -206,24 +185,18 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
   // No voxel lists more objects than the block has.
   const int layers = std::min(layers_, static_cast<int>(listed.size()));
-  const auto size = static_cast<std::size_t>(kBlockVoxels * layers);
-  if (ids.size() != size) {
-    ids = IndexBlock(size, kNoInstance);
-  } else {
-    std::fill(ids.begin(), ids.end(), kNoInstance);
+  for (const Listed& of : listed) {
+    if (of.block != nullptr) of.block->is_listed_with_others = listed.size() > 1;
   }
+  const auto size = static_cast<std::size_t>(kBlockVoxels * layers);
+  if (ids.size() != size) ids = IndexBlock(size);
   if (listed.size() == 1) {
-    int first = 0;
-    for (const std::uint64_t slice : listed[0].cover) {
-      for (unsigned k = 0; k < 64; ++k) {
-        if ((slice >> k & 1U) != 0) ids[static_cast<std::size_t>(first) + k] = listed[0].id;
-      }
-      first += 64;
-    }
+    ListAlone(listed[0].cover, listed[0].id, ids.data());
     return;
   }
+  std::fill(ids.begin(), ids.end(), kNoInstance);
   std::array<float, kMaxLayers * kBlockVoxels> distance;
-  distance.fill(std::numeric_limits<float>::infinity());
+  std::fill_n(distance.begin(), size, std::numeric_limits<float>::infinity());
   std::array<float, kBlockVoxels> of_block;
   for (const Listed& of : listed) {
     if (of.block != nullptr) ToFloats(of.block->distance.data(), kBlockVoxels, of_block.data());
@@ -232,10 +205,9 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
 }
 
-LayeredMap::ActiveIds AnchoredMap::ActiveIn(const Index3& block) const {
+const InstanceId* AnchoredMap::ActiveIn(const Index3& block) const {
   const IndexBlock* ids = index_.Find(block);
-  if (ids == nullptr || ids->empty()) return {};
-  return {ids->data(), 1};
+  return ids == nullptr || ids->empty() ? nullptr : ids->data();
 }
 
 MeshWork AnchoredMap::UpdateMeshes() const {
@@ -284,7 +256,7 @@ MapMemory AnchoredMap::Memory() const {
   for (const auto& entry : index_.entries()) {
     if (entry.block->empty()) continue;
     ++memory.blocks;
-    memory.bytes += entry.block->size() * sizeof(InstanceId);
+    memory.bytes += sizeof(IndexBlock) + entry.block->size() * sizeof(InstanceId);
   }
   memory.bytes += index_.TableBytes();
   return memory;

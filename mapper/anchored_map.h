@@ -28,7 +28,7 @@ class AnchoredMap final : public LayeredMap {
   Expected<void> Load(const Sections& sections) override;
 
  protected:
-  ActiveIds ActiveIn(const Index3& block) const override;
+  const InstanceId* ActiveIn(const Index3& block) const override;
 
  private:
   // Entry k of the list of voxel i at [k * kBlockVoxels + i], active first, kNoInstance where
@@ -40,7 +40,6 @@ class AnchoredMap final : public LayeredMap {
   // a function of volumes and poses.
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
-  bool MayListSeveral(const Index3& index) const;
   void ComputeBlock(const Index3& index, const Participants& participants, IndexBlock& ids) const;
 
   int layers_;

@@ -116,6 +116,9 @@ class BlockGrid {
     entries_.resize(kept);
   }
 
+  // Where the blocks are in entries().
+  const BlockDirectory& directory() const { return directory_; }
+
   // In the order of insertion.
   const std::vector<Entry>& entries() const { return entries_; }
   std::size_t size() const { return entries_.size(); }

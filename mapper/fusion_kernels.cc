@@ -18,10 +18,18 @@
 namespace tsdfpp {
 namespace {
 
-// table[pixel], `kLanes` at a time, where these are to be looked at. Plain loads: from a frame,
-// which no cache holds, gathers took longer.
+// One load after the other: from a frame, which no cache holds, gathers took longer, and so did
+// what GCC made of the loops by itself.
+#if defined(__GNUC__) && !defined(__clang__)
+#define TSDFPP_PLAIN_LOADS __attribute__((noinline, optimize("no-tree-slp-vectorize")))
+#else
+#define TSDFPP_PLAIN_LOADS
+#endif
+
+// table[pixel], `kLanes` at a time, where these are to be looked at.
 template <std::size_t kLanes, typename From, typename To>
-void Read(const From* table, const Lanes& pixel, const std::uint8_t* look, To* out) {
+TSDFPP_PLAIN_LOADS void Read(const From* table, const Lanes& pixel, const std::uint8_t* look,
+                             To* out) {
   for (std::size_t i = 0; i < kBlockVoxels; i += kLanes) {
     if (look[i] == 0) continue;
     for (std::size_t k = i; k < i + kLanes; ++k) out[k] = table[pixel[k]];
@@ -74,8 +82,8 @@ struct Projected {
 constexpr std::size_t kLanes = hn::MaxLanes(Floats());
 
 // False where none is to be looked at.
-bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock* next,
-             Projected& out) {
+template <bool kAllInView>
+bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
   const Floats df;
   const Ints di;
   std::array<float, 12> m;
@@ -110,10 +118,6 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
                             hn::Set(df, m[10] * pz)};
     for (std::size_t k = 0; k < kSlice; k += hn::Lanes(df)) {
       const std::size_t i = kSlice * z + k;
-      if (next != nullptr) {
-        if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
-        if (k == 0 && next->full[z] != ~0ULL) hwy::Prefetch(&next->weight[i]);
-      }
       const auto row = [&](std::size_t r) {
         const auto fixed =
             hn::Add(hn::Add(hn::Load(df, &y_term[r][k]), z_term[r]), hn::Set(df, m[4 * r + 3]));
@@ -127,21 +131,34 @@ bool Project(const KernelFrame& frame, const BlockPlace& place, const TsdfBlock*
       const auto v = hn::Add(hn::Add(hn::Mul(hn::Mul(fy, cam_y), iz), cy), half);
       const auto ray = hn::Sqrt(
           hn::Add(hn::Add(hn::Mul(cam_x, cam_x), hn::Mul(cam_y, cam_y)), hn::Mul(cam_z, cam_z)));
-      const auto in_view = hn::And(hn::And(hn::Ge(cam_z, hn::Set(df, kNearest_m)),
-                                           hn::And(hn::Ge(u, zero), hn::Lt(u, width))),
-                                   hn::And(hn::Ge(v, zero), hn::Lt(v, height)));
-      // Non-negative here, so truncation is the floor.
-      const auto column = hn::ConvertTo(di, hn::IfThenElseZero(in_view, u));
-      const auto line = hn::ConvertTo(di, hn::IfThenElseZero(in_view, v));
-      hn::Store(hn::Add(hn::Mul(line, stride), column), di, &out.pixel[i]);
-      hn::Store(hn::IfThenElse(in_view, cam_z, far_away), df, &out.z[i]);
       hn::Store(hn::Mul(ray, iz), df, &out.scale[i]);
-      const auto look = hn::And(in_view, hn::Le(cam_z, behind));
+      auto look = hn::Le(cam_z, behind);
+      // Non-negative in view, so truncation is the floor.
+      const auto store = [&](auto seen_u, auto seen_v, auto seen_z) {
+        const auto line = hn::Mul(hn::ConvertTo(di, seen_v), stride);
+        hn::Store(hn::Add(line, hn::ConvertTo(di, seen_u)), di, &out.pixel[i]);
+        hn::Store(seen_z, df, &out.z[i]);
+      };
+      if constexpr (kAllInView) {
+        store(u, v, cam_z);
+      } else {
+        const auto in_view = hn::And(hn::And(hn::Ge(cam_z, hn::Set(df, kNearest_m)),
+                                             hn::And(hn::Ge(u, zero), hn::Lt(u, width))),
+                                     hn::And(hn::Ge(v, zero), hn::Lt(v, height)));
+        store(hn::IfThenElseZero(in_view, u), hn::IfThenElseZero(in_view, v),
+              hn::IfThenElse(in_view, cam_z, far_away));
+        look = hn::And(in_view, look);
+      }
       out.look[i] = hn::AllFalse(df, look) ? 0 : 1;
       any = hn::Or(any, look);
     }
   }
   return !hn::AllFalse(df, any);
+}
+
+bool Project(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
+  return place.all_in_view ? ProjectWith<true>(frame, place, out)
+                           : ProjectWith<false>(frame, place, out);
 }
 
 // s of the lanes i ... and whether they are observed, labels apart: s >= -back.
@@ -165,7 +182,7 @@ Measured<V> Measure(const Projected& projected, const float* depth_of, std::size
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
   Projected projected;
-  if (!Project(frame, place, nullptr, projected)) return false;
+  if (!Project(frame, place, projected)) return false;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
@@ -266,7 +283,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
                       TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
   FusionResult result;
   Projected projected;
-  if (!Project(frame, place, next, projected)) return result;
+  if (!Project(frame, place, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
@@ -296,14 +313,25 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   HWY_ALIGN auto observed = std::bit_cast<Bytes>(block.observed);
   HWY_ALIGN auto negative = std::bit_cast<Bytes>(block.negative);
   HWY_ALIGN auto band = std::bit_cast<Bytes>(block.band);
-  HWY_ALIGN auto coloured = std::bit_cast<Bytes>(block.coloured);
   HWY_ALIGN auto full = std::bit_cast<Bytes>(block.full);
   HWY_ALIGN Bytes in_band{};
   HWY_ALIGN Bytes to_colour{};
   HWY_ALIGN Bytes cleared{};
   bool any_coloured = false;
   bool any_cleared = false;
+  if (next != nullptr) {
+    hwy::Prefetch(&next->observed);
+    hwy::Prefetch(&next->negative);
+    hwy::Prefetch(&next->band);
+    hwy::Prefetch(&next->cover);
+    hwy::Prefetch(&next->full);
+  }
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    // A line at a time: many at once would wait for each other.
+    if (next != nullptr) {
+      if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
+      if (i % 64 == 32) hwy::Prefetch(&next->weight[i]);
+    }
     if (projected.look[i] == 0) continue;
     const auto measured = Measure(projected, depth.data(), i, minus_back);
     const auto s = measured.s;
@@ -347,12 +375,15 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     if constexpr (kLabels == Labels::kEvery) {
       if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
     }
-    const auto has_colour = MaskAt(df, coloured.data(), i);
-    const auto colours = hn::And(
-        near, hn::Le(hn::Abs(s), hn::IfThenElse(has_colour, colour_band, first_colour_band)));
+    auto may_colour = first_colour_band;
+    if (block.colours != nullptr && !hn::AllFalse(df, near)) {
+      const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &block.colours->count[i]));
+      const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
+      may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
+    }
+    const auto colours = hn::And(near, hn::Le(hn::Abs(s), may_colour));
     if (!hn::AllFalse(df, colours)) {
       PutBits(df, colours, i, to_colour.data());
-      PutBits(df, hn::Or(has_colour, colours), i, coloured.data());
       if (block.colours != nullptr) {
         for (const auto& channel : block.colours->channel) hwy::Prefetch(&channel[i]);
         hwy::Prefetch(&block.colours->count[i]);
@@ -392,9 +423,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     for (int i = 0; i < kBlockVoxels; ++i) {
       if (Bit(places, i)) block.SetColour(static_cast<std::size_t>(i), {}, 0);
     }
-    for (std::size_t k = 0; k < cleared.size(); ++k) {
-      coloured[k] = static_cast<std::uint8_t>(coloured[k] & ~cleared[k]);
-    }
+    block.FreeColoursIfNone();
   }
   if (!result.changed) return result;
   result.in_band = std::bit_cast<BlockMask>(in_band);
@@ -407,8 +436,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto new_band = std::bit_cast<BlockMask>(band);
   result.changed_band = block.band != new_band;
   block.band = new_band;
-  block.coloured = std::bit_cast<BlockMask>(coloured);
-  if (any_cleared && !Any(block.coloured)) block.colours.reset();
   return result;
 }
 

@@ -36,6 +36,7 @@ struct BlockPlace {
   Index3 first;                 // the block's lowest voxel
   // p_C.z from which on a voxel is certainly farther behind what is seen than the back band.
   float behind_m = std::numeric_limits<float>::infinity();
+  bool all_in_view = false;  // it is known that every voxel falls on a pixel
 };
 
 // Projects the voxels of a block and reads what the frame has there. False where no voxel is

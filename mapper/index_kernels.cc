@@ -1,7 +1,5 @@
 #include "mapper/index_kernels.h"
 
-#include <bit>
-
 // One pass of this file an instruction set (see fusion_kernels.cc).
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "mapper/index_kernels.cc"
@@ -20,33 +18,41 @@ using Ints = hn::CappedTag<std::int32_t, 16>;
 using Shorts = hn::Rebind<std::uint16_t, Ints>;
 using Floats = hn::Rebind<float, Ints>;
 
-VotesCounted Votes(const BlockMask& votes, InstanceId id, int confidence_cap, ListEntry* active) {
-  static_assert(sizeof(ListEntry) == 4 && std::endian::native == std::endian::little);
-  const Ints di;
+VotesCounted Votes(const BlockMask& votes, InstanceId id, int confidence_cap,
+                   const InstanceId* active, std::uint8_t* confidences) {
+  const hn::CappedTag<std::int16_t, 32> d;
+  const hn::Rebind<std::uint8_t, decltype(d)> d8;
   const auto* bits = reinterpret_cast<const std::uint8_t*>(votes.data());
   VotesCounted counted;
   auto* other_bits = reinterpret_cast<std::uint8_t*>(counted.others.data());
   auto* saturated_bits = reinterpret_cast<std::uint8_t*>(counted.saturated.data());
-  const auto wanted = hn::Set(di, id);
-  const auto cap = hn::Set(di, confidence_cap);
-  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(di)) {
-    const auto voting = MaskAt(di, bits, i);
-    if (hn::AllFalse(di, voting)) continue;
-    auto* entries = reinterpret_cast<std::int32_t*>(active + i);
-    const auto entry = hn::LoadU(di, entries);
-    const auto same = hn::Eq(hn::And(entry, hn::Set(di, 0xFFFF)), wanted);
-    const auto below = hn::Lt(hn::ShiftRight<16>(entry), cap);
-    const auto raised = hn::And(voting, hn::And(same, below));
-    if (!hn::AllFalse(di, raised)) {  // else the memory need not be written
-      const auto more = hn::Add(entry, hn::Set(di, 1 << 16));
-      hn::StoreU(hn::IfThenElse(raised, more, entry), di, entries);
+  const auto wanted = hn::Set(d, static_cast<std::int16_t>(id));
+  const auto cap = hn::Set(d, static_cast<std::int16_t>(confidence_cap));
+  const auto one = hn::Set(d, 1);
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(d)) {
+    const auto voting = MaskAt(d, bits, i);
+    if (hn::AllFalse(d, voting)) continue;
+    const auto ids = hn::LoadU(d, reinterpret_cast<const std::int16_t*>(active + i));
+    const auto confidence = hn::PromoteTo(d, hn::LoadU(d8, confidences + i));
+    const auto same = hn::Eq(ids, wanted);
+    const auto raised = hn::And(voting, hn::And(same, hn::Lt(confidence, cap)));
+    const auto more = hn::Add(confidence, one);
+    if (!hn::AllFalse(d, raised)) {  // else the memory need not be written
+      hn::StoreU(hn::DemoteTo(d8, hn::IfThenElse(raised, more, confidence)), d8, confidences + i);
     }
-    PutBits(di, hn::AndNot(same, voting), i, other_bits);
-    const auto full =
-        hn::Gt(hn::Add(hn::ShiftRight<16>(entry), hn::Set(di, 1)), hn::Sub(cap, hn::Set(di, 1)));
-    PutBits(di, hn::And(voting, hn::And(same, full)), i, saturated_bits);
+    PutBits(d, hn::AndNot(same, voting), i, other_bits);
+    PutBits(d, hn::And(voting, hn::And(same, hn::Gt(more, hn::Sub(cap, one)))), i, saturated_bits);
   }
   return counted;
+}
+
+void Alone(const BlockMask& covered, InstanceId id, InstanceId* ids) {
+  const hn::CappedTag<std::uint16_t, 32> d;
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(covered.data());
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(d)) {
+    const auto listed = hn::IfThenElse(MaskAt(d, bits, i), hn::Set(d, id), hn::Set(d, kNoInstance));
+    hn::StoreU(listed, d, ids + i);
+  }
 }
 
 void Insert(const BlockMask& covered, const float* distance, InstanceId id,
@@ -83,11 +89,16 @@ HWY_AFTER_NAMESPACE();
 namespace tsdfpp {
 
 HWY_EXPORT(Votes);
+HWY_EXPORT(Alone);
 HWY_EXPORT(Insert);
 
 VotesCounted VoteForActive(const BlockMask& votes, InstanceId id, int confidence_cap,
-                           ListEntry* active) {
-  return HWY_DYNAMIC_DISPATCH(Votes)(votes, id, confidence_cap, active);
+                           const InstanceId* active, std::uint8_t* confidences) {
+  return HWY_DYNAMIC_DISPATCH(Votes)(votes, id, confidence_cap, active, confidences);
+}
+
+void ListAlone(const BlockMask& covered, InstanceId id, InstanceId* ids) {
+  HWY_DYNAMIC_DISPATCH(Alone)(covered, id, ids);
 }
 
 void InsertByDistance(const BlockMask& covered, const float* distance, InstanceId id,

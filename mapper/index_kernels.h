@@ -12,10 +12,13 @@ struct VotesCounted {
   BlockMask saturated{};  // marked voxels where the confidence is now at the cap
 };
 
-// One vote for `id` at each voxel that `votes` marks and whose entry in `active` (kBlockVoxels of
+// One vote for `id` at each voxel that `votes` marks and whose id in `active` (kBlockVoxels of
 // them) is `id`: its confidence grows by one, up to the cap.
 VotesCounted VoteForActive(const BlockMask& votes, InstanceId id, int confidence_cap,
-                           ListEntry* active);
+                           const InstanceId* active, std::uint8_t* confidences);
+
+// Lists of the object alone where `covered` marks a voxel, empty ones elsewhere.
+void ListAlone(const BlockMask& covered, InstanceId id, InstanceId* ids);
 
 // The lists of a block while they are ordered: entry k of voxel i at [k * kBlockVoxels + i], the
 // distance being infinite where there is no entry.

@@ -16,7 +16,8 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 64;
-constexpr std::size_t kCoversPerTask = 16;
+constexpr std::size_t kCoversPerTask = 64;
+constexpr std::size_t kCoversAhead = 3;  // more than a few do not stay in the cache
 
 }  // namespace
 
@@ -53,12 +54,6 @@ std::vector<InstanceId> LayeredMap::Objects() const {
     if (!volume.grid.empty()) ids.push_back(id);
   }
   return ids;
-}
-
-void LayeredMap::PlaceLattice(ObjectVolume& volume) {
-  volume.lattice_is_world = !volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, *volume.T_WO);
-  volume.T_WL =
-      volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
 }
 
 Pose LayeredMap::ObjectLattice(InstanceId id) const {
@@ -189,7 +184,7 @@ void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) c
       // Triangles beside each other are looked up in the same block.
       struct Last {
         Index3 block;
-        ActiveIds ids;
+        const InstanceId* ids = nullptr;
         bool is_known = false;
       };
       return [&, id, last = Last{}](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
@@ -199,9 +194,9 @@ void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) c
         const Index3 v = NearestVoxel(outwards, voxel);
         const Index3 block = BlockOf(v);
         if (!last.is_known || block != last.block) last = {block, ActiveIn(block), true};
-        const InstanceId* place = last.ids.Place(PlaceInBlock(v));
-        if (place == nullptr || *place == kNoInstance || *place == id) return false;
-        const auto distance = distance_at(*place, v);
+        const InstanceId active = last.ids == nullptr ? kNoInstance : last.ids[PlaceInBlock(v)];
+        if (active == kNoInstance || active == id) return false;
+        const auto distance = distance_at(active, v);
         return distance && *distance < -voxel;
       };
     };
@@ -300,12 +295,16 @@ std::vector<BlockMask> LayeredMap::NewCovers(const std::vector<StaleCover>& stal
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, stale.size(), kCoversPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        std::array<Surroundings, kCoversPerTask> around;
+        // What is found is fetched while the ones before are worked on.
+        std::array<Surroundings, kCoversAhead> around;
+        const auto find = [&](std::size_t i) {
+          if (i >= range.end()) return;
+          around[i % kCoversAhead] = FindSurroundings(*stale[i].grid, stale[i].index);
+        };
+        for (std::size_t i = range.begin(); i < range.begin() + kCoversAhead; ++i) find(i);
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          around[i - range.begin()] = FindSurroundings(*stale[i].grid, stale[i].index);
-        }
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          covers[i] = CoverOf(around[i - range.begin()]);
+          covers[i] = CoverOf(around[i % kCoversAhead]);
+          find(i + kCoversAhead);
         }
       },
       tbb::simple_partitioner());

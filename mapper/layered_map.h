@@ -35,24 +35,15 @@ class LayeredMap : public MapRepresentation {
   explicit LayeredMap(const MapConfig& config) : config_(config) {}
   LayeredMap(const LayeredMap&) = default;
 
-  // The active objects of a block of the global index, kNoInstance where there is none: that of the
-  // i-th voxel is first[i * stride]. `first` is nullptr where nothing is listed.
-  struct ActiveIds {
-    const InstanceId* first = nullptr;
-    std::size_t stride = 0;
-
-    // Where the voxel's is, nullptr where nothing is listed.
-    const InstanceId* Place(int place) const {
-      return first == nullptr ? nullptr : first + static_cast<std::size_t>(place) * stride;
-    }
-  };
-  virtual ActiveIds ActiveIn(const Index3& block) const = 0;
+  // The active objects of the kBlockVoxels voxels of a block of the global index, kNoInstance where
+  // there is none; nullptr where nothing is listed in the block.
+  virtual const InstanceId* ActiveIn(const Index3& block) const = 0;
   // Whether anybody is active anywhere, so that triangles may be hidden.
   virtual bool HasIndex() const { return true; }
   // The active object of a global voxel, or kNoInstance.
   InstanceId ActiveAt(const Index3& voxel) const {
-    const InstanceId* place = ActiveIn(BlockOf(voxel)).Place(PlaceInBlock(voxel));
-    return place == nullptr ? kNoInstance : *place;
+    const InstanceId* ids = ActiveIn(BlockOf(voxel));
+    return ids == nullptr ? kNoInstance : ids[PlaceInBlock(voxel)];
   }
 
   // Tells the visible scene that other objects may be active in this block of the index than were.
@@ -69,10 +60,6 @@ class LayeredMap : public MapRepresentation {
   std::vector<StaleCover> StaleCovers(const std::vector<FusedBlock>& fused) const;
   // The covers as they are now, one for each of these; their blocks still hold the old ones.
   static std::vector<BlockMask> NewCovers(const std::vector<StaleCover>& stale);
-
-  // Where the lattice of a volume that stays in its object's frame is, from the poses at birth and
-  // now.
-  static void PlaceLattice(ObjectVolume& volume);
 
   MapMemory VolumeMemory() const;
   // FindFault() of the volumes; adds their blocks to `blocks`. Covers are those of volumes whose

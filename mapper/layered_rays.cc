@@ -153,14 +153,14 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
       // in the same block.
       looked_up.clear();
       Index3 block;
-      ActiveIds ids = ActiveIn(block);
+      const InstanceId* ids = ActiveIn(block);
       for (const HiddenQuery& query : queries) {
         const Index3 v = NearestVoxel(query.look_up_W, voxel_m);
         if (BlockOf(v) != block) {
           block = BlockOf(v);
           ids = ActiveIn(block);
         }
-        const InstanceId* place = ids.Place(PlaceInBlock(v));
+        const InstanceId* place = ids == nullptr ? nullptr : ids + PlaceInBlock(v);
         __builtin_prefetch(place);
         looked_up.push_back({v, place});
       }

@@ -31,12 +31,11 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   active_.is_current = false;
   const FrameView view(frame, labels);
-  const auto world = [](InstanceId) { return Pose::Identity(); };
-  const auto is_known = [&](InstanceId, const Index3& index) {
-    return lists_.Find(index) != nullptr;
+  const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
+    return {Pose::Identity(), &lists_.directory()};
   };
   const std::size_t blocks_before = lists_.size();
-  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
+  for (const auto& [id, indices] : BlocksAlongRays(view, config_, lattice_of)) {
     for (const Index3& index : indices) lists_.FindOrAdd(index);
   }
   const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
@@ -49,7 +48,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   for (const PlannedBlock& planned :
        PlanBlocks(view, sorted.size(), config_.voxel(), config_.back(), candidate_at)) {
     const auto* entry = sorted[planned.number];
-    tasks.push_back({entry->index, entry->block.get(), planned.behind_m, {}});
+    tasks.push_back({entry->index, entry->block.get(), planned, {}});
   }
   const auto for_each_task = [&](const auto& function) {
     tbb::parallel_for(
@@ -71,7 +70,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
 
 void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
   BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.behind_m);
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const std::int32_t pixel = observation.pixel[i];
@@ -95,7 +94,7 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
 void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW,
                             const Task& task) {
   BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.behind_m);
+  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
   const auto weight_cap = static_cast<float>(config_.weight_cap);
   for (auto& [id, volume] : volumes_) {

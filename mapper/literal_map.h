@@ -63,7 +63,7 @@ class LiteralMap final : public MapRepresentation {
   struct Task {
     Index3 index;
     ListBlock* lists = nullptr;
-    float behind_m = 0;               // see BlockPlace
+    PlannedBlock planned;
     std::vector<InstanceId> targets;  // objects that take an observation here, increasing
   };
 

@@ -76,7 +76,7 @@ Expected<void> MapConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("trunc_back_voxels", trunc_back_voxels, 1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("layers", layers, 0, kMaxLayers));
   TSDFPP_RETURN_IF_ERROR(InRange("weight_cap", weight_cap, 1, 255));
-  TSDFPP_RETURN_IF_ERROR(InRange("confidence_cap", confidence_cap, 1, 10000));
+  TSDFPP_RETURN_IF_ERROR(InRange("confidence_cap", confidence_cap, 1, kMostConfidence));
   TSDFPP_RETURN_IF_ERROR(InRange("moved_confidence", moved_confidence, 1, confidence_cap));
   return {};
 }

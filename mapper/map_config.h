@@ -42,7 +42,7 @@ struct MapConfig {
   double trunc_back_voxels = 3;    // B / h
   int layers = 0;                  // K; 0 is the method's own default (LayersOf)
   int weight_cap = 50;             // observations after which a voxel forgets (docs/map.md)
-  int confidence_cap = 10;         // votes at which a listing saturates
+  int confidence_cap = 10;         // votes at which a listing saturates, at most 255
   int moved_confidence = 1;        // of an object in a voxel that it was moved to; up to the cap
   bool contradiction = true;  // tsdf++ and anchored: pixels of others clear what o wrongly claims
   bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped

@@ -180,7 +180,6 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
       const bool right = Bit(block->observed, place) == observed &&
                          Bit(block->negative, place) == negative &&
                          Bit(block->band, place) == (negative && distance >= -config.back()) &&
-                         Bit(block->coloured, place) == (block->ColourCount(i) > 0) &&
                          (!Bit(block->full, place) || block->weight[i] == config.weight_cap);
       if (!right) return fmt::format("{}: the masks of voxel {} are wrong", name, Text(voxel));
       const Eigen::Vector3d q(voxel.x, voxel.y, voxel.z);
@@ -259,24 +258,23 @@ Fault TsdfppMap::FindFault() const {
   if (Fault fault = FindCountFault(*this, blocks)) return fault;
   for (const auto& [index, lists] : index_.entries()) {
     if (IsEmpty(*lists)) return fmt::format("block {} of the index is empty", Text(index));
-    if (lists->entries.size() % kBlockVoxels != 0 ||
-        lists->entries.size() > static_cast<std::size_t>(kBlockVoxels * layers_)) {
-      return fmt::format("block {} of the index has {} listings", Text(index),
-                         lists->entries.size());
+    if (lists->ids.size() % kBlockVoxels != 0 || lists->confidences.size() != lists->ids.size() ||
+        lists->ids.size() > static_cast<std::size_t>(kBlockVoxels * layers_)) {
+      return fmt::format("block {} of the index has {} listings", Text(index), lists->ids.size());
     }
     ListBlock shortest = *lists;
     FreeEmptyLayers(shortest);
-    if (shortest.entries.size() != lists->entries.size()) {
+    if (shortest.ids.size() != lists->ids.size()) {
       return fmt::format("block {} of the index has a layer that lists nothing", Text(index));
     }
-    for (std::size_t i = kBlockVoxels; i < lists->entries.size(); ++i) {
-      const InstanceId before = lists->entries[i - kBlockVoxels].id;
-      if (before == kNoInstance && lists->entries[i].id != kNoInstance) {
+    for (std::size_t i = kBlockVoxels; i < lists->ids.size(); ++i) {
+      const InstanceId before = lists->ids[i - kBlockVoxels];
+      if (before == kNoInstance && lists->ids[i] != kNoInstance) {
         return fmt::format("a list in block {} of the index has a gap", Text(index));
       }
     }
     for (int place = 0; place < kBlockVoxels; ++place) {
-      const ListEntry& active = lists->entries[At(place)];
+      const ListEntry active = lists->At(At(place));
       // A vote there would be passed over.
       if (Bit(lists->settled, place) &&
           (active.id != lists->settled_id || active.confidence < config_.confidence_cap)) {

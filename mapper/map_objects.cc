@@ -1,5 +1,7 @@
 #include "mapper/map_objects.h"
 
+#include <algorithm>
+
 #include "mapper/anchored_map.h"
 #include "mapper/literal_map.h"
 #include "mapper/map_invariants.h"
@@ -86,9 +88,7 @@ Expected<void> TsdfppMap::Rename(InstanceId from, InstanceId to) {
   for (const auto& entry : volumes_.at(to).grid.entries()) {
     ListBlock* lists = Any(entry.block->cover) ? index_.Find(entry.index) : nullptr;
     if (lists == nullptr) continue;
-    for (ListEntry& listing : lists->entries) {
-      if (listing.id == from) listing.id = to;
-    }
+    std::replace(lists->ids.begin(), lists->ids.end(), from, to);
     if (lists->settled_id == from) lists->settled_id = to;
   }
   CheckInDebugBuilds(*this);

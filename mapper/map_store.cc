@@ -89,8 +89,8 @@ void TsdfppMap::Save(Sections& sections) const {
   LayeredMap::Save(sections);
   std::vector<ListsOfBlock> lists;
   for (const auto* entry : index_.Sorted()) {
-    std::vector<ListEntry> entries = entry->block->entries;
-    entries.resize(static_cast<std::size_t>(kBlockVoxels * layers_));
+    std::vector<ListEntry> entries(static_cast<std::size_t>(kBlockVoxels * layers_));
+    for (std::size_t i = 0; i < entry->block->ids.size(); ++i) entries[i] = entry->block->At(i);
     lists.push_back({entry->index, Transposed(entries, static_cast<std::size_t>(layers_))});
   }
   SaveLists(lists, layers_, sections[kLists]);
@@ -115,7 +115,12 @@ Expected<void> TsdfppMap::Load(const Sections& sections) {
   for (const ListsOfBlock& block : lists) {
     TSDFPP_RETURN_IF_ERROR(CheckListings(block, layers_, covers));
     ListBlock& added = ListsOf(block.index);
-    added.entries = Transposed(block.entries, kBlockVoxels);
+    added.Resize(static_cast<std::size_t>(layers_));
+    const std::vector<ListEntry> entries = Transposed(block.entries, kBlockVoxels);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      added.ids[i] = entries[i].id;
+      added.confidences[i] = static_cast<std::uint8_t>(entries[i].confidence);
+    }
     FreeEmptyLayers(added);
   }
   return {};

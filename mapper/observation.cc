@@ -113,6 +113,7 @@ struct Verdict {
   std::uint32_t bin = kNotSeen;
   InstanceId label = kNoInstance;
   float behind_m = std::numeric_limits<float>::infinity();
+  bool all_in_view = false;
 };
 
 Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, float back) {
@@ -127,6 +128,10 @@ Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, 
         extent.v.low > static_cast<float>(frame.height) + kSlack_px) {
       return verdict;
     }
+    verdict.all_in_view = extent.z.low - slack_m >= kNearest_m && extent.u.low >= kSlack_px &&
+                          extent.v.low >= kSlack_px &&
+                          extent.u.high <= static_cast<float>(frame.width - 1) - kSlack_px &&
+                          extent.v.high <= static_cast<float>(frame.height - 1) - kSlack_px;
     const Tile seen = TilesUnder(frame, extent);
     // Along the ray what is behind is at least as far behind as along the axis.
     verdict.behind_m = seen.farthest + back + slack_m;
@@ -214,18 +219,19 @@ std::vector<PlannedBlock> PlanBlocks(
   for (std::size_t i = 0; i < count; ++i) {
     const Verdict& verdict = verdicts[i];
     if (verdict.bin == kNotSeen) continue;
-    planned[first[verdict.bin]++] = {static_cast<std::uint32_t>(i), verdict.label,
-                                     verdict.behind_m};
+    planned[first[verdict.bin]++] = {static_cast<std::uint32_t>(i), verdict.label, verdict.behind_m,
+                                     verdict.all_in_view};
   }
   return planned;
 }
 
 BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel,
-                   float behind_m) {
+                   const PlannedBlock& planned) {
   return {T_CL.rows[0].data(),
           voxel,
           {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide},
-          behind_m};
+          planned.behind_m,
+          planned.all_in_view};
 }
 
 }  // namespace tsdfpp

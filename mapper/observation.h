@@ -57,7 +57,8 @@ struct PlannedBlock {
   // The one label of all pixels that the block's voxels can fall on, kNoInstance where there may be
   // several.
   InstanceId label = kNoInstance;
-  float behind_m = 0;  // see BlockPlace
+  float behind_m = 0;        // see BlockPlace
+  bool all_in_view = false;  // see BlockPlace
 };
 
 // The candidates i of [0, count), given by `candidate_at(i)`, of which the frame may observe a
@@ -68,7 +69,8 @@ std::vector<PlannedBlock> PlanBlocks(
     const FrameView& frame, std::size_t count, float voxel, float back,
     const std::function<BlockCandidate(std::size_t)>& candidate_at);
 
-// The block as the kernels take it; `T_CL` must outlive the result.
-BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel, float behind_m);
+// A planned block as the kernels take it; `T_CL` must outlive the result.
+BlockPlace PlaceOf(const CameraFromLattice& T_CL, const Index3& block, float voxel,
+                   const PlannedBlock& planned);
 
 }  // namespace tsdfpp

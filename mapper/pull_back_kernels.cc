@@ -9,6 +9,9 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/half_lanes-inl.h"
+#include "mapper/mask_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace tsdfpp::HWY_NAMESPACE {
 namespace {
@@ -90,15 +93,16 @@ V Trilinear8(D d, const std::array<V, 8>& c, V fx, V fy, V fz) {
 }
 
 template <bool kOnlyCounted>
-void Interpolate(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+void Interpolate(const PatchValues& values, const PulledPoints& points, const BlockMask& wanted,
                  float* out) {
   const hn::ScalableTag<float> df;
   const hn::RebindToSigned<decltype(df)> di;
   using V = hn::VFromD<decltype(df)>;
   const V zero = hn::Zero(df);
   const V one = hn::Set(df, 1.0F);
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(wanted.data());
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
-    if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
+    if (hn::AllFalse(df, MaskAt(df, bits, i))) continue;
     const auto at = hn::LoadU(di, &points.corner[i]);
     const V fx = hn::LoadU(df, &points.fraction[0][i]);
     const V fy = hn::LoadU(df, &points.fraction[1][i]);
@@ -120,11 +124,11 @@ void Interpolate(const PatchValues& values, const PulledPoints& points, const st
   }
 }
 
-void Counted(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+void Counted(const PatchValues& values, const PulledPoints& points, const BlockMask& wanted,
              float* out) {
   Interpolate<true>(values, points, wanted, out);
 }
-void All(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+void All(const PatchValues& values, const PulledPoints& points, const BlockMask& wanted,
          float* out) {
   Interpolate<false>(values, points, wanted, out);
 }
@@ -141,13 +145,14 @@ V Coefficient(D d, std::size_t corner, const std::array<V, 3>& upper) {
   return coefficient;
 }
 
-void Observed(const PatchValues& values, const PulledPoints& points, const std::int32_t* wanted,
+void Observed(const PatchValues& values, const PulledPoints& points, const BlockMask& wanted,
               float* out) {
   const hn::ScalableTag<float> df;
   const hn::RebindToSigned<decltype(df)> di;
   using V = hn::VFromD<decltype(df)>;
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(wanted.data());
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
-    if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
+    if (hn::AllFalse(df, MaskAt(df, bits, i))) continue;
     const auto at = hn::LoadU(di, &points.corner[i]);
     std::array<V, 3> upper;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -169,15 +174,19 @@ void Observed(const PatchValues& values, const PulledPoints& points, const std::
 }
 
 void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
-             const PulledPoints& points, const std::int32_t* wanted,
-             const std::array<std::uint16_t*, 3>& out, float* totals) {
+             const PulledPoints& points, const BlockMask& wanted, const float* points_count,
+             BlockColours& colours) {
   const hn::ScalableTag<float> df;
   const hn::RebindToSigned<decltype(df)> di;
   const hn::Rebind<std::uint16_t, decltype(df)> du;
+  const hn::Rebind<std::uint8_t, decltype(df)> d8;
   using V = hn::VFromD<decltype(df)>;
   const V zero = hn::Zero(df);
+  const V half = hn::Set(df, 0.5F);
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(wanted.data());
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
-    if (hn::AllTrue(di, hn::Eq(hn::LoadU(di, wanted + i), hn::Zero(di)))) continue;
+    const auto take = MaskAt(df, bits, i);
+    if (hn::AllFalse(df, take)) continue;
     const auto at = hn::LoadU(di, &points.corner[i]);
     std::array<V, 3> upper;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -188,6 +197,7 @@ void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& coun
     for (std::size_t k = 0; k < 8; ++k) {
       // Unobserved corners are NaN, in every channel.
       const auto coloured = hn::Gt(hn::GatherIndex(df, count.data() + kCorner[k], at), zero);
+      if (hn::AllFalse(df, coloured)) continue;
       const V coefficient = hn::IfThenElseZero(coloured, Coefficient(df, k, upper));
       total = hn::Add(total, coefficient);
       for (std::size_t channel = 0; channel < 3; ++channel) {
@@ -196,13 +206,49 @@ void Colours(const std::array<PatchValues, 3>& channels, const PatchValues& coun
             hn::Add(sum[channel], hn::Mul(coefficient, hn::IfThenElseZero(coloured, level)));
       }
     }
-    hn::StoreU(total, df, totals + i);
-    const auto any = hn::Gt(total, zero);
+    const auto has = hn::And(take, hn::Gt(total, zero));
+    const auto counted = hn::IfThenElseZero(has, hn::LoadU(df, points_count + i));
+    const auto rounded = hn::ConvertTo(di, hn::Add(counted, half));
+    hn::StoreU(hn::DemoteTo(d8, rounded), d8, &colours.count[i]);
+    const auto is_coloured = hn::RebindMask(df, hn::Gt(rounded, hn::Zero(di)));
     for (std::size_t channel = 0; channel < 3; ++channel) {
-      const V mean = hn::Add(hn::Div(sum[channel], total), hn::Set(df, 0.5F));
-      hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElseZero(any, mean))), du,
-                 out[channel] + i);
+      const V mean = hn::Add(hn::Div(sum[channel], total), half);
+      hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, hn::IfThenElseZero(is_coloured, mean))), du,
+                 &colours.channel[channel][i]);
     }
+  }
+}
+
+BlockMask Cover(const BlockMask& wanted, const BlockMask& in_crossed, const float* distance,
+                float back) {
+  const hn::ScalableTag<float> df;
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(wanted.data());
+  const auto* crossed = reinterpret_cast<const std::uint8_t*>(in_crossed.data());
+  BlockMask covered{};
+  auto* covered_bits = reinterpret_cast<std::uint8_t*>(covered.data());
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    const auto take = MaskAt(df, bits, i);
+    if (hn::AllFalse(df, take)) continue;
+    const auto d = hn::LoadU(df, distance + i);
+    const auto in_band = hn::And(hn::Lt(d, hn::Zero(df)), hn::Ge(d, hn::Set(df, -back)));
+    const auto at_surface = hn::And(MaskAt(df, crossed, i), hn::Eq(d, d));
+    PutBits(df, hn::And(take, hn::Or(in_band, at_surface)), i, covered_bits);
+  }
+  return covered;
+}
+
+void Put(const BlockMask& wanted, const float* distance, const float* weight, TsdfBlock& block) {
+  const hn::CappedTag<float, 16> df;
+  const hn::RebindToSigned<decltype(df)> di;
+  const hn::Rebind<std::uint8_t, decltype(df)> d8;
+  const auto* bits = reinterpret_cast<const std::uint8_t*>(wanted.data());
+  for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
+    const auto take = MaskAt(df, bits, i);
+    const auto d = hn::IfThenElseZero(take, hn::LoadU(df, distance + i));
+    StoreHalves(df, RoundLanesToHalf(df, d), &block.distance[i]);
+    const auto w = hn::Add(hn::LoadU(df, weight + i), hn::Set(df, 0.5F));
+    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, hn::IfThenElseZero(take, w))), d8,
+               &block.weight[i]);
   }
 }
 
@@ -218,6 +264,8 @@ HWY_EXPORT(Counted);
 HWY_EXPORT(All);
 HWY_EXPORT(Observed);
 HWY_EXPORT(Colours);
+HWY_EXPORT(Cover);
+HWY_EXPORT(Put);
 
 void PullBackPoints(const std::array<double, 12>& T, double voxel_m, const Index3& first,
                     PulledPoints& points) {
@@ -225,24 +273,34 @@ void PullBackPoints(const std::array<double, 12>& T, double voxel_m, const Index
 }
 
 void InterpolateCounted(const PatchValues& values, const PulledPoints& points,
-                        const std::int32_t* wanted, float* out) {
+                        const BlockMask& wanted, float* out) {
   HWY_DYNAMIC_DISPATCH(Counted)(values, points, wanted, out);
 }
 
-void InterpolateAll(const PatchValues& values, const PulledPoints& points,
-                    const std::int32_t* wanted, float* out) {
+void InterpolateAll(const PatchValues& values, const PulledPoints& points, const BlockMask& wanted,
+                    float* out) {
   HWY_DYNAMIC_DISPATCH(All)(values, points, wanted, out);
 }
 
 void InterpolateObserved(const PatchValues& values, const PulledPoints& points,
-                         const std::int32_t* wanted, float* out) {
+                         const BlockMask& wanted, float* out) {
   HWY_DYNAMIC_DISPATCH(Observed)(values, points, wanted, out);
 }
 
-void InterpolateColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
-                        const PulledPoints& points, const std::int32_t* wanted,
-                        const std::array<std::uint16_t*, 3>& out, float* total) {
-  HWY_DYNAMIC_DISPATCH(Colours)(channels, count, points, wanted, out, total);
+BlockMask Covered(const BlockMask& wanted, const BlockMask& in_crossed, const float* distance,
+                  float back) {
+  return HWY_DYNAMIC_DISPATCH(Cover)(wanted, in_crossed, distance, back);
+}
+
+void PutValues(const BlockMask& wanted, const float* distance, const float* weight,
+               TsdfBlock& block) {
+  HWY_DYNAMIC_DISPATCH(Put)(wanted, distance, weight, block);
+}
+
+void PutColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
+                const PulledPoints& points, const BlockMask& wanted, const float* points_count,
+                BlockColours& colours) {
+  HWY_DYNAMIC_DISPATCH(Colours)(channels, count, points, wanted, points_count, colours);
 }
 
 }  // namespace tsdfpp

@@ -34,12 +34,11 @@ std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
 
 void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
-  const auto world = [](InstanceId) { return Pose::Identity(); };
-  const auto is_known = [&](InstanceId, const Index3& index) {
-    return field_.Find(index) != nullptr;
+  const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
+    return {Pose::Identity(), &field_.directory()};
   };
   const std::size_t blocks_before = field_.size();
-  for (const auto& [id, indices] : BlocksAlongRays(view, config_, world, is_known)) {
+  for (const auto& [id, indices] : BlocksAlongRays(view, config_, lattice_of)) {
     for (const Index3& index : indices) {
       field_.FindOrAdd(index);
       labels_.FindOrAdd(index);
@@ -58,8 +57,8 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
           const auto& [index, block] = blocks[planned[k].number];
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : blocks[planned[k + 1].number].block.get();
-          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel(), planned[k].behind_m),
-                    planned[k].label, next, *block, *labels_.Find(index));
+          FuseBlock(view, PlaceOf(T_CW, index, config_.voxel(), planned[k]), planned[k].label, next,
+                    *block, *labels_.Find(index));
         }
       },
       tbb::simple_partitioner());

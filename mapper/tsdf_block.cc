@@ -74,13 +74,8 @@ bool TsdfBlock::UpdateMasks(float back) {
     observed[z] = o;
     negative[z] = n & o;
     band[z] = b & n & o;
-    std::uint64_t with_colour = 0;
-    for (std::size_t i = 0; i < 64 && colours != nullptr; ++i) {
-      with_colour |= static_cast<std::uint64_t>(colours->count[64 * z + i] > 0) << i;
-    }
-    coloured[z] = with_colour;
   }
-  if (!Any(coloured)) colours.reset();
+  FreeColoursIfNone();
   return observed != old_observed || negative != old_negative || band != old_band;
 }
 

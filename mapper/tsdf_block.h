@@ -7,6 +7,7 @@
 
 #include "core/types.h"
 #include "mapper/block_grid.h"
+#include "mapper/block_pool.h"
 #include "mapper/half.h"
 
 namespace tsdfpp {
@@ -39,7 +40,16 @@ std::uint64_t NewRevision();
 struct alignas(64) BlockColours {
   std::array<std::array<std::uint16_t, kBlockVoxels>, 3> channel{};  // 8.8 fixed point
   std::array<std::uint8_t, kBlockVoxels> count{};
+
+  static void* operator new(std::size_t);
+  static void operator delete(void* block);
 };
+inline void* BlockColours::operator new(std::size_t) {
+  return ObjectPool<sizeof(BlockColours), alignof(BlockColours)>::Take();
+}
+inline void BlockColours::operator delete(void* block) {
+  ObjectPool<sizeof(BlockColours), alignof(BlockColours)>::Give(block);
+}
 
 // A unique_ptr that copies what it points at.
 template <typename T>
@@ -60,20 +70,28 @@ class Copied : public std::unique_ptr<T> {
 struct alignas(64) TsdfBlock {
   std::array<Half, kBlockVoxels> distance{};        // metres, positive in front of the surface
   std::array<std::uint8_t, kBlockVoxels> weight{};  // observations; 0 is unobserved
-  // Only while a voxel has a colour: most blocks lie too far from a surface.
-  Copied<BlockColours> colours;
 
+  // Each fills a cache line.
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
-  BlockMask coloured{};  // the number of colours is above 0
   BlockMask full{};      // of these it is known that the weight is at its cap
+
+  // Only while a voxel has a colour: most blocks lie too far from a surface.
+  Copied<BlockColours> colours;
 
   // Names the values: blocks of the same revision hold the same ones, 0 is an empty block. Whoever
   // changes values gives the block a new one (UpdateMasks does), which is how the cached meshes see
   // it.
   std::uint64_t revision = 0;
+
+  // Kept by AnchoredMap where the object's lattice is the world's: other objects are listed in the
+  // index's block as well.
+  bool is_listed_with_others = false;
+
+  static void* operator new(std::size_t);
+  static void operator delete(void* block);
 
   // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
   // true where one of observed, negative and band changed. `back` in metres. Frees the colours
@@ -102,6 +120,11 @@ struct alignas(64) TsdfBlock {
     for (std::size_t c = 0; c < 3; ++c) into.channel[c][i] = fixed[c];
     into.count[i] = static_cast<std::uint8_t>(count);
   }
+  void FreeColoursIfNone() {
+    if (colours == nullptr) return;
+    const auto& count = colours->count;
+    if (std::all_of(count.begin(), count.end(), [](auto n) { return n == 0; })) colours.reset();
+  }
   std::size_t Bytes() const {
     return sizeof(TsdfBlock) + (colours == nullptr ? 0 : sizeof(BlockColours));
   }
@@ -113,6 +136,13 @@ struct alignas(64) TsdfBlock {
     return static_cast<std::uint8_t>(std::min(255, (fixed + 128) >> 8));
   }
 };
+
+inline void* TsdfBlock::operator new(std::size_t) {
+  return ObjectPool<sizeof(TsdfBlock), alignof(TsdfBlock)>::Take();
+}
+inline void TsdfBlock::operator delete(void* block) {
+  ObjectPool<sizeof(TsdfBlock), alignof(TsdfBlock)>::Give(block);
+}
 
 using TsdfGrid = BlockGrid<TsdfBlock>;
 

@@ -151,35 +151,45 @@ std::unique_ptr<MapRepresentation> TsdfppMap::Clone() const {
 
 TsdfppMap::ListBlock& TsdfppMap::ListsOf(const Index3& block) {
   ListBlock& lists = index_.FindOrAdd(block);
-  if (lists.entries.empty()) lists.entries.resize(kBlockVoxels);
+  if (lists.ids.empty()) lists.Resize(1);
   return lists;
 }
 
 VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) {
   lists.settled[static_cast<std::size_t>(place >> 6)] &=
       ~(1ULL << static_cast<unsigned>(place & 63));
-  const auto layers = static_cast<int>(lists.entries.size() / kBlockVoxels);
-  return {&lists.entries[static_cast<std::size_t>(place)], layers, kBlockVoxels};
+  const auto at = static_cast<std::size_t>(place);
+  return {&lists.ids[at], &lists.confidences[at], static_cast<int>(lists.layers()), kBlockVoxels};
 }
 
 VoxelList TsdfppMap::ListWithRoom(ListBlock& lists, int place) const {
-  const std::size_t size = lists.entries.size();
-  const std::size_t last = size - kBlockVoxels + static_cast<std::size_t>(place);
-  if (lists.entries[last].id != kNoInstance &&
-      size < static_cast<std::size_t>(kBlockVoxels * layers_)) {
-    lists.entries.reserve(size + kBlockVoxels);  // no more than that
-    lists.entries.resize(size + kBlockVoxels);
+  const std::size_t layers = lists.layers();
+  const std::size_t last = (layers - 1) * kBlockVoxels + static_cast<std::size_t>(place);
+  if (lists.ids[last] != kNoInstance && layers < static_cast<std::size_t>(layers_)) {
+    lists.Resize(layers + 1);
   }
   return ListOf(lists, place);
 }
 
 void TsdfppMap::FreeEmptyLayers(ListBlock& lists) {
-  const auto is_free = [](const ListEntry& entry) { return entry.id == kNoInstance; };
-  while (lists.entries.size() > kBlockVoxels &&
-         std::all_of(lists.entries.end() - kBlockVoxels, lists.entries.end(), is_free)) {
-    lists.entries.resize(lists.entries.size() - kBlockVoxels);
-    lists.entries.shrink_to_fit();
-  }
+  std::size_t layers = lists.layers();
+  const auto lists_nothing = [&](std::size_t layer) {
+    const auto first = lists.ids.begin() + static_cast<std::ptrdiff_t>(layer * kBlockVoxels);
+    return std::all_of(first, first + kBlockVoxels,
+                       [](InstanceId id) { return id == kNoInstance; });
+  };
+  while (layers > 1 && lists_nothing(layers - 1)) --layers;
+  if (layers != lists.layers()) lists.Resize(layers);
+}
+
+void TsdfppMap::ListBlock::Resize(std::size_t layers) {
+  const std::size_t size = layers * kBlockVoxels;
+  ids.reserve(size);
+  ids.resize(size, kNoInstance);
+  ids.shrink_to_fit();
+  confidences.reserve(size);
+  confidences.resize(size);
+  confidences.shrink_to_fit();
 }
 
 bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
@@ -191,7 +201,7 @@ bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
   if (!Any(votes)) return false;
   // Nearly every vote is for the active object.
   const VotesCounted counted =
-      VoteForActive(votes, id, config_.confidence_cap, lists.entries.data());
+      VoteForActive(votes, id, config_.confidence_cap, lists.ids.data(), lists.confidences.data());
   for (std::size_t z = 0; z < votes.size(); ++z) lists.settled[z] |= counted.saturated[z];
   ForEachVoxel(counted.others, [&](int place) {
     const bool is_listed = ListOf(lists, place).Lists(id);
@@ -228,9 +238,8 @@ std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
 }
 
 bool TsdfppMap::IsEmpty(const ListBlock& lists) {
-  const auto first = lists.entries.begin();
-  return std::all_of(first, first + kBlockVoxels,
-                     [](const ListEntry& active) { return active.id == kNoInstance; });
+  return std::all_of(lists.ids.begin(), lists.ids.begin() + kBlockVoxels,
+                     [](InstanceId active) { return active == kNoInstance; });
 }
 
 void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
@@ -249,15 +258,31 @@ void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
 
 void TsdfppMap::Activate(InstanceId id) {
   const TsdfGrid& grid = volumes_.at(id).grid;
-  for (const auto& entry : grid.entries()) {
+  const auto in_parallel = [&](const auto& function) {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, grid.size(), kBlocksPerTask),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
+        },
+        tbb::simple_partitioner());
+  };
+  in_parallel([&](std::size_t i) {
+    const TsdfGrid::Entry& entry = grid.entries()[i];
     entry.block->cover = FindCover(grid, entry.index);
+  });
+  std::vector<ListBlock*> lists(grid.size(), nullptr);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const TsdfGrid::Entry& entry = grid.entries()[i];
     if (!Any(entry.block->cover)) continue;
-    ListBlock& lists = ListsOf(entry.index);
+    lists[i] = &ListsOf(entry.index);
     NoteIndexChange(entry.index);
-    ForEachVoxel(entry.block->cover, [&](int place) {
-      ListWithRoom(lists, place).PushFront(id, config_.moved_confidence);
-    });
   }
+  in_parallel([&](std::size_t i) {
+    if (lists[i] == nullptr) return;
+    ForEachVoxel(grid.entries()[i].block->cover, [&](int place) {
+      ListWithRoom(*lists[i], place).PushFront(id, config_.moved_confidence);
+    });
+  });
 }
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
@@ -367,11 +392,9 @@ void TsdfppMap::Remove(InstanceId id) {
   CheckInDebugBuilds(*this);
 }
 
-LayeredMap::ActiveIds TsdfppMap::ActiveIn(const Index3& block) const {
+const InstanceId* TsdfppMap::ActiveIn(const Index3& block) const {
   const ListBlock* lists = index_.Find(block);
-  if (lists == nullptr || lists->entries.empty()) return {};
-  static_assert(sizeof(ListEntry) == 2 * sizeof(InstanceId) && offsetof(ListEntry, id) == 0);
-  return {&lists->entries.data()->id, 2};
+  return lists == nullptr || lists->ids.empty() ? nullptr : lists->ids.data();
 }
 
 std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
@@ -386,10 +409,10 @@ std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose
 std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
   std::vector<Listing> listings;
   const ListBlock* lists = index_.Find(BlockOf(ToIndex3(voxel)));
-  if (lists == nullptr || lists->entries.empty()) return listings;
+  if (lists == nullptr) return listings;
   const int place = PlaceInBlock(ToIndex3(voxel));
-  for (auto i = static_cast<std::size_t>(place); i < lists->entries.size(); i += kBlockVoxels) {
-    const ListEntry& entry = lists->entries[i];
+  for (auto i = static_cast<std::size_t>(place); i < lists->ids.size(); i += kBlockVoxels) {
+    const ListEntry entry = lists->At(i);
     if (entry.id == kNoInstance) break;
     listings.push_back({entry.id, entry.confidence});
   }
@@ -399,9 +422,9 @@ std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
 std::vector<Eigen::Vector3i> TsdfppMap::ListedVoxels() const {
   std::vector<Index3> voxels;
   for (const auto& entry : index_.entries()) {
-    for (int place = 0; place < kBlockVoxels && !entry.block->entries.empty(); ++place) {
-      const ListEntry& active = entry.block->entries[static_cast<std::size_t>(place)];
-      if (active.id != kNoInstance) voxels.push_back(VoxelAt(entry.index, place));
+    for (int place = 0; place < kBlockVoxels && !entry.block->ids.empty(); ++place) {
+      if (entry.block->ids[static_cast<std::size_t>(place)] != kNoInstance)
+        voxels.push_back(VoxelAt(entry.index, place));
     }
   }
   return SortedVoxels(std::move(voxels));
@@ -412,7 +435,8 @@ MapMemory TsdfppMap::Memory() const {
   memory.blocks += index_.size();
   memory.bytes += index_.TableBytes();
   for (const auto& entry : index_.entries()) {
-    memory.bytes += entry.block->entries.size() * sizeof(ListEntry);
+    memory.bytes +=
+        sizeof(ListBlock) + entry.block->ids.size() * (sizeof(InstanceId) + sizeof(std::uint8_t));
   }
   return memory;
 }

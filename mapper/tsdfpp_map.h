@@ -28,15 +28,21 @@ class TsdfppMap final : public LayeredMap {
   Expected<void> Load(const Sections& sections) override;
 
  protected:
-  ActiveIds ActiveIn(const Index3& block) const override;
+  const InstanceId* ActiveIn(const Index3& block) const override;
 
  private:
   struct ListBlock {
     // Entry k of the list of voxel i at [k * kBlockVoxels + i]; as many layers as its longest list.
-    std::vector<ListEntry> entries;
+    std::vector<InstanceId> ids;
+    std::vector<std::uint8_t> confidences;
     // Voxels where `settled_id` is active with full confidence, so that its votes change nothing.
     BlockMask settled{};
     InstanceId settled_id = kNoInstance;
+
+    std::size_t layers() const { return ids.size() / kBlockVoxels; }
+    // Takes no more room than that; new entries are empty.
+    void Resize(std::size_t layers);
+    ListEntry At(std::size_t i) const { return {ids[i], confidences[i]}; }
   };
   struct CoverChange;
   class Groups;

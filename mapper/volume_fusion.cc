@@ -11,15 +11,12 @@ namespace {
 constexpr std::size_t kBlocksPerTask = 16;
 
 void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolumes& volumes) {
-  const auto T_WL_of = [&](InstanceId id) {
+  const auto lattice_of = [&](InstanceId id) -> LatticeOfLabel {
     const auto volume = volumes.find(id);
-    return volume == volumes.end() ? Pose::Identity() : volume->second.T_WL;
+    if (volume == volumes.end()) return {};
+    return {volume->second.T_WL, &volume->second.grid.directory()};
   };
-  const auto is_known = [&](InstanceId id, const Index3& index) {
-    const auto volume = volumes.find(id);
-    return volume != volumes.end() && volume->second.grid.Find(index) != nullptr;
-  };
-  for (const auto& [id, indices] : BlocksAlongRays(frame, config, T_WL_of, is_known)) {
+  for (const auto& [id, indices] : BlocksAlongRays(frame, config, lattice_of)) {
     TsdfGrid& grid = volumes[id].grid;
     for (const Index3& index : indices) grid.FindOrAdd(index);
   }
@@ -90,13 +87,16 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           TsdfBlock& block = *of.entry->block;
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].entry->block.get();
-          const BlockPlace place =
-              PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k].behind_m);
+          const BlockPlace place = PlaceOf(*of.T_CL, of.entry->index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();
-          fused[k] = {of.id, of.entry->index, &block, result.in_band,
-                      AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U)};
+          fused[k] = {of.id,
+                      of.entry->index,
+                      &block,
+                      result.in_band,
+                      AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U),
+                      block.is_listed_with_others};
         }
       },
       tbb::simple_partitioner());

@@ -41,6 +41,7 @@ struct FusedBlock {
   BlockMask votes{};  // voxels with an observation of this object in band
   // The 27 blocks around (bit 9 z + 3 y + x, this one in the middle) whose cover may have changed.
   std::uint32_t touched = 0;
+  bool is_listed_with_others = false;  // of the block
 };
 
 // Allocates the blocks of the labels in the frame (making volumes for new labels), fuses, applies

@@ -12,33 +12,36 @@ namespace tsdfpp {
 
 inline constexpr int kMaxLayers = 8;
 
+inline constexpr int kMostConfidence = 255;
+
 struct ListEntry {
   InstanceId id = kNoInstance;
   std::int16_t confidence = 0;
 };
 
-// A view of K stored entries, `stride` apart; the used ones come first.
+// A view of K stored entries, `stride` apart; the used ones come first. Confidences are at most
+// kMostConfidence.
 class VoxelList {
  public:
-  VoxelList(ListEntry* entries, int layers, int stride)
-      : entries_(entries), layers_(layers), stride_(stride) {
-    while (size_ < layers_ && At(size_).id != kNoInstance) ++size_;
+  VoxelList(InstanceId* ids, std::uint8_t* confidences, int layers, int stride)
+      : ids_(ids), confidences_(confidences), layers_(layers), stride_(stride) {
+    while (size_ < layers_ && IdAt(size_) != kNoInstance) ++size_;
   }
 
   int size() const { return size_; }
 
   bool Lists(InstanceId id) const {
     for (int i = 0; i < size_; ++i) {
-      if (At(i).id == id) return true;
+      if (IdAt(i) == id) return true;
     }
     return false;
   }
 
   void Remove(InstanceId id) {
     for (int i = 0; i < size_; ++i) {
-      if (At(i).id != id) continue;
-      for (int k = i; k + 1 < size_; ++k) At(k) = At(k + 1);
-      At(--size_) = {};
+      if (IdAt(i) != id) continue;
+      for (int k = i; k + 1 < size_; ++k) Set(k, At(k + 1));
+      Set(--size_, {});
       return;
     }
   }
@@ -53,14 +56,13 @@ class VoxelList {
       PushFront(id, 1);
       return;
     }
-    ListEntry& active = At(0);
-    if (active.id == id) {
-      if (active.confidence < confidence_cap) ++active.confidence;
+    std::uint8_t& confidence = *confidences_;
+    if (IdAt(0) == id) {
+      if (confidence < confidence_cap) ++confidence;
       return;
     }
-    --active.confidence;
-    if (active.confidence <= 0) {
-      active.confidence = 0;
+    if (confidence > 0) --confidence;
+    if (confidence == 0) {
       Remove(id);
       PushFront(id, 1);
     } else if (!Lists(id)) {
@@ -69,7 +71,13 @@ class VoxelList {
   }
 
  private:
-  ListEntry& At(int i) const { return entries_[static_cast<std::ptrdiff_t>(i) * stride_]; }
+  std::ptrdiff_t Place(int i) const { return static_cast<std::ptrdiff_t>(i) * stride_; }
+  InstanceId IdAt(int i) const { return ids_[Place(i)]; }
+  ListEntry At(int i) const { return {IdAt(i), confidences_[Place(i)]}; }
+  void Set(int i, const ListEntry& entry) {
+    ids_[Place(i)] = entry.id;
+    confidences_[Place(i)] = static_cast<std::uint8_t>(entry.confidence);
+  }
 
   void Insert(int at, InstanceId id, int confidence) {
     std::array<ListEntry, kMaxLayers + 1> longer{};
@@ -86,7 +94,7 @@ class VoxelList {
       }
       --count;
     }
-    for (int i = 0; i < count; ++i) At(i) = longer[static_cast<std::size_t>(i)];
+    for (int i = 0; i < count; ++i) Set(i, longer[static_cast<std::size_t>(i)]);
     size_ = count;
   }
 
@@ -104,7 +112,8 @@ class VoxelList {
     return victim < 0 ? count - 1 : victim;
   }
 
-  ListEntry* entries_;
+  InstanceId* ids_;
+  std::uint8_t* confidences_;
   int layers_;
   int stride_;
   int size_ = 0;

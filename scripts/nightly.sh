@@ -14,7 +14,7 @@ status=0
 "$tsdfpp" gate results/gates.toml --profile full --sabotages --out "$out/gates" || status=$?
 if [ "$gates_only" = yes ]; then exit "$status"; fi
 "$tsdfpp" gate results/gates.toml --profile quick --audit --out "$out/gates" || status=$?
-for preset in asan tsan; do SHORT=1 bash scripts/sanitizers.sh "$preset" || status=$?; done
+for preset in asan tsan; do ROOMS="core;mapper;tests" bash scripts/sanitizers.sh "$preset" || status=$?; done
 for experiment in eval/experiments/*.toml; do
   "$tsdfpp" sweep "$experiment" --out "$out/experiments/$(basename "$experiment" .toml)" || status=$?
 done

@@ -3,8 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
+#include <thread>
+#include <vector>
 
+#include "mapper/block_pool.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -96,6 +101,42 @@ TEST(BlockGrid, ErasingAllLeavesNothing) {
   for (const Index3& index : all) EXPECT_EQ(grid.Find(index), nullptr);
   for (const Index3& index : all) grid.FindOrAdd(index) = 1;
   EXPECT_EQ(grid.TableBytes(), table);
+}
+
+// What is written to an object stays, whatever other threads take and give meanwhile.
+TEST(ObjectPool, HandsOutNoPlaceTwice) {
+  constexpr std::size_t kSize = 192;
+  constexpr std::size_t kAlignment = 64;
+  constexpr std::size_t kObjects = 30000;  // more than one chunk
+  using Pool = ObjectPool<kSize, kAlignment>;
+  const auto work = [](unsigned char mark) {
+    Dice dice(mark);
+    std::vector<unsigned char*> held;
+    bool good = true;
+    const auto give = [&](std::size_t i) {
+      good = good && std::all_of(held[i], held[i] + kSize,
+                                 [&](unsigned char byte) { return byte == mark; });
+      Pool::Give(held[i]);
+      held[i] = held.back();
+      held.pop_back();
+    };
+    for (std::size_t i = 0; i < kObjects; ++i) {
+      held.push_back(static_cast<unsigned char*>(Pool::Take()));
+      good = good && reinterpret_cast<std::uintptr_t>(held.back()) % kAlignment == 0;
+      std::fill_n(held.back(), kSize, mark);
+      if (dice.Whole(3) == 0)
+        give(static_cast<std::size_t>(dice.Whole(static_cast<int>(held.size()))));
+    }
+    while (!held.empty()) give(held.size() - 1);
+    return good;
+  };
+  std::array<bool, 3> good{};
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < good.size(); ++t) {
+    threads.emplace_back([&, t] { good[t] = work(static_cast<unsigned char>(t + 1)); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const bool each : good) EXPECT_TRUE(each);
 }
 
 }  // namespace

@@ -76,6 +76,7 @@ TEST(MapConfigTest, EachBadFieldIsNamedWithItsValue) {
       {"weight_cap", "0", [](MapConfig& c) { c.weight_cap = 0; }},
       {"weight_cap", "256", [](MapConfig& c) { c.weight_cap = 256; }},
       {"confidence_cap", "0", [](MapConfig& c) { c.confidence_cap = 0; }},
+      {"confidence_cap", "256", [](MapConfig& c) { c.confidence_cap = 256; }},
       {"moved_confidence", "-2", [](MapConfig& c) { c.moved_confidence = -2; }},
       {"moved_confidence", "11", [](MapConfig& c) { c.moved_confidence = c.confidence_cap + 1; }},
   };

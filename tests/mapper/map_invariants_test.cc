@@ -61,8 +61,8 @@ TEST_P(Invariants, ValuesOutOfRangeAreNoticed) {
 }
 
 TEST_P(Invariants, MasksThatAreNotOfTheValuesAreNoticed) {
-  for (BlockMask TsdfBlock::*mask : {&TsdfBlock::observed, &TsdfBlock::negative, &TsdfBlock::band,
-                                     &TsdfBlock::coloured, &TsdfBlock::full}) {
+  for (BlockMask TsdfBlock::*mask :
+       {&TsdfBlock::observed, &TsdfBlock::negative, &TsdfBlock::band, &TsdfBlock::full}) {
     ExpectFault("the masks of voxel",
                 [mask](Place& p) { (p.block->*mask)[p.observed / 64] ^= 1ULL << p.observed % 64; });
   }

@@ -10,6 +10,8 @@
 namespace tsdfpp {
 namespace {
 
+constexpr PlannedBlock kUnplanned{0, kNoInstance, std::numeric_limits<float>::infinity(), false};
+
 std::vector<Index3> BlocksOfBox() {
   std::vector<Index3> blocks;
   for (int z = -6; z <= 6; ++z) {
@@ -25,15 +27,20 @@ std::set<InstanceId> LabelsSeen(const FrameView& view, const CameraFromLattice& 
                                 const Index3& block, const MapConfig& config) {
   BlockObservation observation;
   std::set<InstanceId> labels;
-  if (!ObserveVoxels(view.kernel,
-                     PlaceOf(T_CL, block, config.voxel(), std::numeric_limits<float>::infinity()),
-                     config.back(), observation)) {
+  if (!ObserveVoxels(view.kernel, PlaceOf(T_CL, block, config.voxel(), kUnplanned), config.back(),
+                     observation)) {
     return labels;
   }
   for (const std::int32_t pixel : observation.pixel) {
     if (pixel >= 0) labels.insert(view.kernel.label[pixel]);
   }
   return labels;
+}
+
+std::vector<std::int32_t> PixelsOf(const FrameView& view, const BlockPlace& place, float back) {
+  BlockObservation observation;
+  if (!ObserveVoxels(view.kernel, place, back, observation)) return {};
+  return {observation.pixel.begin(), observation.pixel.end()};
 }
 
 class PlanBlocksTest : public ::testing::TestWithParam<int> {};
@@ -71,6 +78,42 @@ TEST_P(PlanBlocksTest, LeavesOutOnlyWhatTheFrameDoesNotSee) {
       }
     }
   }
+}
+
+// Of blocks that are all in view it is not asked again.
+TEST_P(PlanBlocksTest, AllInViewIsSaidOfBlocksWithoutAVoxelOutside) {
+  const MapConfig config = ToyConfig(1 + GetParam() % 4);
+  const Frame frame = RenderToys(TableWithToys(), GetParam());
+  const FrameView view(frame, frame.mask);
+  const CameraFromLattice T_CL(frame.T_WC, Pose::Identity(), true);
+  const std::vector<Index3> blocks = BlocksOfBox();
+  const auto planned = PlanBlocks(view, blocks.size(), config.voxel(), config.back(),
+                                  [&](std::size_t i) -> BlockCandidate {
+                                    return {blocks[i], &T_CL, 1, true};
+                                  });
+  std::size_t inside = 0;
+  std::size_t in_view = 0;
+  for (const PlannedBlock& block : planned) {
+    bool all = true;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const Index3 v = VoxelAt(blocks[block.number], i);
+      const Eigen::Vector3d p_C =
+          frame.T_WC.inverse() * (Eigen::Vector3d(v.x, v.y, v.z) * config.voxel_m);
+      const double u = frame.intrinsics.fx * p_C.x() / p_C.z() + frame.intrinsics.cx;
+      const double at = frame.intrinsics.fy * p_C.y() / p_C.z() + frame.intrinsics.cy;
+      all = all && p_C.z() > kNearest_m && u > 0 && u < view.width - 1 && at > 0 &&
+            at < view.height - 1;
+    }
+    EXPECT_TRUE(all || !block.all_in_view) << "block " << block.number;
+    inside += all ? 1 : 0;
+    in_view += block.all_in_view ? 1 : 0;
+    BlockPlace place = PlaceOf(T_CL, blocks[block.number], config.voxel(), block);
+    const auto pixels = PixelsOf(view, place, config.back());
+    place.all_in_view = false;
+    EXPECT_EQ(pixels, PixelsOf(view, place, config.back()));
+  }
+  EXPECT_GT(2 * in_view, inside) << "hardly any";
+  EXPECT_LT(inside, planned.size()) << "none at the border";
 }
 
 }  // namespace

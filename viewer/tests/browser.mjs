@@ -252,7 +252,8 @@ test('a click in the view says what is there, and so does Enter', async (browser
   await page.mouse.click(place.x, place.y);
   const said = await page.locator('.picked').textContent();
   assert.match(said, /anchored.*car \(id 1\).* mm from the true surface; .*; at -?\d/);
-  assert.equal(await page.locator('.mark:visible').count(), 2);
+  // The marks are placed when the panels are drawn again.
+  await page.waitForFunction(() => [...document.querySelectorAll('.mark')].filter((mark) => !mark.hidden).length === 2);
   await page.locator('.panels').focus();
   await page.keyboard.press('Enter');
   assert.notEqual(await page.locator('.picked').textContent(), said);
