@@ -113,8 +113,13 @@ TEST_P(SceneChanges, LeadToTheWholeMesh) {
       } else if (what == 4) {
         // And back, so that the same id is another volume, or the same one in other hands.
         constexpr InstanceId kOther = 9;
-        if (map->Rename(id, kOther) && dice.Whole(2) == 0) {
-          ASSERT_TRUE(follower.Take(*map)) << "seed " << seed << ", event " << event;
+        if (map->Rename(id, kOther)) {
+          const int told = dice.Whole(3);
+          if (told == 0) {
+            ASSERT_TRUE(follower.Take(*map)) << "seed " << seed << ", event " << event;
+          } else if (told == 1) {
+            map->UpdateMeshes();  // has seen that the id is gone when it is back
+          }
         }
         static_cast<void>(map->Rename(kOther, id));
       } else if (what == 5) {
@@ -144,6 +149,35 @@ TEST_P(SceneChanges, LeadToTheWholeMesh) {
     EXPECT_TRUE(other.Triangles() == Follower::TrianglesOf(map->SceneMesh()));
   }
   EXPECT_GT(small, 5);
+}
+
+TEST(ScenePieces, TellOfABlockThatIsBackWithoutASurface) {
+  constexpr float kVoxel_m = 0.1F;
+  const auto fill = [](TsdfBlock& block, float behind_m) {
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      block.distance[i] = i < kBlockVoxels / 2 ? kVoxel_m : behind_m;
+      block.weight[i] = 1;
+    }
+    block.UpdateMasks(kVoxel_m);
+  };
+  TsdfGrid grid;
+  GridMesh mesh;
+  const auto take = [&] { return TakeScenePieces(mesh, {&mesh, 1}); };
+  fill(grid.FindOrAdd({0, 0, 0}), -kVoxel_m);
+  mesh.Update(grid, kVoxel_m);
+  std::vector<ScenePiece> pieces = take();
+  ASSERT_EQ(pieces.size(), 1U);
+  EXPECT_FALSE(pieces[0].mesh.triangles.empty());
+
+  grid.Erase({{0, 0, 0}});
+  mesh.Update(grid, kVoxel_m);
+  fill(grid.FindOrAdd({0, 0, 0}), kVoxel_m);
+  mesh.Update(grid, kVoxel_m);
+  pieces = take();
+  ASSERT_EQ(pieces.size(), 1U);
+  EXPECT_EQ(pieces[0].block, (Index3{0, 0, 0}));
+  EXPECT_TRUE(pieces[0].mesh.triangles.empty());
+  EXPECT_TRUE(take().empty());
 }
 
 }  // namespace
