@@ -48,6 +48,8 @@ class LayeredMap : public MapRepresentation {
 
   // Tells the visible scene that other objects may be active in this block of the index than were.
   void NoteIndexChange(const Index3& block) const;
+  // False while it need not be told.
+  bool NotesIndexChanges() const { return !anything_may_be_hidden_; }
 
   // A block whose cover may have changed with a frame.
   struct StaleCover {
@@ -71,10 +73,20 @@ class LayeredMap : public MapRepresentation {
 
  private:
   MeshWork UpdateObjectMesh(InstanceId id) const;
-  // Where triangles may have become hidden or visible since the last update; nothing where that
-  // may be anywhere.
-  std::optional<BlocksAround> WhereVisibilityChanged() const;
-  void FindHiddenTriangles(const std::optional<BlocksAround>& where) const;
+  // Where triangles may have become hidden or visible since the last update, in global blocks.
+  struct VisibilityChanges {
+    BlockSet index;           // other objects may be active
+    BlockSet values;          // distances of some objects are others ...
+    std::uint64_t whose = 0;  // ... of those with these bits
+    std::vector<BlockBox> all;
+  };
+  // Nothing where that may be anywhere.
+  std::optional<VisibilityChanges> WhereVisibilityChanged() const;
+  // The parts of the object whose triangles are to be looked up again; all where `where` is
+  // nothing.
+  std::vector<MeshPart*> PartsToLookUp(PlacedMesh& object,
+                                       const std::optional<VisibilityChanges>& where) const;
+  void FindHiddenTriangles(const std::optional<VisibilityChanges>& where) const;
 
   // Shown parts of objects that are gone. A copy starts empty, as its meshes do.
   struct GoneParts {

@@ -68,6 +68,7 @@ TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {
 Expected<void> LayeredMap::Rename(InstanceId from, InstanceId to) {
   TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
   RenameKey(from, to, volumes_);
+  anything_may_be_hidden_ = true;
   return {};
 }
 

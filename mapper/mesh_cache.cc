@@ -10,11 +10,10 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kPartsPerTask = 32;
+constexpr std::size_t kPartsPerTask = 8;
 constexpr std::size_t kPartsPerLink = 1024;
-// No block has these revisions.
-constexpr std::uint64_t kNeverSeen = ~0ULL;
-constexpr std::uint64_t kGone = ~0ULL - 1;
+constexpr std::size_t kPartsPerComparison = 1024;
+constexpr std::uint64_t kNeverSeen = ~0ULL;  // no block has this revision
 
 // Bits of MeshPart::todo.
 constexpr std::uint32_t kCubes = 1;
@@ -30,9 +29,10 @@ constexpr std::array<std::size_t, 8> kReadMyMasks{kSelf, 12, 10, 9, 4, 3, 1, 0};
 constexpr std::array<std::size_t, 7> kReadMyCubes{kSelf, 14, 16, 22, 17, 23, 25};
 
 template <typename Function>
-void ForEachInParallel(std::size_t count, const Function& function) {
+void ForEachInParallel(std::size_t count, const Function& function,
+                       std::size_t per_task = kPartsPerTask) {
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, count, kPartsPerTask),
+      tbb::blocked_range<std::size_t>(0, count, per_task),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
       },
@@ -108,7 +108,7 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   const auto& entries = grid.entries();
   std::size_t same = 0;
   while (same < owned_.size() && same < entries.size() &&
-         owned_index_[same] == entries[same].index) {
+         seen_[same].index == entries[same].index) {
     ++same;
   }
   if (same == owned_.size() && same == entries.size()) return 0;
@@ -116,20 +116,19 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   // Blocks were added behind, or some were erased, or this is another grid.
   struct Spare {
     std::uint64_t key;
+    Seen seen;
     std::unique_ptr<MeshPart> part;
   };
   std::vector<Spare> spares;
   for (std::size_t i = same; i < owned_.size(); ++i) {
-    const std::uint64_t key = PackIndex(owned_index_[i]);
-    spares.push_back({key, std::move(owned_[i])});
+    spares.push_back({PackIndex(seen_[i].index), seen_[i], std::move(owned_[i])});
   }
   std::sort(spares.begin(), spares.end(),
             [](const Spare& a, const Spare& b) { return a.key < b.key; });
   owned_.resize(entries.size());
-  owned_index_.resize(entries.size());
+  seen_.resize(entries.size());
   ForEachInParallel(entries.size() - same, [&](std::size_t k) {
     const Index3& index = entries[same + k].index;
-    owned_index_[same + k] = index;
     const std::uint64_t key = PackIndex(index);
     const auto spare =
         std::lower_bound(spares.begin(), spares.end(), key,
@@ -137,15 +136,16 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
     std::unique_ptr<MeshPart>& part = owned_[same + k];
     if (spare != spares.end() && spare->key == key) {
       part = std::move(spare->part);
+      seen_[same + k] = spare->seen;
     } else {
       part = std::make_unique<MeshPart>();
       part->index = index;
-      part->revision = kNeverSeen;
+      seen_[same + k] = {index, nullptr, kNeverSeen};
     }
   });
   // What lay around an erased block has lost what it was made from.
   for (const Spare& spare : spares) {
-    if (spare.part != nullptr) spare.part->revision = kGone;
+    if (spare.part != nullptr) spare.part->block = nullptr;
   }
   std::size_t erased = 0;
   for (const Spare& spare : spares) {
@@ -154,7 +154,7 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
     changed_.push_back(spare.part->index);
     if (spare.part->is_shown) gone_.push_back(spare.part->index);
     for (MeshPart* part : spare.part->around) {
-      if (part == nullptr || part->revision == kGone) continue;
+      if (part == nullptr || part->block == nullptr) continue;
       Mark(part, kCubes, cubes_todo_);
       Mark(part, kEdges, edges_todo_);
     }
@@ -162,7 +162,7 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
 
   if (erased > 0) {
     for (Parts* list : {&unsettled_, &pending_}) {
-      std::erase_if(*list, [](const MeshPart* part) { return part->revision == kGone; });
+      std::erase_if(*list, [](const MeshPart* part) { return part->block == nullptr; });
     }
   }
 
@@ -211,18 +211,24 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
   const auto& entries = grid.entries();
   enum : std::uint8_t { kSame, kValues, kMasks };
   std::vector<std::uint8_t> change(entries.size(), kSame);
-  ForEachInParallel(entries.size(), [&](std::size_t i) {
+  const auto compare = [&](std::size_t i) {
+    const TsdfBlock& block = *entries[i].block;
+    Seen& seen = seen_[i];
+    if (block.revision == seen.revision && &block == seen.block) return;
+    const bool is_same = block.revision == seen.revision;
+    seen.revision = block.revision;
+    seen.block = &block;
     MeshPart& part = *owned_[i];
-    part.block = entries[i].block.get();
-    if (part.block->revision == part.revision) return;
-    part.revision = part.block->revision;
+    part.block = &block;
+    if (is_same) return;
     change[i] = kValues;
-    if (part.observed == part.block->observed && part.negative == part.block->negative) return;
-    part.observed = part.block->observed;
-    part.negative = part.block->negative;
-    part.any_negative = part.block->AnyNegative();
+    if (part.observed == block.observed && part.negative == block.negative) return;
+    part.observed = block.observed;
+    part.negative = block.negative;
+    part.any_negative = block.AnyNegative();
     change[i] = kMasks;
-  });
+  };
+  ForEachInParallel(entries.size(), compare, kPartsPerComparison);
   work.blocks = entries.size();
   if (std::find_if(change.begin(), change.end(), [](auto c) { return c != kMasks; }) ==
       change.end()) {
@@ -301,7 +307,7 @@ std::size_t GridMesh::Bytes() const {
       order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
       (remade_.capacity() + unsettled_.capacity() + pending_.capacity()) * sizeof(MeshPart*) +
       (changed_.capacity() + gone_.capacity()) * sizeof(Index3) +
-      owned_.capacity() * (sizeof(owned_[0]) + sizeof(Index3));
+      owned_.capacity() * (sizeof(owned_[0]) + sizeof(Seen));
   for (const MeshPart* part : order_) {
     bytes += sizeof(MeshPart) + part->positions.capacity() * sizeof(part->positions[0]) +
              part->colours.capacity() * sizeof(part->colours[0]) +

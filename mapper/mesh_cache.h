@@ -39,6 +39,8 @@ class GridMesh {
 
   // By block, in Index3's order. The caller may change what a part says of the scene.
   const std::vector<MeshPart*>& parts() const { return order_; }
+  // PackIndex of their blocks, in the same order.
+  const std::vector<std::uint64_t>& keys() const { return keys_; }
 
   // Of the last update: the parts that were made again, and the blocks whose values changed, new
   // and erased ones too.
@@ -70,6 +72,12 @@ class GridMesh {
 
  private:
   using Parts = std::vector<MeshPart*>;
+  // What a part was made from. These lie together, because each update compares them all.
+  struct Seen {
+    Index3 index;
+    const TsdfBlock* block = nullptr;
+    std::uint64_t revision = 0;
+  };
 
   std::size_t MatchBlocks(const TsdfGrid& grid);
   void Link();
@@ -80,9 +88,9 @@ class GridMesh {
   void Unsettle(MeshPart& part);
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i
-  std::vector<Index3> owned_index_;               // of owned_
+  std::vector<Seen> seen_;                        // of owned_
   Parts order_;
-  std::vector<std::uint64_t> keys_;  // PackIndex of order_
+  std::vector<std::uint64_t> keys_;
   Parts cubes_todo_;
   Parts edges_todo_;
   Parts vertices_todo_;

@@ -9,13 +9,22 @@
 
 namespace tsdfpp {
 
+// Blocks of a lattice, both ends included.
+struct BlockBox {
+  Index3 low;
+  Index3 high;
+  bool is_empty = true;
+
+  void Extend(const Index3& index);
+  bool Holds(const Index3& index) const;
+};
+
 // A part owns the cubes named by its block's voxels, and the vertices on the edges that start at
 // them; the triangles of its cubes also name vertices of the seven blocks further along x, y, z.
 // Masks are read from parts and not from blocks, because they are small and lie together.
 struct MeshPart {
   Index3 index;
   const TsdfBlock* block = nullptr;
-  std::uint64_t revision = 0;  // of the values that the part was made from
 
   BlockMask observed{};  // the block's
   BlockMask negative{};
@@ -42,6 +51,8 @@ struct MeshPart {
   std::vector<Eigen::Vector3f> placed;  // in the world; empty where the lattice is the world's
   std::vector<InstanceId> face_ids;     // labels of the triangles, of one field
   std::vector<std::uint8_t> hidden;     // 1 for triangles that are not visible; empty where all are
+  BlockBox looked_up;                   // global: at least the blocks that say which are hidden
+  std::uint64_t others = 0;             // IdBit of the objects whose values say it
   std::vector<std::uint16_t> renamed;   // of vertices, among the visible; empty where all are
   std::size_t visible_vertices = 0;     // where `renamed` is not empty
   std::uint32_t first_vertex = 0;       // in the mesh that is being put together
@@ -50,6 +61,9 @@ struct MeshPart {
     return placed.empty() ? positions : placed;
   }
 };
+
+// One of 64 bits for each object, some of which share one.
+inline std::uint64_t IdBit(InstanceId id) { return 1ULL << (id & 63U); }
 
 // A triangle's corner: vertex `local` of the part at offset bit x, y, z of `which`.
 inline constexpr unsigned kLocalVertexBits = 11;  // three edges a voxel: 1536

@@ -12,7 +12,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kPartsPerTask = 32;
+constexpr std::size_t kPartsPerTask = 8;
 constexpr std::uint16_t kUnused = 0xFFFF;  // more than any vertex of a part
 constexpr std::uint16_t kUsed = 0;
 
@@ -244,63 +244,68 @@ bool BlockBox::Holds(const Index3& index) const {
          index.x <= high.x && index.y <= high.y && index.z <= high.z;
 }
 
-BlockBox PlacedBox(const BlockBox& box, const PlacedMesh& object, double voxel_m, int margin) {
-  BlockBox placed;
-  if (box.is_empty) return placed;
+BlockBox MovedBox(const BlockBox& box, const Pose* T, double voxel_m, int margin) {
+  BlockBox moved;
+  if (box.is_empty) return moved;
   const Index3 low{box.low.x * kBlockSide - margin, box.low.y * kBlockSide - margin,
                    box.low.z * kBlockSide - margin};
   const Index3 high{(box.high.x + 1) * kBlockSide + margin, (box.high.y + 1) * kBlockSide + margin,
                     (box.high.z + 1) * kBlockSide + margin};
-  if (object.lattice_is_world) {
-    placed.Extend(BlockOf(low));
-    placed.Extend(BlockOf(high + Index3{-1, -1, -1}));
-    return placed;
+  if (T == nullptr) {
+    moved.Extend(BlockOf(low));
+    moved.Extend(BlockOf(high + Index3{-1, -1, -1}));
+    return moved;
   }
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector3d corner((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
                                  (i & 4) != 0 ? high.z : low.z);
-    placed.Extend(BlockOf(FloorOf(object.T_WL * (corner * voxel_m) / voxel_m)));
+    moved.Extend(BlockOf(FloorOf(*T * (corner * voxel_m) / voxel_m)));
   }
-  return placed;
+  return moved;
 }
 
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
   // What is covered is at most a voxel from a negative one, and a look-up voxel at most two from
   // the block of its triangle: not as much as a block together.
-  return PlacedBox(object.negative, object, voxel_m, kBlockSide);
+  return MovedBox(object.negative, object.lattice_is_world ? nullptr : &object.T_WL, voxel_m,
+                  kBlockSide);
 }
 
-std::optional<BlocksAround> BlocksAround::Of(const std::vector<BlockBox>& boxes) {
+std::optional<BlockSet> BlockSet::Of(const std::vector<BlockBox>& boxes, int margin) {
   constexpr double kMost = 1 << 22;  // blocks in the bounds, a byte each
-  BlocksAround around;
-  BlockBox& bounds = around.bounds_;
+  BlockSet set;
+  BlockBox& bounds = set.bounds_;
+  const Index3 down{-margin, -margin, -margin};
+  const Index3 up{margin, margin, margin};
   for (const BlockBox& box : boxes) {
     if (box.is_empty) continue;
-    bounds.Extend(box.low + Index3{-1, -1, -1});
-    bounds.Extend(box.high + Index3{1, 1, 1});
+    bounds.Extend(box.low + down);
+    bounds.Extend(box.high + up);
   }
-  if (bounds.is_empty) return around;
+  if (bounds.is_empty) return set;
   const auto side = [](int low, int high) { return double{1} + high - low; };
   if (side(bounds.low.x, bounds.high.x) * side(bounds.low.y, bounds.high.y) *
           side(bounds.low.z, bounds.high.z) >
       kMost) {
     return std::nullopt;
   }
-  around.held_.assign(around.PlaceOf(bounds.high) + 1, 0);
+  set.held_.assign(set.PlaceOf(bounds.high) + 1, 0);
   for (const BlockBox& box : boxes) {
     if (box.is_empty) continue;
-    for (int z = box.low.z - 1; z <= box.high.z + 1; ++z) {
-      for (int y = box.low.y - 1; y <= box.high.y + 1; ++y) {
-        const std::size_t first = around.PlaceOf({box.low.x - 1, y, z});
-        std::fill_n(around.held_.begin() + static_cast<std::ptrdiff_t>(first),
-                    box.high.x - box.low.x + 3, std::uint8_t{1});
+    const Index3 low = box.low + down;
+    const Index3 high = box.high + up;
+    for (int z = low.z; z <= high.z; ++z) {
+      for (int y = low.y; y <= high.y; ++y) {
+        const std::size_t first = set.PlaceOf({low.x, y, z});
+        std::fill_n(set.held_.begin() + static_cast<std::ptrdiff_t>(first), high.x - low.x + 1,
+                    std::uint8_t{1});
       }
     }
   }
-  return around;
+  return set;
 }
 
-std::size_t BlocksAround::PlaceOf(const Index3& index) const {
+std::size_t BlockSet::PlaceOf(const Index3& index) const {
   const auto along = [](int at, int low) { return static_cast<std::size_t>(at - low); };
   const std::size_t width = along(bounds_.high.x, bounds_.low.x) + 1;
   const std::size_t depth = along(bounds_.high.y, bounds_.low.y) + 1;
@@ -308,11 +313,11 @@ std::size_t BlocksAround::PlaceOf(const Index3& index) const {
          width * (along(index.y, bounds_.low.y) + depth * along(index.z, bounds_.low.z));
 }
 
-bool BlocksAround::Holds(const Index3& index) const {
+bool BlockSet::Holds(const Index3& index) const {
   return bounds_.Holds(index) && held_[PlaceOf(index)] != 0;
 }
 
-bool BlocksAround::Meets(const BlockBox& box) const {
+bool BlockSet::Meets(const BlockBox& box) const {
   for (int z = box.low.z; !box.is_empty && z <= box.high.z; ++z) {
     for (int y = box.low.y; y <= box.high.y; ++y) {
       for (int x = box.low.x; x <= box.high.x; ++x) {
@@ -321,6 +326,26 @@ bool BlocksAround::Meets(const BlockBox& box) const {
     }
   }
   return false;
+}
+
+std::vector<MeshPart*> BlockSet::PartsOf(const GridMesh& mesh) const {
+  std::vector<MeshPart*> parts;
+  if (bounds_.is_empty) return parts;
+  const std::vector<std::uint64_t>& keys = mesh.keys();
+  auto key = keys.begin();
+  const auto [low, high, is_empty] = bounds_;
+  for (int z = low.z; z <= high.z; ++z) {
+    for (int y = low.y; y <= high.y; ++y) {
+      const std::uint64_t first = PackIndex({low.x, y, z});
+      const std::uint64_t last = PackIndex({high.x, y, z});
+      if (key != keys.end() && *key < first) key = std::lower_bound(key, keys.end(), first);
+      for (; key != keys.end() && *key <= last; ++key) {
+        if (held_[PlaceOf(UnpackIndex(*key))] == 0) continue;
+        parts.push_back(mesh.parts()[static_cast<std::size_t>(key - keys.begin())]);
+      }
+    }
+  }
+  return parts;
 }
 
 void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels) {
@@ -342,7 +367,7 @@ void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels
 
 std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
                                      const std::function<bool(const MeshPart&)>& in_doubt,
-                                     const std::function<IsHidden()>& new_test) {
+                                     const std::function<LookUpTriangle()>& new_test) {
   // Vertices are named by the triangles of the part and of the lower ones around it: where these
   // are others, or others are hidden, the part's vertices are numbered again.
   constexpr std::uint32_t kNamesChanged = 1;
@@ -350,12 +375,21 @@ std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
   ForEachPart(parts, [&](MeshPart& part) {
     thread_local std::vector<std::uint8_t> hidden;
     hidden.clear();
-    if (!part.triangles.empty() && in_doubt(part)) {
-      const IsHidden is_hidden = new_test();
+    part.looked_up = {};
+    part.others = 0;
+    if (!part.triangles.empty() && !in_doubt(part)) {
+      // Where it would be.
+      part.looked_up.Extend(part.index + Index3{-1, -1, -1});
+      part.looked_up.Extend(part.index + Index3{1, 1, 1});
+    } else if (!part.triangles.empty()) {
+      const LookUpTriangle look_up = new_test();
       const CornersOf corner(part);
       for (std::size_t t = 0; t < part.triangles.size(); ++t) {
         const auto& [a, b, c] = part.triangles[t];
-        if (!is_hidden(corner(a), corner(b), corner(c))) continue;
+        const FoundThere found = look_up(corner(a), corner(b), corner(c));
+        part.looked_up.Extend(found.block);
+        if (found.other != kNoInstance) part.others |= IdBit(found.other);
+        if (!found.is_hidden) continue;
         hidden.resize(part.triangles.size(), 0);
         hidden[t] = 1;
       }

@@ -26,16 +26,6 @@ struct SceneChanges {
   MeshWork work;  // of bringing the kept meshes up to date
 };
 
-// Blocks of a lattice, both ends included.
-struct BlockBox {
-  Index3 low;
-  Index3 high;
-  bool is_empty = true;
-
-  void Extend(const Index3& index);
-  bool Holds(const Index3& index) const;
-};
-
 // The mesh of an object's volume and where it stands. A copy starts empty.
 struct PlacedMesh {
   GridMesh mesh;
@@ -54,24 +44,26 @@ struct PlacedMesh {
   MeshWork Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now, bool is_world_now);
 };
 
-// The global blocks that a box of blocks of the lattice touches when `margin` voxels are added on
-// each side.
-BlockBox PlacedBox(const BlockBox& box, const PlacedMesh& object, double voxel_m, int margin);
+// The blocks that a box of blocks touches when `margin` voxels are added on each side and it is
+// moved by T (in metres). No motion where T is nullptr.
+BlockBox MovedBox(const BlockBox& box, const Pose* T, double voxel_m, int margin);
 
 // Where triangles of other objects may have a look-up voxel that this object covers: the blocks
 // around those that hold a negative voxel.
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m);
 
-// Some blocks of the global lattice and those that touch them.
-class BlocksAround {
+// A set of blocks.
+class BlockSet {
  public:
-  // Of all blocks of the boxes. Nothing where they are so far apart that this takes more than some
-  // megabytes.
-  static std::optional<BlocksAround> Of(const std::vector<BlockBox>& boxes);
+  // All blocks of the boxes and, with a margin, those at most so many blocks away along each axis.
+  // Nothing where they are so far apart that this takes more than some megabytes.
+  static std::optional<BlockSet> Of(const std::vector<BlockBox>& boxes, int margin);
 
   bool Holds(const Index3& index) const;
-  // Whether the box holds one of them.
+  // Whether it holds a block of the box.
   bool Meets(const BlockBox& box) const;
+  // The parts of its blocks.
+  std::vector<MeshPart*> PartsOf(const GridMesh& mesh) const;
 
  private:
   std::size_t PlaceOf(const Index3& index) const;
@@ -80,9 +72,16 @@ class BlocksAround {
   std::vector<std::uint8_t> held_;  // of the bounds
 };
 
-// Whether a triangle is hidden, from its three corners in the world.
-using IsHidden =
-    std::function<bool(const Eigen::Vector3f&, const Eigen::Vector3f&, const Eigen::Vector3f&)>;
+// What may hide a triangle: the block where it is looked up, the other object that is active there,
+// kNoInstance where there is none, and whether that one's distance says that it is hidden.
+struct FoundThere {
+  Index3 block;
+  InstanceId other = kNoInstance;
+  bool is_hidden = false;
+};
+// Of a triangle, from its three corners in the world.
+using LookUpTriangle = std::function<FoundThere(const Eigen::Vector3f&, const Eigen::Vector3f&,
+                                                const Eigen::Vector3f&)>;
 
 // Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names,
 // by a test of their own each; no others are.
@@ -90,7 +89,7 @@ using IsHidden =
 // again.
 std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
                                      const std::function<bool(const MeshPart&)>& in_doubt,
-                                     const std::function<IsHidden()>& new_test);
+                                     const std::function<LookUpTriangle()>& new_test);
 
 // Labels the triangles of the parts whose values changed by what labels of each part's own say of
 // the voxels nearest to their centroids in the lattice; `voxel` in metres.
