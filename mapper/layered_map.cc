@@ -140,9 +140,11 @@ std::optional<LayeredMap::VisibilityChanges> LayeredMap::WhereVisibilityChanged(
   for (const Index3& block : index_changes_) index.push_back({block, block, false});
   auto index_set = BlockSet::Of(index, 0);
   auto value_set = BlockSet::Of(values, 0);
-  if (!index_set || !value_set) return std::nullopt;
   index.insert(index.end(), values.begin(), values.end());
-  return VisibilityChanges{std::move(*index_set), std::move(*value_set), whose, std::move(index)};
+  auto near = BlockSet::Of(index, 1);
+  if (!index_set || !value_set || !near) return std::nullopt;
+  return VisibilityChanges{std::move(*index_set), std::move(*value_set), whose, std::move(index),
+                           std::move(*near)};
 }
 
 std::vector<MeshPart*> LayeredMap::PartsToLookUp(
@@ -150,14 +152,18 @@ std::vector<MeshPart*> LayeredMap::PartsToLookUp(
   std::vector<MeshPart*> parts = object.mesh.TakeUnsettled();
   if (!where || object.has_moved) return object.mesh.parts();
   // A triangle is looked up less than a block from its own.
-  std::vector<BlockBox> boxes = where->all;
-  const Pose T_LW = object.T_WL.inverse();
-  for (BlockBox& box : boxes) {
-    if (!object.lattice_is_world) box = MovedBox(box, &T_LW, config_.voxel_m, 0);
+  std::optional<BlockSet> near_in_lattice;
+  if (!object.lattice_is_world) {
+    const Pose T_LW = object.T_WL.inverse();
+    std::vector<BlockBox> boxes;
+    for (const BlockBox& box : where->all) {
+      boxes.push_back(MovedBox(box, &T_LW, config_.voxel_m, 0));
+    }
+    near_in_lattice = BlockSet::Of(boxes, 1);
+    if (!near_in_lattice) return object.mesh.parts();
   }
-  const std::optional<BlockSet> around = BlockSet::Of(boxes, 1);
-  if (!around) return object.mesh.parts();
-  for (MeshPart* part : around->PartsOf(object.mesh)) {
+  const BlockSet& near = near_in_lattice ? *near_in_lattice : where->near;
+  for (MeshPart* part : near.PartsOf(object.mesh)) {
     if (!part->is_settled) continue;
     // Where the index is as it was, the objects that are looked up are those that were.
     const bool others_changed = (part->others & where->whose) != 0;
@@ -208,26 +214,25 @@ void LayeredMap::FindHiddenTriangles(const std::optional<VisibilityChanges>& whe
                return other.first != id && (!is_world || other.second.reach.Holds(part.index));
              });
     };
-    const auto new_test = [&, id = self]() -> LookUpTriangle {
-      // Triangles beside each other are looked up in the same block.
-      struct Last {
-        Index3 block;
-        const InstanceId* ids = nullptr;
-        bool is_known = false;
-      };
-      return [&, id, last = Last{}](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
-                                    const Eigen::Vector3f& c) mutable -> FoundThere {
-        const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
-        const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
-        const Index3 v = NearestVoxel(outwards, voxel);
-        const Index3 block = BlockOf(v);
-        if (!last.is_known || block != last.block) last = {block, ActiveIn(block), true};
-        const InstanceId active = last.ids == nullptr ? kNoInstance : last.ids[PlaceInBlock(v)];
-        if (active == kNoInstance || active == id) return {block};
-        return {block, active, is_inside(active, v)};
-      };
+    const auto hidden_at = [&, id = self](std::span<const Index3> voxels,
+                                          std::span<std::uint8_t> hidden) {
+      std::uint64_t others = 0;
+      // One voxel after another is in the same block.
+      std::optional<Index3> last;
+      const InstanceId* ids = nullptr;
+      for (std::size_t i = 0; i < voxels.size(); ++i) {
+        const Index3 block = BlockOf(voxels[i]);
+        if (last != block) ids = ActiveIn(block);
+        last = block;
+        const InstanceId active = ids == nullptr ? kNoInstance : ids[PlaceInBlock(voxels[i])];
+        const bool is_other = active != kNoInstance && active != id;
+        if (is_other) others |= IdBit(active);
+        hidden[i] = is_other && is_inside(active, voxels[i]) ? 1 : 0;
+      }
+      return others;
     };
-    object.mesh.NoteChanges(HideTriangles(PartsToLookUp(object, where), in_doubt, new_test));
+    object.mesh.NoteChanges(
+        HideTriangles(PartsToLookUp(object, where), voxel, in_doubt, hidden_at));
     if (object.has_moved) object.mesh.NoteChanges(object.mesh.parts());
   }
 }

@@ -79,6 +79,7 @@ class LayeredMap : public MapRepresentation {
     BlockSet values;          // distances of some objects are others ...
     std::uint64_t whose = 0;  // ... of those with these bits
     std::vector<BlockBox> all;
+    BlockSet near;  // these and the blocks beside them
   };
   // Nothing where that may be anywhere.
   std::optional<VisibilityChanges> WhereVisibilityChanged() const;

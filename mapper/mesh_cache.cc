@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <tuple>
 #include <utility>
 
@@ -103,16 +104,14 @@ void GridMesh::MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t 
   for (const std::size_t place : offsets) Mark(part.around[place], what, list);
 }
 
-// Makes `owned_` and `order_` those of the grid's blocks; returns how many were erased.
-std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
+// Makes `owned_` and `order_` those of the grid's blocks.
+void GridMesh::MatchBlocks(const TsdfGrid& grid) {
   const auto& entries = grid.entries();
   std::size_t same = 0;
   while (same < owned_.size() && same < entries.size() &&
          seen_[same].index == entries[same].index) {
     ++same;
   }
-  if (same == owned_.size() && same == entries.size()) return 0;
-
   // Blocks were added behind, or some were erased, or this is another grid.
   struct Spare {
     std::uint64_t key;
@@ -147,10 +146,10 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   for (const Spare& spare : spares) {
     if (spare.part != nullptr) spare.part->block = nullptr;
   }
-  std::size_t erased = 0;
+  bool any_erased = false;
   for (const Spare& spare : spares) {
     if (spare.part == nullptr) continue;
-    ++erased;
+    any_erased = true;
     changed_.push_back(spare.part->index);
     if (spare.part->is_shown) gone_.push_back(spare.part->index);
     for (MeshPart* part : spare.part->around) {
@@ -160,7 +159,7 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
     }
   }
 
-  if (erased > 0) {
+  if (any_erased) {
     for (Parts* list : {&unsettled_, &pending_}) {
       std::erase_if(*list, [](const MeshPart* part) { return part->block == nullptr; });
     }
@@ -175,7 +174,6 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   keys_.resize(sorted.size());
   for (std::size_t i = 0; i < sorted.size(); ++i) std::tie(keys_[i], order_[i]) = sorted[i];
   Link();
-  return erased;
 }
 
 // Tells each part which ones are around it. The nine rows of blocks along x that surround a part
@@ -206,14 +204,19 @@ void GridMesh::Link() {
       tbb::simple_partitioner());
 }
 
-// Compares the parts with their blocks and notes what has to be made again.
-void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
+// Compares the parts with their blocks and brings their masks up to date. False where the parts are
+// not those of the grid's blocks; the rest is done then.
+bool GridMesh::Compare(const TsdfGrid& grid, std::vector<Change>& change) {
   const auto& entries = grid.entries();
-  enum : std::uint8_t { kSame, kValues, kMasks };
-  std::vector<std::uint8_t> change(entries.size(), kSame);
+  if (entries.size() != owned_.size()) return false;
+  std::atomic<bool> matches = true;
   const auto compare = [&](std::size_t i) {
     const TsdfBlock& block = *entries[i].block;
     Seen& seen = seen_[i];
+    if (entries[i].index != seen.index) {
+      matches.store(false, std::memory_order_relaxed);
+      return;
+    }
     if (block.revision == seen.revision && &block == seen.block) return;
     const bool is_same = block.revision == seen.revision;
     seen.revision = block.revision;
@@ -229,11 +232,14 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
     change[i] = kMasks;
   };
   ForEachInParallel(entries.size(), compare, kPartsPerComparison);
-  work.blocks = entries.size();
-  if (std::find_if(change.begin(), change.end(), [](auto c) { return c != kMasks; }) ==
+  return matches.load(std::memory_order_relaxed);
+}
+
+// Notes what has to be made again.
+void GridMesh::MarkChanged(const std::vector<Change>& change) {
+  if (std::find_if(change.begin(), change.end(), [](Change c) { return c != kMasks; }) ==
       change.end()) {
     // All is new: no need to ask who reads what.
-    work.changed = entries.size();
     for (MeshPart* part : order_) {
       part->todo = kCubes | kEdges | kVertices | kTriangles;
       changed_.push_back(part->index);
@@ -243,10 +249,9 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
     }
     return;
   }
-  for (std::size_t i = 0; i < entries.size(); ++i) {
+  for (std::size_t i = 0; i < change.size(); ++i) {
     if (change[i] == kSame) continue;
-    ++work.changed;
-    changed_.push_back(entries[i].index);
+    changed_.push_back(seen_[i].index);
     MarkAround(*owned_[i], kReadMyValues, kVertices, vertices_todo_);
     for (const std::size_t place : kReadMyMasks) {
       if (MeshPart* part = owned_[i]->around[place]) Unsettle(*part);
@@ -261,9 +266,14 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
   MeshWork work;
   changed_.clear();
   remade_.clear();
-  const std::size_t erased = MatchBlocks(grid);
-  MarkChanged(grid, work);
-  work.changed += erased;
+  std::vector<Change> change(grid.size(), kSame);
+  if (!Compare(grid, change)) {
+    MatchBlocks(grid);
+    Compare(grid, change);
+  }
+  MarkChanged(change);
+  work.blocks = grid.size();
+  work.changed = changed_.size();
 
   std::vector<std::uint8_t> changed(cubes_todo_.size());
   ForEachInParallel(cubes_todo_.size(),

@@ -79,12 +79,15 @@ class GridMesh {
     std::uint64_t revision = 0;
   };
 
-  std::size_t MatchBlocks(const TsdfGrid& grid);
+  // What a comparison found of a block.
+  enum Change : std::uint8_t { kSame, kValues, kMasks };
+  bool Compare(const TsdfGrid& grid, std::vector<Change>& change);
+  void MatchBlocks(const TsdfGrid& grid);
   void Link();
   void Mark(MeshPart* part, std::uint32_t what, Parts& list);
   template <typename Offsets>
   void MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t what, Parts& list);
-  void MarkChanged(const TsdfGrid& grid, MeshWork& work);
+  void MarkChanged(const std::vector<Change>& change);
   void Unsettle(MeshPart& part);
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i

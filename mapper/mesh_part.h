@@ -23,7 +23,15 @@ struct BlockBox {
 // them; the triangles of its cubes also name vertices of the seven blocks further along x, y, z.
 // Masks are read from parts and not from blocks, because they are small and lie together.
 struct MeshPart {
+  // What is asked of many parts comes first, so that it is read at once.
   Index3 index;
+  bool any_negative = false;
+  bool is_settled = true;    // what the scene adds belongs to triangles and values as they are
+  bool is_pending = false;   // somebody who follows the scene has not been told how it is now
+  bool is_shown = false;     // somebody who follows the scene has triangles of it
+  std::uint64_t others = 0;  // IdBit of the objects whose values say which triangles are hidden
+  BlockBox looked_up;        // global: at least the blocks that say it
+  std::uint32_t todo = 0;    // the cache's own notes
   const TsdfBlock* block = nullptr;
 
   BlockMask observed{};  // the block's
@@ -41,18 +49,11 @@ struct MeshPart {
   // Bit x, y, z of the place: the part one further along x, y, z; nullptr where there is none.
   // Offsets run from -1 to 1: (x + 1) + 3 (y + 1) + 9 (z + 1).
   std::array<MeshPart*, 27> around{};
-  std::uint32_t todo = 0;  // the cache's own notes
-  bool any_negative = false;
 
   // What the scene adds (mapper/scene_parts.h).
-  bool is_settled = true;   // `face_ids` and `hidden` belong to triangles and values as they are
-  bool is_pending = false;  // somebody who follows the scene has not been told how it is now
-  bool is_shown = false;    // somebody who follows the scene has triangles of it
   std::vector<Eigen::Vector3f> placed;  // in the world; empty where the lattice is the world's
   std::vector<InstanceId> face_ids;     // labels of the triangles, of one field
   std::vector<std::uint8_t> hidden;     // 1 for triangles that are not visible; empty where all are
-  BlockBox looked_up;                   // global: at least the blocks that say which are hidden
-  std::uint64_t others = 0;             // IdBit of the objects whose values say it
   std::vector<std::uint16_t> renamed;   // of vertices, among the visible; empty where all are
   std::size_t visible_vertices = 0;     // where `renamed` is not empty
   std::uint32_t first_vertex = 0;       // in the mesh that is being put together

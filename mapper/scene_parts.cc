@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "mapper/mesh_tools.h"
@@ -42,6 +44,30 @@ class CornersOf {
  private:
   std::array<const Eigen::Vector3f*, 8> positions_{};
 };
+
+// The voxels where the part's triangles are looked up: those nearest to a point half a voxel in
+// front of each one's centroid. Returns a box around them.
+BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<Index3>& voxels) {
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const float per_voxel = 1 / voxel;
+  const CornersOf corner(part);
+  Index3 low{kMost, kMost, kMost};
+  Index3 high{-kMost, -kMost, -kMost};
+  voxels.resize(part.triangles.size());
+  for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+    const Eigen::Vector3f a = corner(part.triangles[t][0]) * per_voxel;
+    const Eigen::Vector3f b = corner(part.triangles[t][1]) * per_voxel;
+    const Eigen::Vector3f c = corner(part.triangles[t][2]) * per_voxel;
+    const Eigen::Vector3f normal = (b - a).cross(c - a);
+    const float squared = normal.squaredNorm();
+    const float half = squared > 0 ? 0.5F / std::sqrt(squared) : 0;
+    const Index3 v = NearestVoxel((a + b + c) * (1.0F / 3) + half * normal, 1);
+    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+    voxels[t] = v;
+  }
+  return {low, high, false};
+}
 
 // Numbers the vertices of a part that some visible triangle names.
 void RenameVertices(MeshPart& part) {
@@ -139,35 +165,37 @@ void WriteTriangles(const Piece& piece, TriangleMesh& mesh) {
 TriangleMesh MeshAlone(const MeshPart& part, const JoinedMesh& of) {
   constexpr std::uint32_t kNotYet = ~0U;
   thread_local std::vector<std::uint32_t> number(std::size_t{8} << kLocalVertexBits, kNotYet);
+  thread_local std::vector<std::uint16_t> names;  // of the vertices
   TriangleMesh mesh;
   const std::size_t visible = of.visible_only ? VisibleTriangles(part) : part.triangles.size();
   if (visible == 0) return mesh;
-  // A closed surface has half as many vertices as triangles; a part has a border.
-  mesh.vertices.reserve(visible / 2 + 64);
-  mesh.colours.reserve(visible / 2 + 64);
-  mesh.triangles.reserve(visible);
-  mesh.face_ids.reserve(visible);
-  const CornersOf position(part);
+  mesh.triangles.resize(visible);
+  mesh.face_ids.assign(visible, of.id);
   const bool all = visible == part.triangles.size();
+  names.clear();
+  std::size_t to = 0;
   for (std::size_t t = 0; t < part.triangles.size(); ++t) {
     if (!all && part.hidden[t] != 0) continue;
-    std::array<std::uint32_t, 3> corners{};
+    if (of.id == kNoInstance) mesh.face_ids[to] = part.face_ids[t];
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint16_t name = part.triangles[t][i];
       std::uint32_t& vertex = number[name];
       if (vertex == kNotYet) {
-        vertex = static_cast<std::uint32_t>(mesh.vertices.size());
-        const MeshPart& near = *part.around[UpperPlace(name >> kLocalVertexBits)];
-        mesh.vertices.push_back(position(name));
-        mesh.colours.push_back(near.colours[name & kLocalVertexMask]);
+        vertex = static_cast<std::uint32_t>(names.size());
+        names.push_back(name);
       }
-      corners[i] = vertex;
+      mesh.triangles[to][i] = vertex;
     }
-    mesh.triangles.push_back(corners);
-    mesh.face_ids.push_back(of.id != kNoInstance ? of.id : part.face_ids[t]);
+    ++to;
   }
-  for (const auto& triangle : part.triangles) {
-    for (const std::uint16_t name : triangle) number[name] = kNotYet;
+  const CornersOf position(part);
+  mesh.vertices.reserve(names.size());
+  mesh.colours.reserve(names.size());
+  for (const std::uint16_t name : names) {
+    number[name] = kNotYet;
+    const MeshPart& near = *part.around[UpperPlace(name >> kLocalVertexBits)];
+    mesh.vertices.push_back(position(name));
+    mesh.colours.push_back(near.colours[name & kLocalVertexMask]);
   }
   return mesh;
 }
@@ -365,14 +393,15 @@ void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels
   });
 }
 
-std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
                                      const std::function<bool(const MeshPart&)>& in_doubt,
-                                     const std::function<LookUpTriangle()>& new_test) {
+                                     const HiddenAt& hidden_at) {
   // Vertices are named by the triangles of the part and of the lower ones around it: where these
   // are others, or others are hidden, the part's vertices are numbered again.
   constexpr std::uint32_t kNamesChanged = 1;
   constexpr std::uint32_t kToBeNamed = 2;
   ForEachPart(parts, [&](MeshPart& part) {
+    thread_local std::vector<Index3> voxels;
     thread_local std::vector<std::uint8_t> hidden;
     hidden.clear();
     part.looked_up = {};
@@ -382,17 +411,11 @@ std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
       part.looked_up.Extend(part.index + Index3{-1, -1, -1});
       part.looked_up.Extend(part.index + Index3{1, 1, 1});
     } else if (!part.triangles.empty()) {
-      const LookUpTriangle look_up = new_test();
-      const CornersOf corner(part);
-      for (std::size_t t = 0; t < part.triangles.size(); ++t) {
-        const auto& [a, b, c] = part.triangles[t];
-        const FoundThere found = look_up(corner(a), corner(b), corner(c));
-        part.looked_up.Extend(found.block);
-        if (found.other != kNoInstance) part.others |= IdBit(found.other);
-        if (!found.is_hidden) continue;
-        hidden.resize(part.triangles.size(), 0);
-        hidden[t] = 1;
-      }
+      const BlockBox box = FindLookUps(part, voxel, voxels);
+      part.looked_up = {BlockOf(box.low), BlockOf(box.high), false};
+      hidden.resize(voxels.size());
+      part.others = hidden_at(voxels, hidden);
+      if (std::find(hidden.begin(), hidden.end(), 1) == hidden.end()) hidden.clear();
     }
     if (part.is_settled && part.hidden == hidden) return;
     part.is_settled = true;

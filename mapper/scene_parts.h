@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "mapper/mesh_cache.h"
@@ -72,24 +73,17 @@ class BlockSet {
   std::vector<std::uint8_t> held_;  // of the bounds
 };
 
-// What may hide a triangle: the block where it is looked up, the other object that is active there,
-// kNoInstance where there is none, and whether that one's distance says that it is hidden.
-struct FoundThere {
-  Index3 block;
-  InstanceId other = kNoInstance;
-  bool is_hidden = false;
-};
-// Of a triangle, from its three corners in the world.
-using LookUpTriangle = std::function<FoundThere(const Eigen::Vector3f&, const Eigen::Vector3f&,
-                                                const Eigen::Vector3f&)>;
+// Which triangles are hidden, from the global voxels where they are looked up: 1 for those, 0 for
+// the others. Returns IdBit of all objects whose values say it. For several threads at once.
+using HiddenAt = std::function<std::uint64_t(std::span<const Index3>, std::span<std::uint8_t>)>;
 
-// Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names,
-// by a test of their own each; no others are.
+// Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names;
+// no others are. `voxel` in metres.
 // Returns the parts of which other triangles are visible than before, or whose triangles were made
 // again.
-std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts,
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
                                      const std::function<bool(const MeshPart&)>& in_doubt,
-                                     const std::function<LookUpTriangle()>& new_test);
+                                     const HiddenAt& hidden_at);
 
 // Labels the triangles of the parts whose values changed by what labels of each part's own say of
 // the voxels nearest to their centroids in the lattice; `voxel` in metres.
