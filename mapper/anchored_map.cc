@@ -133,12 +133,20 @@ void AnchoredMap::RefreshIndex() const {
   }
   std::vector<IndexBlock> computed(dirty_.size());
   std::vector<IndexBlock*> existing(dirty_.size());
+  std::vector<std::uint8_t> relisted(dirty_.size(), 1);  // other objects are active than were
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, dirty_.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           existing[i] = index_.Find(dirty_[i]);
-          ComputeBlock(dirty_[i], participants, existing[i] ? *existing[i] : computed[i]);
+          IndexBlock& ids = existing[i] ? *existing[i] : computed[i];
+          std::array<InstanceId, kBlockVoxels> before;
+          const bool was_empty = ids.empty();
+          const bool compares = NotesIndexChanges();
+          if (compares && !was_empty) std::copy_n(ids.begin(), kBlockVoxels, before.begin());
+          ComputeBlock(dirty_[i], participants, ids);
+          if (!compares || was_empty != ids.empty()) continue;
+          relisted[i] = was_empty || std::equal(before.begin(), before.end(), ids.begin()) ? 0 : 1;
         }
       },
       tbb::simple_partitioner());
@@ -151,7 +159,9 @@ void AnchoredMap::RefreshIndex() const {
     }
   }
   index_.Erase(emptied);
-  for (const Index3& block : dirty_) NoteIndexChange(block);
+  for (std::size_t i = 0; i < dirty_.size(); ++i) {
+    if (relisted[i] != 0) NoteIndexChange(dirty_[i]);
+  }
   dirty_.clear();
 }
 

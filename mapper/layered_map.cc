@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
+#include <iterator>
+#include <tuple>
+#include <utility>
 
 #include "mapper/mesh_tools.h"
 
@@ -78,8 +81,13 @@ void LayeredMap::NoteIndexChange(const Index3& block) const {
 }
 
 MeshWork LayeredMap::UpdateMeshes() const {
-  const std::size_t gone =
-      std::erase_if(meshes_, [&](const auto& mesh) { return !volumes_.contains(mesh.first); });
+  const std::size_t gone = std::erase_if(meshes_, [&](auto& mesh) {
+    if (volumes_.contains(mesh.first)) return false;
+    for (const Index3& block : mesh.second.mesh.ShownBlocks()) {
+      gone_.parts.push_back({mesh.first, block, {}});
+    }
+    return true;
+  });
   anything_may_be_hidden_ = anything_may_be_hidden_ || gone > 0 || meshes_.size() < volumes_.size();
   MeshWork work;
   bool is_same = !anything_may_be_hidden_ && index_changes_.empty();
@@ -88,7 +96,7 @@ MeshWork LayeredMap::UpdateMeshes() const {
     is_same = is_same && meshes_.at(id).changed.empty() && !meshes_.at(id).has_moved;
   }
   if (is_same) return work;
-  const std::optional<BlocksAround> where = WhereVisibilityChanged();
+  const std::optional<VisibilityChanges> where = WhereVisibilityChanged();
   for (auto& [id, object] : meshes_) {
     if (!where) object.FindNegative();
   }
@@ -103,7 +111,7 @@ MeshWork LayeredMap::UpdateMeshes() const {
 }
 
 // Who is active where changes with the index alone; how deep, with volumes and poses.
-std::optional<BlocksAround> LayeredMap::WhereVisibilityChanged() const {
+std::optional<LayeredMap::VisibilityChanges> LayeredMap::WhereVisibilityChanged() const {
   std::size_t blocks = 0;
   std::size_t changed = 0;
   for (const auto& [id, object] : meshes_) {
@@ -111,88 +119,121 @@ std::optional<BlocksAround> LayeredMap::WhereVisibilityChanged() const {
     changed += object.has_moved ? object.mesh.parts().size() : object.changed.size();
   }
   if (anything_may_be_hidden_ || 4 * changed > blocks) return std::nullopt;
-  std::vector<BlockBox> where;
-  const auto add = [&](const PlacedMesh& object, const Index3& block) {
-    // An interpolated distance reads a voxel further along each axis.
-    where.push_back(
-        PlacedBox({block, block, false}, object, config_.voxel_m, object.lattice_is_world ? 0 : 1));
-  };
+  if (!HasIndex()) return VisibilityChanges{};
+  std::uint64_t whose = 0;
+  std::vector<BlockBox> values;
   for (const auto& [id, object] : meshes_) {
+    const auto add = [&, &of = object](const Index3& block) {
+      // An interpolated distance reads a voxel further along each axis.
+      const bool is_world = of.lattice_is_world;
+      values.push_back(MovedBox({block, block, false}, is_world ? nullptr : &of.T_WL,
+                                config_.voxel_m, is_world ? 0 : 1));
+    };
     if (object.has_moved) {
-      for (const MeshPart* part : object.mesh.parts()) add(object, part->index);
+      for (const MeshPart* part : object.mesh.parts()) add(part->index);
     } else {
-      for (const Index3& block : object.changed) add(object, block);
+      for (const Index3& block : object.changed) add(block);
+    }
+    if (object.has_moved || !object.changed.empty()) whose |= IdBit(id);
+  }
+  std::vector<BlockBox> index;
+  for (const Index3& block : index_changes_) index.push_back({block, block, false});
+  auto index_set = BlockSet::Of(index, 0);
+  auto value_set = BlockSet::Of(values, 0);
+  index.insert(index.end(), values.begin(), values.end());
+  auto near = BlockSet::Of(index, 1);
+  if (!index_set || !value_set || !near) return std::nullopt;
+  return VisibilityChanges{std::move(*index_set), std::move(*value_set), whose, std::move(index),
+                           std::move(*near)};
+}
+
+std::vector<MeshPart*> LayeredMap::PartsToLookUp(
+    PlacedMesh& object, const std::optional<VisibilityChanges>& where) const {
+  std::vector<MeshPart*> parts = object.mesh.TakeUnsettled();
+  if (!where || object.has_moved) return object.mesh.parts();
+  // A triangle is looked up less than a block from its own.
+  std::optional<BlockSet> near_in_lattice;
+  if (!object.lattice_is_world) {
+    const Pose T_LW = object.T_WL.inverse();
+    std::vector<BlockBox> boxes;
+    for (const BlockBox& box : where->all) {
+      boxes.push_back(MovedBox(box, &T_LW, config_.voxel_m, 0));
+    }
+    near_in_lattice = BlockSet::Of(boxes, 1);
+    if (!near_in_lattice) return object.mesh.parts();
+  }
+  const BlockSet& near = near_in_lattice ? *near_in_lattice : where->near;
+  for (MeshPart* part : near.PartsOf(object.mesh)) {
+    if (!part->is_settled) continue;
+    // Where the index is as it was, the objects that are looked up are those that were.
+    const bool others_changed = (part->others & where->whose) != 0;
+    if (where->index.Meets(part->looked_up) ||
+        (others_changed && where->values.Meets(part->looked_up))) {
+      parts.push_back(part);
     }
   }
-  for (const Index3& block : index_changes_) where.push_back({block, block, false});
-  return BlocksAround::Of(where);
+  return parts;
 }
 
 // A triangle is dropped where another object is active at its look-up voxel, deep enough.
-void LayeredMap::FindHiddenTriangles(const std::optional<BlocksAround>& where) const {
+void LayeredMap::FindHiddenTriangles(const std::optional<VisibilityChanges>& where) const {
   struct Object {
-    const PlacedMesh* mesh;
+    const TsdfGrid* grid;
+    bool lattice_is_world;
     BlockBox reach;
-    VoxelReader reader;
+    std::optional<VoxelReader> reader;  // unless the lattice is the world's
     Pose T_LW;
   };
   std::map<InstanceId, Object> objects;
   for (const auto& [id, volume] : volumes_) {
-    const PlacedMesh& mesh = meshes_.at(id);
-    objects.emplace(id, Object{&mesh, ReachOf(mesh, config_.voxel_m), VoxelReader(volume.grid),
-                               volume.T_WL.inverse()});
+    const bool is_world = volume.lattice_is_world;
+    Object object{&volume.grid,
+                  is_world,
+                  ReachOf(meshes_.at(id), config_.voxel_m),
+                  {},
+                  volume.T_WL.inverse()};
+    if (!is_world) object.reader.emplace(volume.grid);
+    objects.emplace(id, std::move(object));
   }
-  const auto distance_at = [&](InstanceId id, const Index3& v) {
-    const Object& of = objects.at(id);
-    const Eigen::Vector3d voxel(v.x, v.y, v.z);
-    const Eigen::Vector3d q =
-        of.mesh->lattice_is_world
-            ? voxel
-            : Eigen::Vector3d(of.T_LW * (voxel * config_.voxel_m) / config_.voxel_m);
-    return DistanceAt(FindCorners(of.reader, q));
-  };
   const float voxel = config_.voxel();
-  for (auto& [self, object] : meshes_) {
-    std::vector<MeshPart*> parts = object.mesh.TakeUnsettled();
-    const auto blocks_of = [&, &placed = object](const MeshPart& part) {
-      return PlacedBox({part.index, part.index, false}, placed, config_.voxel_m, 0);
-    };
-    if (!where || object.has_moved) {
-      parts = object.mesh.parts();
-    } else {
-      for (MeshPart* part : object.mesh.parts()) {
-        if (!part->is_settled || part->triangles.empty()) continue;
-        const bool meets =
-            object.lattice_is_world ? where->Holds(part->index) : where->Meets(blocks_of(*part));
-        if (meets) parts.push_back(part);
-      }
+  const auto is_inside = [&](InstanceId id, const Index3& v) {
+    const Object& of = objects.at(id);
+    if (of.lattice_is_world) {
+      const TsdfBlock* block = of.grid->Find(BlockOf(v));
+      const auto i = static_cast<std::size_t>(PlaceInBlock(v));
+      return block != nullptr && block->weight[i] > 0 && block->distance[i] < -voxel;
     }
+    const Eigen::Vector3d q =
+        of.T_LW * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
+    const auto distance = DistanceAt(FindCorners(*of.reader, q));
+    return distance && *distance < -voxel;
+  };
+  for (auto& [self, object] : meshes_) {
     const auto in_doubt = [&, id = self, is_world = object.lattice_is_world](const MeshPart& part) {
-      return std::any_of(objects.begin(), objects.end(), [&](const auto& other) {
-        return other.first != id && (!is_world || other.second.reach.Holds(part.index));
-      });
+      return HasIndex() && std::any_of(objects.begin(), objects.end(), [&](const auto& other) {
+               return other.first != id && (!is_world || other.second.reach.Holds(part.index));
+             });
     };
-    const auto new_test = [&, id = self]() -> IsHidden {
-      // Triangles beside each other are looked up in the same block.
-      struct Last {
-        Index3 block;
-        const InstanceId* ids = nullptr;
-        bool is_known = false;
-      };
-      return [&, id, last = Last{}](const Eigen::Vector3f& a, const Eigen::Vector3f& b,
-                                    const Eigen::Vector3f& c) mutable {
-        const Eigen::Vector3f normal = (b - a).cross(c - a).stableNormalized();
-        const Eigen::Vector3f outwards = (a + b + c) / 3.0F + 0.5F * voxel * normal;
-        const Index3 v = NearestVoxel(outwards, voxel);
-        const Index3 block = BlockOf(v);
-        if (!last.is_known || block != last.block) last = {block, ActiveIn(block), true};
-        const InstanceId active = last.ids == nullptr ? kNoInstance : last.ids[PlaceInBlock(v)];
-        if (active == kNoInstance || active == id) return false;
-        const auto distance = distance_at(active, v);
-        return distance && *distance < -voxel;
-      };
+    const auto hidden_at = [&, id = self](std::span<const Index3> voxels,
+                                          std::span<std::uint8_t> hidden) {
+      std::uint64_t others = 0;
+      // One voxel after another is in the same block.
+      std::optional<Index3> last;
+      const InstanceId* ids = nullptr;
+      for (std::size_t i = 0; i < voxels.size(); ++i) {
+        const Index3 block = BlockOf(voxels[i]);
+        if (last != block) ids = ActiveIn(block);
+        last = block;
+        const InstanceId active = ids == nullptr ? kNoInstance : ids[PlaceInBlock(voxels[i])];
+        const bool is_other = active != kNoInstance && active != id;
+        if (is_other) others |= IdBit(active);
+        hidden[i] = is_other && is_inside(active, voxels[i]) ? 1 : 0;
+      }
+      return others;
     };
-    HideTriangles(parts, in_doubt, new_test);
+    object.mesh.NoteChanges(
+        HideTriangles(PartsToLookUp(object, where), voxel, in_doubt, hidden_at));
+    if (object.has_moved) object.mesh.NoteChanges(object.mesh.parts());
   }
 }
 
@@ -201,6 +242,28 @@ TriangleMesh LayeredMap::SceneMesh() const {
   std::vector<JoinedMesh> visible;
   for (const auto& [id, object] : meshes_) visible.push_back({&object.mesh, id, true});
   return Join(visible);
+}
+
+SceneChanges LayeredMap::TakeSceneChanges() const {
+  SceneChanges changes;
+  changes.work = UpdateMeshes();
+  std::vector<ScenePiece>& parts = changes.parts;
+  parts = std::exchange(gone_.parts, {});
+  const bool any_gone = !parts.empty();
+  for (auto& [id, object] : meshes_) {
+    std::vector<ScenePiece> more = TakeScenePieces(object.mesh, {&object.mesh, id, true});
+    std::move(more.begin(), more.end(), std::back_inserter(parts));
+  }
+  if (!any_gone) return changes;
+  // An object of the same id may have come since, to the same blocks: the last word counts.
+  const auto place = [](const ScenePiece& part) { return std::tie(part.id, part.block); };
+  std::stable_sort(parts.begin(), parts.end(),
+                   [&](const ScenePiece& a, const ScenePiece& b) { return place(a) < place(b); });
+  const auto last =
+      std::unique(parts.rbegin(), parts.rend(),
+                  [&](const ScenePiece& a, const ScenePiece& b) { return place(a) == place(b); });
+  parts.erase(parts.begin(), last.base());
+  return changes;
 }
 
 const TsdfGrid* LayeredMap::GridOf(InstanceId id) const {

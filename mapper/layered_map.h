@@ -14,6 +14,7 @@ class LayeredMap : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  SceneChanges TakeSceneChanges() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
   MeshWork UpdateMeshes() const override;
@@ -37,6 +38,8 @@ class LayeredMap : public MapRepresentation {
   // The active objects of the kBlockVoxels voxels of a block of the global index, kNoInstance where
   // there is none; nullptr where nothing is listed in the block.
   virtual const InstanceId* ActiveIn(const Index3& block) const = 0;
+  // Whether anybody is active anywhere, so that triangles may be hidden.
+  virtual bool HasIndex() const { return true; }
   // The active object of a global voxel, or kNoInstance.
   InstanceId ActiveAt(const Index3& voxel) const {
     const InstanceId* ids = ActiveIn(BlockOf(voxel));
@@ -45,6 +48,8 @@ class LayeredMap : public MapRepresentation {
 
   // Tells the visible scene that other objects may be active in this block of the index than were.
   void NoteIndexChange(const Index3& block) const;
+  // False while it need not be told.
+  bool NotesIndexChanges() const { return !anything_may_be_hidden_; }
 
   // A block whose cover may have changed with a frame.
   struct StaleCover {
@@ -68,12 +73,31 @@ class LayeredMap : public MapRepresentation {
 
  private:
   MeshWork UpdateObjectMesh(InstanceId id) const;
-  // Where triangles may have become hidden or visible since the last update; nothing where that
-  // may be anywhere.
-  std::optional<BlocksAround> WhereVisibilityChanged() const;
-  void FindHiddenTriangles(const std::optional<BlocksAround>& where) const;
+  // Where triangles may have become hidden or visible since the last update, in global blocks.
+  struct VisibilityChanges {
+    BlockSet index;           // other objects may be active
+    BlockSet values;          // distances of some objects are others ...
+    std::uint64_t whose = 0;  // ... of those with these bits
+    std::vector<BlockBox> all;
+    BlockSet near;  // these and the blocks beside them
+  };
+  // Nothing where that may be anywhere.
+  std::optional<VisibilityChanges> WhereVisibilityChanged() const;
+  // The parts of the object whose triangles are to be looked up again; all where `where` is
+  // nothing.
+  std::vector<MeshPart*> PartsToLookUp(PlacedMesh& object,
+                                       const std::optional<VisibilityChanges>& where) const;
+  void FindHiddenTriangles(const std::optional<VisibilityChanges>& where) const;
+
+  // Shown parts of objects that are gone. A copy starts empty, as its meshes do.
+  struct GoneParts {
+    GoneParts() = default;
+    GoneParts(const GoneParts&) {}
+    std::vector<ScenePiece> parts;
+  };
 
   mutable std::map<InstanceId, PlacedMesh> meshes_;
+  mutable GoneParts gone_;
   mutable std::vector<Index3> index_changes_;  // since the last update
   mutable bool anything_may_be_hidden_ = true;
 };

@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -29,7 +30,6 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 }
 
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
-  active_.is_current = false;
   const FrameView view(frame, labels);
   const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
     return {Pose::Identity(), &lists_.directory()};
@@ -63,6 +63,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
     for (const InstanceId id : task.targets) volumes_[id].grid.FindOrAdd(task.index);
   }
   for_each_task([&](Task& task) { FuseActive(view, T_CW, task); });
+  NoteFieldChange(tasks);
   // A frame empties no list; it may have made blocks in vain.
   lists_.Erase(EmptyFrom(lists_, blocks_before, [](const ListBlock& b) { return b.IsEmpty(); }));
   CheckInDebugBuilds(*this);
@@ -154,7 +155,7 @@ void LiteralMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
 }
 
 void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
-  active_.is_current = false;
+  active_.all_are_stale = true;
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
   if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
@@ -180,7 +181,7 @@ void LiteralMap::Activate(InstanceId id) {
 }
 
 void LiteralMap::Remove(InstanceId id) {
-  active_.is_current = false;
+  active_.all_are_stale = true;
   FreeEmptyLists(Unlist(id));
   volumes_.erase(id);
   CheckInDebugBuilds(*this);
@@ -204,36 +205,52 @@ TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
   return Join({{&mesh}});
 }
 
+void LiteralMap::NoteFieldChange(const std::vector<Task>& tasks) {
+  if (active_.all_are_stale) return;
+  for (const Task& task : tasks) active_.stale.push_back(task.index);
+  // Nor may they pile up while nobody asks.
+  active_.all_are_stale = active_.stale.size() > lists_.size();
+}
+
 // Brings the field of the active objects' values in line with lists and volumes.
 void LiteralMap::UpdateActiveField() const {
-  if (std::exchange(active_.is_current, true)) return;
   TsdfGrid& field = active_.field;
-  std::vector<Index3> gone;
-  for (const auto& entry : field.entries()) {
-    if (lists_.Find(entry.index) == nullptr) gone.push_back(entry.index);
+  std::vector<Index3> stale = std::exchange(active_.stale, {});
+  if (std::exchange(active_.all_are_stale, false)) {
+    stale.clear();
+    for (const auto& entry : field.entries()) stale.push_back(entry.index);
+    for (const auto& entry : lists_.entries()) stale.push_back(entry.index);
   }
+  if (stale.empty()) return;
+  std::sort(stale.begin(), stale.end());
+  stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
+  std::vector<Index3> gone;
+  std::erase_if(stale, [&](const Index3& index) {
+    if (lists_.Find(index) != nullptr) return false;
+    if (field.Find(index) != nullptr) gone.push_back(index);
+    return true;
+  });
   field.Erase(gone);
   active_.made_from.Erase(gone);
-  for (const auto& entry : lists_.entries()) {
-    field.FindOrAdd(entry.index);
-    active_.made_from.FindOrAdd(entry.index);
+  for (const Index3& index : stale) {
+    field.FindOrAdd(index);
+    active_.made_from.FindOrAdd(index);
   }
-  const auto& lists = lists_.entries();
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, lists.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, stale.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const ListBlock& list = *lists[i].block;
+          const ListBlock& list = *lists_.Find(stale[i]);
           std::vector<std::uint64_t> from{list.revision};
           std::vector<const TsdfBlock*> of;
           for (const auto& [id, volume] : volumes_) {
-            of.push_back(volume.grid.Find(lists[i].index));
+            of.push_back(volume.grid.Find(stale[i]));
             from.push_back(of.back() == nullptr ? 0 : of.back()->revision);
           }
-          std::vector<std::uint64_t>& made_from = *active_.made_from.Find(lists[i].index);
+          std::vector<std::uint64_t>& made_from = *active_.made_from.Find(stale[i]);
           if (from == made_from) continue;
           made_from = std::move(from);
-          TsdfBlock& block = *field.Find(lists[i].index);
+          TsdfBlock& block = *field.Find(stale[i]);
           block = {};
           auto source = of.begin();
           for (const auto& [id, volume] : volumes_) {
@@ -279,6 +296,11 @@ std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pos
 TriangleMesh LiteralMap::SceneMesh() const {
   UpdateMeshes();
   return Join({{&active_.mesh}});
+}
+
+SceneChanges LiteralMap::TakeSceneChanges() const {
+  const MeshWork work = UpdateMeshes();
+  return {TakeScenePieces(active_.mesh, {&active_.mesh}), work};
 }
 
 const TsdfGrid* LiteralMap::GridOf(InstanceId id) const {

@@ -25,6 +25,7 @@ class LiteralMap final : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  SceneChanges TakeSceneChanges() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
   MeshWork UpdateMeshes() const override;
@@ -54,7 +55,9 @@ class LiteralMap final : public MapRepresentation {
   struct ActiveField {
     ActiveField() = default;
     ActiveField(const ActiveField&) {}
-    bool is_current = false;
+    // Blocks of lists or values that may have changed since it was made.
+    bool all_are_stale = true;
+    std::vector<Index3> stale;
     TsdfGrid field;
     BlockGrid<std::vector<std::uint64_t>> made_from;  // revisions of the lists and of each volume
     GridMesh mesh;
@@ -72,6 +75,7 @@ class LiteralMap final : public MapRepresentation {
   // none.
   VoxelLabels ActiveAtVoxels() const;
   void UpdateActiveField() const;
+  void NoteFieldChange(const std::vector<Task>& tasks);
   // The list blocks in which the object was listed.
   std::vector<Index3> Unlist(InstanceId id);
   // Lists the object first wherever it is observed.

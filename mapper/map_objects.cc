@@ -68,6 +68,7 @@ TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {
 Expected<void> LayeredMap::Rename(InstanceId from, InstanceId to) {
   TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
   RenameKey(from, to, volumes_);
+  anything_may_be_hidden_ = true;
   return {};
 }
 
@@ -125,7 +126,7 @@ Expected<void> AnchoredMap::Add(InstanceId id, const TsdfGrid& volume, const Pos
 }
 
 Expected<void> LiteralMap::Rename(InstanceId from, InstanceId to) {
-  active_.is_current = false;
+  active_.all_are_stale = true;
   TSDFPP_RETURN_IF_ERROR(CheckRename(from, volumes_.contains(from), to, volumes_.contains(to)));
   for (const auto& entry : lists_.entries()) {
     for (auto* entries : {&entry.block->active, &entry.block->inactive}) {
@@ -141,7 +142,7 @@ Expected<void> LiteralMap::Rename(InstanceId from, InstanceId to) {
 
 Expected<void> LiteralMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                                const Pose& T_WO) {
-  active_.is_current = false;
+  active_.all_are_stale = true;
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
   ObjectVolume& added = volumes_[id];
   added.T_WO = T_WO;

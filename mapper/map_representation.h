@@ -10,6 +10,7 @@
 #include "mapper/map_config.h"
 #include "mapper/mesh_cache.h"
 #include "mapper/ray_cast.h"
+#include "mapper/scene_parts.h"
 #include "mapper/section_file.h"
 #include "mapper/tsdf_block.h"
 
@@ -88,6 +89,14 @@ class MapRepresentation {
 
   // The visible scene: coloured, with face_ids.
   virtual TriangleMesh SceneMesh() const = 0;
+
+  // The visible scene for somebody who follows it: the parts of it that are not as they were when
+  // this was last asked, all that have triangles the first time, at a cost that goes with their
+  // number. By id, then block. Who replaces what he has of an id and block by what he is told,
+  // dropping it where it has no triangles, has the triangles of SceneMesh(), in its order where
+  // parts are by id and block. A copy of the map starts anew. Call from one thread, as
+  // UpdateMeshes.
+  virtual SceneChanges TakeSceneChanges() const = 0;
 
   // The map seen from a pose: options.surfaces images, the visible scene first. The n-th surface
   // along a ray is the first one of the map without the objects of the n - 1 before it.

@@ -155,7 +155,7 @@ void LiteralMap::Save(Sections& sections) const {
 }
 
 Expected<void> LiteralMap::Load(const Sections& sections) {
-  active_.is_current = false;
+  active_.all_are_stale = true;
   TSDFPP_ASSIGN(volumes_, LoadAllVolumes(sections, config_));
   TSDFPP_RETURN_IF_ERROR(CheckWorldLattices(volumes_));
   TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists, LoadAllLists(sections, kLists, 2, config_));

@@ -4,17 +4,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <tuple>
 #include <utility>
 
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kPartsPerTask = 32;
+constexpr std::size_t kPartsPerTask = 8;
 constexpr std::size_t kPartsPerLink = 1024;
-// No block has these revisions.
-constexpr std::uint64_t kNeverSeen = ~0ULL;
-constexpr std::uint64_t kGone = ~0ULL - 1;
+constexpr std::size_t kPartsPerComparison = 1024;
+constexpr std::uint64_t kNeverSeen = ~0ULL;  // no block has this revision
 
 // Bits of MeshPart::todo.
 constexpr std::uint32_t kCubes = 1;
@@ -30,9 +30,10 @@ constexpr std::array<std::size_t, 8> kReadMyMasks{kSelf, 12, 10, 9, 4, 3, 1, 0};
 constexpr std::array<std::size_t, 7> kReadMyCubes{kSelf, 14, 16, 22, 17, 23, 25};
 
 template <typename Function>
-void ForEachInParallel(std::size_t count, const Function& function) {
+void ForEachInParallel(std::size_t count, const Function& function,
+                       std::size_t per_task = kPartsPerTask) {
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, count, kPartsPerTask),
+      tbb::blocked_range<std::size_t>(0, count, per_task),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
       },
@@ -55,6 +56,42 @@ void GridMesh::Unsettle(MeshPart& part) {
 
 std::vector<MeshPart*> GridMesh::TakeUnsettled() { return std::exchange(unsettled_, {}); }
 
+void GridMesh::NoteChanges(const std::vector<MeshPart*>& parts) {
+  if (!is_followed_) return;
+  for (MeshPart* part : parts) {
+    if (!std::exchange(part->is_pending, true)) pending_.push_back(part);
+  }
+}
+
+GridMesh::Changes GridMesh::TakeChanges() {
+  if (!std::exchange(is_followed_, true)) return {order_, {}};
+  Changes changes;
+  for (const Index3& index : std::exchange(gone_, {})) {
+    // A block may be there again.
+    MeshPart* part = PartAt(index);
+    if (part == nullptr) {
+      changes.gone.push_back(index);
+      continue;
+    }
+    part->is_shown = true;
+    NoteChanges({part});
+  }
+  changes.parts = std::exchange(pending_, {});
+  for (MeshPart* part : changes.parts) part->is_pending = false;
+  std::sort(changes.parts.begin(), changes.parts.end(),
+            [](const MeshPart* a, const MeshPart* b) { return a->index < b->index; });
+  std::sort(changes.gone.begin(), changes.gone.end());
+  return changes;
+}
+
+std::vector<Index3> GridMesh::ShownBlocks() const {
+  std::vector<Index3> blocks = gone_;
+  for (const MeshPart* part : order_) {
+    if (part->is_shown) blocks.push_back(part->index);
+  }
+  return blocks;
+}
+
 MeshPart* GridMesh::PartAt(const Index3& block) const {
   const std::uint64_t key = PackIndex(block);
   const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
@@ -67,29 +104,28 @@ void GridMesh::MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t 
   for (const std::size_t place : offsets) Mark(part.around[place], what, list);
 }
 
-// Makes `owned_` and `order_` those of the grid's blocks; returns how many were erased.
-std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
+// Makes `owned_` and `order_` those of the grid's blocks.
+void GridMesh::MatchBlocks(const TsdfGrid& grid) {
   const auto& entries = grid.entries();
   std::size_t same = 0;
   while (same < owned_.size() && same < entries.size() &&
-         owned_[same]->index == entries[same].index) {
+         seen_[same].index == entries[same].index) {
     ++same;
   }
-  if (same == owned_.size() && same == entries.size()) return 0;
-
   // Blocks were added behind, or some were erased, or this is another grid.
   struct Spare {
     std::uint64_t key;
+    Seen seen;
     std::unique_ptr<MeshPart> part;
   };
   std::vector<Spare> spares;
   for (std::size_t i = same; i < owned_.size(); ++i) {
-    const std::uint64_t key = PackIndex(owned_[i]->index);
-    spares.push_back({key, std::move(owned_[i])});
+    spares.push_back({PackIndex(seen_[i].index), seen_[i], std::move(owned_[i])});
   }
   std::sort(spares.begin(), spares.end(),
             [](const Spare& a, const Spare& b) { return a.key < b.key; });
   owned_.resize(entries.size());
+  seen_.resize(entries.size());
   ForEachInParallel(entries.size() - same, [&](std::size_t k) {
     const Index3& index = entries[same + k].index;
     const std::uint64_t key = PackIndex(index);
@@ -99,30 +135,34 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
     std::unique_ptr<MeshPart>& part = owned_[same + k];
     if (spare != spares.end() && spare->key == key) {
       part = std::move(spare->part);
+      seen_[same + k] = spare->seen;
     } else {
       part = std::make_unique<MeshPart>();
       part->index = index;
-      part->revision = kNeverSeen;
+      seen_[same + k] = {index, nullptr, kNeverSeen};
     }
   });
   // What lay around an erased block has lost what it was made from.
   for (const Spare& spare : spares) {
-    if (spare.part != nullptr) spare.part->revision = kGone;
+    if (spare.part != nullptr) spare.part->block = nullptr;
   }
-  std::size_t erased = 0;
+  bool any_erased = false;
   for (const Spare& spare : spares) {
     if (spare.part == nullptr) continue;
-    ++erased;
+    any_erased = true;
     changed_.push_back(spare.part->index);
+    if (spare.part->is_shown) gone_.push_back(spare.part->index);
     for (MeshPart* part : spare.part->around) {
-      if (part == nullptr || part->revision == kGone) continue;
+      if (part == nullptr || part->block == nullptr) continue;
       Mark(part, kCubes, cubes_todo_);
       Mark(part, kEdges, edges_todo_);
     }
   }
 
-  if (erased > 0) {
-    std::erase_if(unsettled_, [](const MeshPart* part) { return part->revision == kGone; });
+  if (any_erased) {
+    for (Parts* list : {&unsettled_, &pending_}) {
+      std::erase_if(*list, [](const MeshPart* part) { return part->block == nullptr; });
+    }
   }
 
   std::vector<std::pair<std::uint64_t, MeshPart*>> sorted(owned_.size());
@@ -134,7 +174,6 @@ std::size_t GridMesh::MatchBlocks(const TsdfGrid& grid) {
   keys_.resize(sorted.size());
   for (std::size_t i = 0; i < sorted.size(); ++i) std::tie(keys_[i], order_[i]) = sorted[i];
   Link();
-  return erased;
 }
 
 // Tells each part which ones are around it. The nine rows of blocks along x that surround a part
@@ -165,28 +204,42 @@ void GridMesh::Link() {
       tbb::simple_partitioner());
 }
 
-// Compares the parts with their blocks and notes what has to be made again.
-void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
+// Compares the parts with their blocks and brings their masks up to date. False where the parts are
+// not those of the grid's blocks; the rest is done then.
+bool GridMesh::Compare(const TsdfGrid& grid, std::vector<Change>& change) {
   const auto& entries = grid.entries();
-  enum : std::uint8_t { kSame, kValues, kMasks };
-  std::vector<std::uint8_t> change(entries.size(), kSame);
-  ForEachInParallel(entries.size(), [&](std::size_t i) {
+  if (entries.size() != owned_.size()) return false;
+  std::atomic<bool> matches = true;
+  const auto compare = [&](std::size_t i) {
+    const TsdfBlock& block = *entries[i].block;
+    Seen& seen = seen_[i];
+    if (entries[i].index != seen.index) {
+      matches.store(false, std::memory_order_relaxed);
+      return;
+    }
+    if (block.revision == seen.revision && &block == seen.block) return;
+    const bool is_same = block.revision == seen.revision;
+    seen.revision = block.revision;
+    seen.block = &block;
     MeshPart& part = *owned_[i];
-    part.block = entries[i].block.get();
-    if (part.block->revision == part.revision) return;
-    part.revision = part.block->revision;
+    part.block = &block;
+    if (is_same) return;
     change[i] = kValues;
-    if (part.observed == part.block->observed && part.negative == part.block->negative) return;
-    part.observed = part.block->observed;
-    part.negative = part.block->negative;
-    part.any_negative = part.block->AnyNegative();
+    if (part.observed == block.observed && part.negative == block.negative) return;
+    part.observed = block.observed;
+    part.negative = block.negative;
+    part.any_negative = block.AnyNegative();
     change[i] = kMasks;
-  });
-  work.blocks = entries.size();
-  if (std::find_if(change.begin(), change.end(), [](auto c) { return c != kMasks; }) ==
+  };
+  ForEachInParallel(entries.size(), compare, kPartsPerComparison);
+  return matches.load(std::memory_order_relaxed);
+}
+
+// Notes what has to be made again.
+void GridMesh::MarkChanged(const std::vector<Change>& change) {
+  if (std::find_if(change.begin(), change.end(), [](Change c) { return c != kMasks; }) ==
       change.end()) {
     // All is new: no need to ask who reads what.
-    work.changed = entries.size();
     for (MeshPart* part : order_) {
       part->todo = kCubes | kEdges | kVertices | kTriangles;
       changed_.push_back(part->index);
@@ -196,10 +249,9 @@ void GridMesh::MarkChanged(const TsdfGrid& grid, MeshWork& work) {
     }
     return;
   }
-  for (std::size_t i = 0; i < entries.size(); ++i) {
+  for (std::size_t i = 0; i < change.size(); ++i) {
     if (change[i] == kSame) continue;
-    ++work.changed;
-    changed_.push_back(entries[i].index);
+    changed_.push_back(seen_[i].index);
     MarkAround(*owned_[i], kReadMyValues, kVertices, vertices_todo_);
     for (const std::size_t place : kReadMyMasks) {
       if (MeshPart* part = owned_[i]->around[place]) Unsettle(*part);
@@ -214,9 +266,14 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
   MeshWork work;
   changed_.clear();
   remade_.clear();
-  const std::size_t erased = MatchBlocks(grid);
-  MarkChanged(grid, work);
-  work.changed += erased;
+  std::vector<Change> change(grid.size(), kSame);
+  if (!Compare(grid, change)) {
+    MatchBlocks(grid);
+    Compare(grid, change);
+  }
+  MarkChanged(change);
+  work.blocks = grid.size();
+  work.changed = changed_.size();
 
   std::vector<std::uint8_t> changed(cubes_todo_.size());
   ForEachInParallel(cubes_todo_.size(),
@@ -256,9 +313,11 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
 }
 
 std::size_t GridMesh::Bytes() const {
-  std::size_t bytes = order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
-                      (remade_.capacity() + unsettled_.capacity()) * sizeof(MeshPart*) +
-                      changed_.capacity() * sizeof(Index3) + owned_.capacity() * sizeof(owned_[0]);
+  std::size_t bytes =
+      order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
+      (remade_.capacity() + unsettled_.capacity() + pending_.capacity()) * sizeof(MeshPart*) +
+      (changed_.capacity() + gone_.capacity()) * sizeof(Index3) +
+      owned_.capacity() * (sizeof(owned_[0]) + sizeof(Seen));
   for (const MeshPart* part : order_) {
     bytes += sizeof(MeshPart) + part->positions.capacity() * sizeof(part->positions[0]) +
              part->colours.capacity() * sizeof(part->colours[0]) +

@@ -39,6 +39,8 @@ class GridMesh {
 
   // By block, in Index3's order. The caller may change what a part says of the scene.
   const std::vector<MeshPart*>& parts() const { return order_; }
+  // PackIndex of their blocks, in the same order.
+  const std::vector<std::uint64_t>& keys() const { return keys_; }
 
   // Of the last update: the parts that were made again, and the blocks whose values changed, new
   // and erased ones too.
@@ -49,6 +51,19 @@ class GridMesh {
   // scene adds to them is to be found again, and noted by `is_settled`.
   std::vector<MeshPart*> TakeUnsettled();
 
+  // For somebody who follows the scene: notes that parts look different now, or where they are is
+  // different. Costs nothing until changes were taken once.
+  void NoteChanges(const std::vector<MeshPart*>& parts);
+  // The parts noted since the last time, all the first time, in Index3's order, and the blocks of
+  // those that were shown and are no more. The caller keeps MeshPart::is_shown.
+  struct Changes {
+    std::vector<MeshPart*> parts;
+    std::vector<Index3> gone;
+  };
+  Changes TakeChanges();
+  // The blocks of which the follower has triangles, those that are gone among them.
+  std::vector<Index3> ShownBlocks() const;
+
   // The part of a block, nullptr where there is none.
   MeshPart* PartAt(const Index3& block) const;
 
@@ -57,18 +72,28 @@ class GridMesh {
 
  private:
   using Parts = std::vector<MeshPart*>;
+  // What a part was made from. These lie together, because each update compares them all.
+  struct Seen {
+    Index3 index;
+    const TsdfBlock* block = nullptr;
+    std::uint64_t revision = 0;
+  };
 
-  std::size_t MatchBlocks(const TsdfGrid& grid);
+  // What a comparison found of a block.
+  enum Change : std::uint8_t { kSame, kValues, kMasks };
+  bool Compare(const TsdfGrid& grid, std::vector<Change>& change);
+  void MatchBlocks(const TsdfGrid& grid);
   void Link();
   void Mark(MeshPart* part, std::uint32_t what, Parts& list);
   template <typename Offsets>
   void MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t what, Parts& list);
-  void MarkChanged(const TsdfGrid& grid, MeshWork& work);
+  void MarkChanged(const std::vector<Change>& change);
   void Unsettle(MeshPart& part);
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i
+  std::vector<Seen> seen_;                        // of owned_
   Parts order_;
-  std::vector<std::uint64_t> keys_;  // PackIndex of order_
+  std::vector<std::uint64_t> keys_;
   Parts cubes_todo_;
   Parts edges_todo_;
   Parts vertices_todo_;
@@ -76,6 +101,9 @@ class GridMesh {
   Parts remade_;
   Parts unsettled_;
   std::vector<Index3> changed_;
+  bool is_followed_ = false;
+  Parts pending_;
+  std::vector<Index3> gone_;  // shown when they were erased
 };
 
 }  // namespace tsdfpp

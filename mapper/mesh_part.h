@@ -9,13 +9,30 @@
 
 namespace tsdfpp {
 
+// Blocks of a lattice, both ends included.
+struct BlockBox {
+  Index3 low;
+  Index3 high;
+  bool is_empty = true;
+
+  void Extend(const Index3& index);
+  bool Holds(const Index3& index) const;
+};
+
 // A part owns the cubes named by its block's voxels, and the vertices on the edges that start at
 // them; the triangles of its cubes also name vertices of the seven blocks further along x, y, z.
 // Masks are read from parts and not from blocks, because they are small and lie together.
 struct MeshPart {
+  // What is asked of many parts comes first, so that it is read at once.
   Index3 index;
+  bool any_negative = false;
+  bool is_settled = true;    // what the scene adds belongs to triangles and values as they are
+  bool is_pending = false;   // somebody who follows the scene has not been told how it is now
+  bool is_shown = false;     // somebody who follows the scene has triangles of it
+  std::uint64_t others = 0;  // IdBit of the objects whose values say which triangles are hidden
+  BlockBox looked_up;        // global: at least the blocks that say it
+  std::uint32_t todo = 0;    // the cache's own notes
   const TsdfBlock* block = nullptr;
-  std::uint64_t revision = 0;  // of the values that the part was made from
 
   BlockMask observed{};  // the block's
   BlockMask negative{};
@@ -32,11 +49,8 @@ struct MeshPart {
   // Bit x, y, z of the place: the part one further along x, y, z; nullptr where there is none.
   // Offsets run from -1 to 1: (x + 1) + 3 (y + 1) + 9 (z + 1).
   std::array<MeshPart*, 27> around{};
-  std::uint32_t todo = 0;  // the cache's own notes
-  bool any_negative = false;
 
   // What the scene adds (mapper/scene_parts.h).
-  bool is_settled = true;  // `face_ids` and `hidden` belong to triangles and values as they are
   std::vector<Eigen::Vector3f> placed;  // in the world; empty where the lattice is the world's
   std::vector<InstanceId> face_ids;     // labels of the triangles, of one field
   std::vector<std::uint8_t> hidden;     // 1 for triangles that are not visible; empty where all are
@@ -48,6 +62,9 @@ struct MeshPart {
     return placed.empty() ? positions : placed;
   }
 };
+
+// One of 64 bits for each object, some of which share one.
+inline std::uint64_t IdBit(InstanceId id) { return 1ULL << (id & 63U); }
 
 // A triangle's corner: vertex `local` of the part at offset bit x, y, z of `which`.
 inline constexpr unsigned kLocalVertexBits = 11;  // three edges a voxel: 1536

@@ -3,8 +3,10 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
+#include <utility>
 
 #include "mapper/mesh_tools.h"
 #include "mapper/object_volume.h"
@@ -12,7 +14,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kPartsPerTask = 32;
+constexpr std::size_t kPartsPerTask = 8;
 constexpr std::uint16_t kUnused = 0xFFFF;  // more than any vertex of a part
 constexpr std::uint16_t kUsed = 0;
 
@@ -42,6 +44,30 @@ class CornersOf {
  private:
   std::array<const Eigen::Vector3f*, 8> positions_{};
 };
+
+// The voxels where the part's triangles are looked up: those nearest to a point half a voxel in
+// front of each one's centroid. Returns a box around them.
+BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<Index3>& voxels) {
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const float per_voxel = 1 / voxel;
+  const CornersOf corner(part);
+  Index3 low{kMost, kMost, kMost};
+  Index3 high{-kMost, -kMost, -kMost};
+  voxels.resize(part.triangles.size());
+  for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+    const Eigen::Vector3f a = corner(part.triangles[t][0]) * per_voxel;
+    const Eigen::Vector3f b = corner(part.triangles[t][1]) * per_voxel;
+    const Eigen::Vector3f c = corner(part.triangles[t][2]) * per_voxel;
+    const Eigen::Vector3f normal = (b - a).cross(c - a);
+    const float squared = normal.squaredNorm();
+    const float half = squared > 0 ? 0.5F / std::sqrt(squared) : 0;
+    const Index3 v = NearestVoxel((a + b + c) * (1.0F / 3) + half * normal, 1);
+    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+    voxels[t] = v;
+  }
+  return {low, high, false};
+}
 
 // Numbers the vertices of a part that some visible triangle names.
 void RenameVertices(MeshPart& part) {
@@ -135,7 +161,72 @@ void WriteTriangles(const Piece& piece, TriangleMesh& mesh) {
   }
 }
 
+// The part's triangles with vertices of their own, in the order in which they are named.
+TriangleMesh MeshAlone(const MeshPart& part, const JoinedMesh& of) {
+  constexpr std::uint32_t kNotYet = ~0U;
+  thread_local std::vector<std::uint32_t> number(std::size_t{8} << kLocalVertexBits, kNotYet);
+  thread_local std::vector<std::uint16_t> names;  // of the vertices
+  TriangleMesh mesh;
+  const std::size_t visible = of.visible_only ? VisibleTriangles(part) : part.triangles.size();
+  if (visible == 0) return mesh;
+  mesh.triangles.resize(visible);
+  mesh.face_ids.assign(visible, of.id);
+  const bool all = visible == part.triangles.size();
+  names.clear();
+  std::size_t to = 0;
+  for (std::size_t t = 0; t < part.triangles.size(); ++t) {
+    if (!all && part.hidden[t] != 0) continue;
+    if (of.id == kNoInstance) mesh.face_ids[to] = part.face_ids[t];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint16_t name = part.triangles[t][i];
+      std::uint32_t& vertex = number[name];
+      if (vertex == kNotYet) {
+        vertex = static_cast<std::uint32_t>(names.size());
+        names.push_back(name);
+      }
+      mesh.triangles[to][i] = vertex;
+    }
+    ++to;
+  }
+  const CornersOf position(part);
+  mesh.vertices.reserve(names.size());
+  mesh.colours.reserve(names.size());
+  for (const std::uint16_t name : names) {
+    number[name] = kNotYet;
+    const MeshPart& near = *part.around[UpperPlace(name >> kLocalVertexBits)];
+    mesh.vertices.push_back(position(name));
+    mesh.colours.push_back(near.colours[name & kLocalVertexMask]);
+  }
+  return mesh;
+}
+
 }  // namespace
+
+std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of) {
+  const GridMesh::Changes changes = mesh.TakeChanges();
+  std::vector<ScenePiece> parts(changes.parts.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, parts.size(), kPartsPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          parts[i] = {of.id, changes.parts[i]->index, MeshAlone(*changes.parts[i], of)};
+        }
+      },
+      tbb::simple_partitioner());
+  // Nobody needs to hear of what was empty and is.
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const bool shows = !parts[i].mesh.triangles.empty();
+    if (!std::exchange(changes.parts[i]->is_shown, shows) && !shows) continue;
+    if (kept != i) parts[kept] = std::move(parts[i]);
+    ++kept;
+  }
+  parts.resize(kept);
+  for (const Index3& block : changes.gone) parts.push_back({of.id, block, {}});
+  std::sort(parts.begin(), parts.end(),
+            [](const ScenePiece& a, const ScenePiece& b) { return a.block < b.block; });
+  return parts;
+}
 
 MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now,
                             bool is_world_now) {
@@ -181,63 +272,68 @@ bool BlockBox::Holds(const Index3& index) const {
          index.x <= high.x && index.y <= high.y && index.z <= high.z;
 }
 
-BlockBox PlacedBox(const BlockBox& box, const PlacedMesh& object, double voxel_m, int margin) {
-  BlockBox placed;
-  if (box.is_empty) return placed;
+BlockBox MovedBox(const BlockBox& box, const Pose* T, double voxel_m, int margin) {
+  BlockBox moved;
+  if (box.is_empty) return moved;
   const Index3 low{box.low.x * kBlockSide - margin, box.low.y * kBlockSide - margin,
                    box.low.z * kBlockSide - margin};
   const Index3 high{(box.high.x + 1) * kBlockSide + margin, (box.high.y + 1) * kBlockSide + margin,
                     (box.high.z + 1) * kBlockSide + margin};
-  if (object.lattice_is_world) {
-    placed.Extend(BlockOf(low));
-    placed.Extend(BlockOf(high + Index3{-1, -1, -1}));
-    return placed;
+  if (T == nullptr) {
+    moved.Extend(BlockOf(low));
+    moved.Extend(BlockOf(high + Index3{-1, -1, -1}));
+    return moved;
   }
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector3d corner((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
                                  (i & 4) != 0 ? high.z : low.z);
-    placed.Extend(BlockOf(FloorOf(object.T_WL * (corner * voxel_m) / voxel_m)));
+    moved.Extend(BlockOf(FloorOf(*T * (corner * voxel_m) / voxel_m)));
   }
-  return placed;
+  return moved;
 }
 
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
   // What is covered is at most a voxel from a negative one, and a look-up voxel at most two from
   // the block of its triangle: not as much as a block together.
-  return PlacedBox(object.negative, object, voxel_m, kBlockSide);
+  return MovedBox(object.negative, object.lattice_is_world ? nullptr : &object.T_WL, voxel_m,
+                  kBlockSide);
 }
 
-std::optional<BlocksAround> BlocksAround::Of(const std::vector<BlockBox>& boxes) {
+std::optional<BlockSet> BlockSet::Of(const std::vector<BlockBox>& boxes, int margin) {
   constexpr double kMost = 1 << 22;  // blocks in the bounds, a byte each
-  BlocksAround around;
-  BlockBox& bounds = around.bounds_;
+  BlockSet set;
+  BlockBox& bounds = set.bounds_;
+  const Index3 down{-margin, -margin, -margin};
+  const Index3 up{margin, margin, margin};
   for (const BlockBox& box : boxes) {
     if (box.is_empty) continue;
-    bounds.Extend(box.low + Index3{-1, -1, -1});
-    bounds.Extend(box.high + Index3{1, 1, 1});
+    bounds.Extend(box.low + down);
+    bounds.Extend(box.high + up);
   }
-  if (bounds.is_empty) return around;
+  if (bounds.is_empty) return set;
   const auto side = [](int low, int high) { return double{1} + high - low; };
   if (side(bounds.low.x, bounds.high.x) * side(bounds.low.y, bounds.high.y) *
           side(bounds.low.z, bounds.high.z) >
       kMost) {
     return std::nullopt;
   }
-  around.held_.assign(around.PlaceOf(bounds.high) + 1, 0);
+  set.held_.assign(set.PlaceOf(bounds.high) + 1, 0);
   for (const BlockBox& box : boxes) {
     if (box.is_empty) continue;
-    for (int z = box.low.z - 1; z <= box.high.z + 1; ++z) {
-      for (int y = box.low.y - 1; y <= box.high.y + 1; ++y) {
-        const std::size_t first = around.PlaceOf({box.low.x - 1, y, z});
-        std::fill_n(around.held_.begin() + static_cast<std::ptrdiff_t>(first),
-                    box.high.x - box.low.x + 3, std::uint8_t{1});
+    const Index3 low = box.low + down;
+    const Index3 high = box.high + up;
+    for (int z = low.z; z <= high.z; ++z) {
+      for (int y = low.y; y <= high.y; ++y) {
+        const std::size_t first = set.PlaceOf({low.x, y, z});
+        std::fill_n(set.held_.begin() + static_cast<std::ptrdiff_t>(first), high.x - low.x + 1,
+                    std::uint8_t{1});
       }
     }
   }
-  return around;
+  return set;
 }
 
-std::size_t BlocksAround::PlaceOf(const Index3& index) const {
+std::size_t BlockSet::PlaceOf(const Index3& index) const {
   const auto along = [](int at, int low) { return static_cast<std::size_t>(at - low); };
   const std::size_t width = along(bounds_.high.x, bounds_.low.x) + 1;
   const std::size_t depth = along(bounds_.high.y, bounds_.low.y) + 1;
@@ -245,11 +341,11 @@ std::size_t BlocksAround::PlaceOf(const Index3& index) const {
          width * (along(index.y, bounds_.low.y) + depth * along(index.z, bounds_.low.z));
 }
 
-bool BlocksAround::Holds(const Index3& index) const {
+bool BlockSet::Holds(const Index3& index) const {
   return bounds_.Holds(index) && held_[PlaceOf(index)] != 0;
 }
 
-bool BlocksAround::Meets(const BlockBox& box) const {
+bool BlockSet::Meets(const BlockBox& box) const {
   for (int z = box.low.z; !box.is_empty && z <= box.high.z; ++z) {
     for (int y = box.low.y; y <= box.high.y; ++y) {
       for (int x = box.low.x; x <= box.high.x; ++x) {
@@ -260,8 +356,30 @@ bool BlocksAround::Meets(const BlockBox& box) const {
   return false;
 }
 
+std::vector<MeshPart*> BlockSet::PartsOf(const GridMesh& mesh) const {
+  std::vector<MeshPart*> parts;
+  if (bounds_.is_empty) return parts;
+  const std::vector<std::uint64_t>& keys = mesh.keys();
+  auto key = keys.begin();
+  const auto [low, high, is_empty] = bounds_;
+  for (int z = low.z; z <= high.z; ++z) {
+    for (int y = low.y; y <= high.y; ++y) {
+      const std::uint64_t first = PackIndex({low.x, y, z});
+      const std::uint64_t last = PackIndex({high.x, y, z});
+      if (key != keys.end() && *key < first) key = std::lower_bound(key, keys.end(), first);
+      for (; key != keys.end() && *key <= last; ++key) {
+        if (held_[PlaceOf(UnpackIndex(*key))] == 0) continue;
+        parts.push_back(mesh.parts()[static_cast<std::size_t>(key - keys.begin())]);
+      }
+    }
+  }
+  return parts;
+}
+
 void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels) {
-  ForEachPart(mesh.TakeUnsettled(), [&](MeshPart& part) {
+  const std::vector<MeshPart*> unsettled = mesh.TakeUnsettled();
+  mesh.NoteChanges(unsettled);
+  ForEachPart(unsettled, [&](MeshPart& part) {
     part.is_settled = true;
     part.face_ids.resize(part.triangles.size());
     if (part.triangles.empty()) return;
@@ -275,34 +393,40 @@ void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels
   });
 }
 
-void HideTriangles(const std::vector<MeshPart*>& parts,
-                   const std::function<bool(const MeshPart&)>& in_doubt,
-                   const std::function<IsHidden()>& new_test) {
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
+                                     const std::function<bool(const MeshPart&)>& in_doubt,
+                                     const HiddenAt& hidden_at) {
   // Vertices are named by the triangles of the part and of the lower ones around it: where these
   // are others, or others are hidden, the part's vertices are numbered again.
   constexpr std::uint32_t kNamesChanged = 1;
   constexpr std::uint32_t kToBeNamed = 2;
   ForEachPart(parts, [&](MeshPart& part) {
+    thread_local std::vector<Index3> voxels;
     thread_local std::vector<std::uint8_t> hidden;
     hidden.clear();
-    if (!part.triangles.empty() && in_doubt(part)) {
-      const IsHidden is_hidden = new_test();
-      const CornersOf corner(part);
-      for (std::size_t t = 0; t < part.triangles.size(); ++t) {
-        const auto& [a, b, c] = part.triangles[t];
-        if (!is_hidden(corner(a), corner(b), corner(c))) continue;
-        hidden.resize(part.triangles.size(), 0);
-        hidden[t] = 1;
-      }
+    part.looked_up = {};
+    part.others = 0;
+    if (!part.triangles.empty() && !in_doubt(part)) {
+      // Where it would be.
+      part.looked_up.Extend(part.index + Index3{-1, -1, -1});
+      part.looked_up.Extend(part.index + Index3{1, 1, 1});
+    } else if (!part.triangles.empty()) {
+      const BlockBox box = FindLookUps(part, voxel, voxels);
+      part.looked_up = {BlockOf(box.low), BlockOf(box.high), false};
+      hidden.resize(voxels.size());
+      part.others = hidden_at(voxels, hidden);
+      if (std::find(hidden.begin(), hidden.end(), 1) == hidden.end()) hidden.clear();
     }
     if (part.is_settled && part.hidden == hidden) return;
     part.is_settled = true;
     part.hidden.assign(hidden.begin(), hidden.end());
     part.todo = kNamesChanged;
   });
+  std::vector<MeshPart*> changed;
   std::vector<MeshPart*> to_name;
   for (MeshPart* part : parts) {
     if ((part->todo & kNamesChanged) == 0) continue;
+    changed.push_back(part);
     for (std::size_t which = 0; which < 8; ++which) {
       MeshPart* named = part->around[UpperPlace(which)];
       if (named == nullptr || (named->todo & kToBeNamed) != 0) continue;
@@ -315,6 +439,7 @@ void HideTriangles(const std::vector<MeshPart*>& parts,
     part.todo = 0;
     RenameVertices(part);
   });
+  return changed;
 }
 
 TriangleMesh Join(const std::vector<JoinedMesh>& meshes) {

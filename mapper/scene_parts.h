@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "mapper/mesh_cache.h"
@@ -11,14 +12,19 @@
 
 namespace tsdfpp {
 
-// Blocks of a lattice, both ends included.
-struct BlockBox {
-  Index3 low;
-  Index3 high;
-  bool is_empty = true;
+// What one block of one volume adds to the visible scene.
+struct ScenePiece {
+  InstanceId id = kNoInstance;  // of the volume; kNoInstance where the map has one field for all
+  Index3 block;                 // of the volume's lattice
+  // In the world, with face_ids, the triangles of the cubes that the block's voxels name and the
+  // vertices that they use. Vertices at a border are in the parts on both sides.
+  TriangleMesh mesh;
+};
 
-  void Extend(const Index3& index);
-  bool Holds(const Index3& index) const;
+// What changed of the visible scene (MapRepresentation::TakeSceneChanges).
+struct SceneChanges {
+  std::vector<ScenePiece> parts;
+  MeshWork work;  // of bringing the kept meshes up to date
 };
 
 // The mesh of an object's volume and where it stands. A copy starts empty.
@@ -39,24 +45,26 @@ struct PlacedMesh {
   MeshWork Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now, bool is_world_now);
 };
 
-// The global blocks that a box of blocks of the lattice touches when `margin` voxels are added on
-// each side.
-BlockBox PlacedBox(const BlockBox& box, const PlacedMesh& object, double voxel_m, int margin);
+// The blocks that a box of blocks touches when `margin` voxels are added on each side and it is
+// moved by T (in metres). No motion where T is nullptr.
+BlockBox MovedBox(const BlockBox& box, const Pose* T, double voxel_m, int margin);
 
 // Where triangles of other objects may have a look-up voxel that this object covers: the blocks
 // around those that hold a negative voxel.
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m);
 
-// Some blocks of the global lattice and those that touch them.
-class BlocksAround {
+// A set of blocks.
+class BlockSet {
  public:
-  // Of all blocks of the boxes. Nothing where they are so far apart that this takes more than some
-  // megabytes.
-  static std::optional<BlocksAround> Of(const std::vector<BlockBox>& boxes);
+  // All blocks of the boxes and, with a margin, those at most so many blocks away along each axis.
+  // Nothing where they are so far apart that this takes more than some megabytes.
+  static std::optional<BlockSet> Of(const std::vector<BlockBox>& boxes, int margin);
 
   bool Holds(const Index3& index) const;
-  // Whether the box holds one of them.
+  // Whether it holds a block of the box.
   bool Meets(const BlockBox& box) const;
+  // The parts of its blocks.
+  std::vector<MeshPart*> PartsOf(const GridMesh& mesh) const;
 
  private:
   std::size_t PlaceOf(const Index3& index) const;
@@ -65,15 +73,17 @@ class BlocksAround {
   std::vector<std::uint8_t> held_;  // of the bounds
 };
 
-// Whether a triangle is hidden, from its three corners in the world.
-using IsHidden =
-    std::function<bool(const Eigen::Vector3f&, const Eigen::Vector3f&, const Eigen::Vector3f&)>;
+// Which triangles are hidden, from the global voxels where they are looked up: 1 for those, 0 for
+// the others. Returns IdBit of all objects whose values say it. For several threads at once.
+using HiddenAt = std::function<std::uint64_t(std::span<const Index3>, std::span<std::uint8_t>)>;
 
-// Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names,
-// by a test of their own each; no others are.
-void HideTriangles(const std::vector<MeshPart*>& parts,
-                   const std::function<bool(const MeshPart&)>& in_doubt,
-                   const std::function<IsHidden()>& new_test);
+// Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names;
+// no others are. `voxel` in metres.
+// Returns the parts of which other triangles are visible than before, or whose triangles were made
+// again.
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
+                                     const std::function<bool(const MeshPart&)>& in_doubt,
+                                     const HiddenAt& hidden_at);
 
 // Labels the triangles of the parts whose values changed by what labels of each part's own say of
 // the voxels nearest to their centroids in the lattice; `voxel` in metres.
@@ -85,6 +95,10 @@ struct JoinedMesh {
   InstanceId id = kNoInstance;  // of all its faces; kNoInstance: those of its parts, where labelled
   bool visible_only = false;    // as HideTriangles found
 };
+
+// What changed of a mesh since this was last asked of it, everything the first time: by block, the
+// parts that are no longer there among them, without triangles. They have the id of `of`.
+std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of);
 
 // The meshes one after the other, block after block; vertices that no triangle names are left out.
 TriangleMesh Join(const std::vector<JoinedMesh>& meshes);

@@ -242,6 +242,11 @@ TriangleMesh SingleFieldMap::SceneMesh() const {
   return Join({{&mesh_}});
 }
 
+SceneChanges SingleFieldMap::TakeSceneChanges() const {
+  const MeshWork work = UpdateMeshes();
+  return {TakeScenePieces(mesh_, {&mesh_}), work};
+}
+
 std::vector<RaySurface> SingleFieldMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
                                                  const RayCastOptions& options) const {
   RayPass pass;

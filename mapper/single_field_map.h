@@ -34,6 +34,7 @@ class SingleFieldMap final : public MapRepresentation {
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;
   TriangleMesh SceneMesh() const override;
+  SceneChanges TakeSceneChanges() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
   MeshWork UpdateMeshes() const override;

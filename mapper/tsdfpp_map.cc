@@ -50,7 +50,7 @@ class TsdfppMap::Groups {
     ListBlock* lists = nullptr;
     std::int32_t first_change = kNone;
     std::int32_t first_vote = kNone;
-    bool relisted = false;  // other objects may be active than were
+    bool relisted = false;  // other objects are active than were
     bool emptied = false;
   };
   static constexpr std::int32_t kNone = -1;
@@ -203,12 +203,15 @@ bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
   const VotesCounted counted =
       VoteForActive(votes, id, config_.confidence_cap, lists.ids.data(), lists.confidences.data());
   for (std::size_t z = 0; z < votes.size(); ++z) lists.settled[z] |= counted.saturated[z];
+  bool other_active = false;
   ForEachVoxel(counted.others, [&](int place) {
+    const InstanceId before = lists.ActiveAt(place);
     const bool is_listed = ListOf(lists, place).Lists(id);
     (is_listed ? ListOf(lists, place) : ListWithRoom(lists, place))
         .Vote(id, config_.confidence_cap);
+    other_active = other_active || lists.ActiveAt(place) != before;
   });
-  return Any(counted.others);
+  return other_active;
 }
 
 void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -326,9 +329,10 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
           ListBlock& lists = *group.lists;
           bool lost_any = false;
           groups.ForEachChange(group, [&](std::size_t k) {
-            group.relisted = true;
-            ForEachVoxel(changes[k].lost,
-                         [&](int place) { ListOf(lists, place).Remove(changes[k].id); });
+            ForEachVoxel(changes[k].lost, [&](int place) {
+              group.relisted = group.relisted || lists.ActiveAt(place) == changes[k].id;
+              ListOf(lists, place).Remove(changes[k].id);
+            });
             lost_any = lost_any || Any(changes[k].lost);
           });
           groups.ForEachVote(group, [&](std::size_t k) {
@@ -340,6 +344,7 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
           groups.ForEachChange(group, [&](std::size_t k) {
             ForEachVoxel(changes[k].gained, [&](int place) {
               if (ListOf(lists, place).Lists(changes[k].id)) return;
+              group.relisted = group.relisted || lists.ActiveAt(place) == kNoInstance;
               ListWithRoom(lists, place).Append(changes[k].id, 1);
             });
           });

@@ -43,6 +43,7 @@ class TsdfppMap final : public LayeredMap {
     // Takes no more room than that; new entries are empty.
     void Resize(std::size_t layers);
     ListEntry At(std::size_t i) const { return {ids[i], confidences[i]}; }
+    InstanceId ActiveAt(int place) const { return ids[static_cast<std::size_t>(place)]; }
   };
   struct CoverChange;
   class Groups;
@@ -52,7 +53,7 @@ class TsdfppMap final : public LayeredMap {
   static VoxelList ListOf(ListBlock& lists, int place);
   // The same with room for one object more, unless it has K.
   VoxelList ListWithRoom(ListBlock& lists, int place) const;
-  // True where the active object may have become another one.
+  // True where another object is active than was.
   bool Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
   // The blocks of the index that lost a listing.
   std::vector<Index3> Deactivate(InstanceId id);

@@ -26,6 +26,7 @@ class VolumesMap final : public LayeredMap {
  protected:
   // Nobody: without an index nothing hides what another object claims.
   const InstanceId* ActiveIn(const Index3&) const override { return nullptr; }
+  bool HasIndex() const override { return false; }
 };
 
 }  // namespace tsdfpp

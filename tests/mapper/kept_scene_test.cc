@@ -68,36 +68,54 @@ TEST_P(KeptScene, FollowsSmallChanges) {
   EXPECT_GT(small, 10);
 }
 
-TEST(BlocksAround, HoldsTheBlocksOfTheBoxesAndThoseThatTouchThem) {
+TEST(BlockSet, HoldsTheBlocksOfTheBoxesAndThoseNear) {
   Dice dice(5);
   const auto some = [&] {
     return Index3{dice.Whole(20) - 10, dice.Whole(20) - 10, dice.Whole(20) - 10};
   };
+  TsdfGrid grid;
+  for (int i = 0; i < 500; ++i) grid.FindOrAdd(some());
+  GridMesh mesh;
+  mesh.Update(grid, 0.1F);
   for (int i = 0; i < 50; ++i) {
     std::vector<BlockBox> boxes(1 + static_cast<std::size_t>(dice.Whole(4)));
     for (BlockBox& box : boxes) {
       const Index3 low = some();
       box = {low, low + Index3{dice.Whole(3), dice.Whole(3), dice.Whole(3)}, false};
     }
-    const auto around = BlocksAround::Of(boxes);
-    ASSERT_TRUE(around);
-    const auto touches = [&](const Index3& a, const Index3& low, const Index3& high) {
-      return a.x >= low.x - 1 && a.x <= high.x + 1 && a.y >= low.y - 1 && a.y <= high.y + 1 &&
-             a.z >= low.z - 1 && a.z <= high.z + 1;
+    const int margin = i % 3;
+    const auto set = BlockSet::Of(boxes, margin);
+    ASSERT_TRUE(set);
+    const auto expected = [&](const Index3& a) {
+      return std::any_of(boxes.begin(), boxes.end(), [&](const BlockBox& box) {
+        const auto [low, high, is_empty] = box;
+        return a.x >= low.x - margin && a.x <= high.x + margin && a.y >= low.y - margin &&
+               a.y <= high.y + margin && a.z >= low.z - margin && a.z <= high.z + margin;
+      });
     };
     for (int k = 0; k < 200; ++k) {
       const Index3 at = some();
-      const bool expected = std::any_of(boxes.begin(), boxes.end(), [&](const BlockBox& box) {
-        return touches(at, box.low, box.high);
-      });
-      ASSERT_EQ(around->Holds(at), expected);
-      ASSERT_EQ(around->Meets({at, at, false}), expected);
+      ASSERT_EQ(set->Holds(at), expected(at));
+      const BlockBox box{at, at + Index3{dice.Whole(2), dice.Whole(2), dice.Whole(2)}, false};
+      bool meets = false;
+      for (int corner = 0; corner < 8; ++corner) {
+        meets = meets || expected({(corner & 1) != 0 ? box.high.x : box.low.x,
+                                   (corner & 2) != 0 ? box.high.y : box.low.y,
+                                   (corner & 4) != 0 ? box.high.z : box.low.z});
+      }
+      ASSERT_EQ(set->Meets(box), meets);
     }
+    std::vector<MeshPart*> parts;
+    for (MeshPart* part : mesh.parts()) {
+      if (expected(part->index)) parts.push_back(part);
+    }
+    ASSERT_EQ(set->PartsOf(mesh), parts);
   }
-  EXPECT_FALSE(BlocksAround::Of({})->Holds({0, 0, 0}));
+  EXPECT_FALSE(BlockSet::Of({}, 1)->Holds({0, 0, 0}));
+  EXPECT_TRUE(BlockSet::Of({}, 1)->PartsOf(mesh).empty());
   constexpr int kFar = 1000000;
   EXPECT_FALSE(
-      BlocksAround::Of({{{0, 0, 0}, {0, 0, 0}, false}, {{kFar, kFar, 0}, {kFar, kFar, 0}, false}}))
+      BlockSet::Of({{{0, 0, 0}, {0, 0, 0}, false}, {{kFar, kFar, 0}, {kFar, kFar, 0}, false}}, 0))
       << "a terabyte of table";
 }
 
