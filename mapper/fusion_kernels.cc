@@ -4,51 +4,14 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
-#include <limits>
 
 #include "core/types.h"
 #include "mapper/cover_kernels.h"
+#include "mapper/frame_reads.h"
 
 // One pass of this file an instruction set; the machine's best is chosen at run time. On x86-64 all
 // give the same bits: only correctly rounded operations, none contracted
 // (cmake/TsdfppTarget.cmake).
-#ifndef TSDFPP_MAPPER_FUSION_KERNELS_ONCE
-#define TSDFPP_MAPPER_FUSION_KERNELS_ONCE
-namespace tsdfpp {
-namespace {
-
-// One load after the other: from a frame, which no cache holds, gathers took longer, and so did
-// what GCC made of the loops by itself.
-#if defined(__GNUC__) && !defined(__clang__)
-#define TSDFPP_PLAIN_LOADS __attribute__((noinline, optimize("no-tree-slp-vectorize")))
-#else
-#define TSDFPP_PLAIN_LOADS
-#endif
-
-// table[pixel], `kLanes` at a time, where these are to be looked at.
-template <std::size_t kLanes, typename From, typename To>
-TSDFPP_PLAIN_LOADS void Read(const From* table, const Lanes& pixel, const std::uint8_t* look,
-                             To* out) {
-  for (std::size_t i = 0; i < kBlockVoxels; i += kLanes) {
-    if (look[i] == 0) continue;
-    for (std::size_t k = i; k < i + kLanes; ++k) out[k] = table[pixel[k]];
-  }
-}
-
-// Four bytes that end with the three of a pixel, or begin with them at pixel 0: no byte beyond the
-// image is read.
-inline std::int32_t BytesOfColour(const KernelFrame& frame, std::int32_t pixel) {
-  std::int32_t bytes;
-  std::memcpy(&bytes, frame.colour + 3 * static_cast<std::ptrdiff_t>(pixel) - (pixel != 0 ? 1 : 0),
-              sizeof(bytes));
-  return bytes;
-}
-
-}  // namespace
-}  // namespace tsdfpp
-#endif
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "mapper/fusion_kernels.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
@@ -56,6 +19,7 @@ inline std::int32_t BytesOfColour(const KernelFrame& frame, std::int32_t pixel) 
 
 #include "mapper/half_lanes-inl.h"
 #include "mapper/mask_lanes-inl.h"
+#include "mapper/projection_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tsdfpp::HWY_NAMESPACE {
@@ -63,131 +27,16 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The vectors that the loops work on: rows of a block's slice, never more than two.
-using Floats = hn::CappedTag<float, 16>;
-using Ints = hn::RebindToSigned<Floats>;
 using Shorts = hn::Rebind<std::uint16_t, Floats>;
 using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
-
-// Towards zero, of numbers that fit; hn::ConvertTo() also looks after those that do not.
-inline hn::VFromD<Ints> Truncated(hn::VFromD<Floats> v) {
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-  return hn::VFromD<Ints>{_mm512_cvttps_epi32(v.raw)};
-#elif HWY_TARGET == HWY_AVX2
-  return hn::VFromD<Ints>{_mm256_cvttps_epi32(v.raw)};
-#else
-  return hn::ConvertTo(Ints(), v);
-#endif
-}
-
-// The voxels of a block as the camera sees them; what is out of view is infinitely far away, at
-// pixel 0.
-struct Projected {
-  HWY_ALIGN std::array<float, kBlockVoxels> z;      // p_C.z
-  HWY_ALIGN std::array<float, kBlockVoxels> scale;  // ray * iz
-  HWY_ALIGN Lanes pixel;
-  // At the first voxel of a vector: whether one of its voxels is in view and not behind all.
-  std::array<std::uint8_t, kBlockVoxels> look;
-};
-constexpr std::size_t kLanes = hn::MaxLanes(Floats());
-
-// False where none is to be looked at.
-template <bool kAllInView>
-bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
-  const Floats df;
-  const Ints di;
-  std::array<float, 12> m;
-  std::copy(place.T_CL, place.T_CL + 12, m.begin());
-  // The terms of x, by place in two rows, and of y, by place in a slice.
-  HWY_ALIGN std::array<std::array<float, 16>, 3> x_term;
-  HWY_ALIGN std::array<std::array<float, kSliceVoxels>, 3> y_term;
-  for (std::size_t r = 0; r < 3; ++r) {
-    for (std::size_t k = 0; k < kBlockSide; ++k) {
-      const auto step = static_cast<int>(k);
-      const float x = m[4 * r] * (static_cast<float>(place.first.x + step) * place.voxel);
-      const float y = m[4 * r + 1] * (static_cast<float>(place.first.y + step) * place.voxel);
-      x_term[r][k] = x_term[r][k + kBlockSide] = x;
-      std::fill_n(y_term[r].begin() + 8 * step, 8, y);
-    }
-  }
-  const auto fx = hn::Set(df, frame.intrinsics[0]);
-  const auto fy = hn::Set(df, frame.intrinsics[1]);
-  const auto cx = hn::Set(df, frame.intrinsics[2]);
-  const auto cy = hn::Set(df, frame.intrinsics[3]);
-  const auto width = hn::Set(df, frame.width);
-  const auto height = hn::Set(df, frame.height);
-  const auto stride = hn::Set(di, static_cast<std::int32_t>(frame.width));
-  const auto half = hn::Set(df, 0.5F);
-  const auto zero = hn::Zero(df);
-  const auto far_away = hn::Set(df, std::numeric_limits<float>::infinity());
-  const auto behind = hn::Set(df, place.behind_m);
-  auto any = hn::MaskFromVec(hn::Zero(df));
-  for (std::size_t z = 0; z < kBlockSide; ++z) {
-    const float pz = static_cast<float>(place.first.z + static_cast<int>(z)) * place.voxel;
-    const std::array z_term{hn::Set(df, m[2] * pz), hn::Set(df, m[6] * pz),
-                            hn::Set(df, m[10] * pz)};
-    for (std::size_t k = 0; k < kSliceVoxels; k += hn::Lanes(df)) {
-      const std::size_t i = kSliceVoxels * z + k;
-      const auto row = [&](std::size_t r) {
-        const auto fixed =
-            hn::Add(hn::Add(hn::Load(df, &y_term[r][k]), z_term[r]), hn::Set(df, m[4 * r + 3]));
-        return hn::Add(fixed, hn::Load(df, &x_term[r][k & 7U]));
-      };
-      const auto cam_x = row(0);
-      const auto cam_y = row(1);
-      const auto cam_z = row(2);
-      const auto iz = hn::Div(hn::Set(df, 1.0F), cam_z);
-      const auto u = hn::Add(hn::Add(hn::Mul(hn::Mul(fx, cam_x), iz), cx), half);
-      const auto v = hn::Add(hn::Add(hn::Mul(hn::Mul(fy, cam_y), iz), cy), half);
-      const auto ray = hn::Sqrt(
-          hn::Add(hn::Add(hn::Mul(cam_x, cam_x), hn::Mul(cam_y, cam_y)), hn::Mul(cam_z, cam_z)));
-      auto scale = hn::Mul(ray, iz);
-      auto look = hn::Le(cam_z, behind);
-      // Non-negative in view, so truncation is the floor.
-      const auto store = [&](auto seen_u, auto seen_v, auto seen_z) {
-        const auto line = hn::Mul(Truncated(seen_v), stride);
-        hn::Store(hn::Add(line, Truncated(seen_u)), di, &out.pixel[i]);
-        hn::Store(seen_z, df, &out.z[i]);
-      };
-      if constexpr (kAllInView) {
-        store(u, v, cam_z);
-      } else {
-        const auto in_view = hn::And(hn::And(hn::Ge(cam_z, hn::Set(df, kNearest_m)),
-                                             hn::And(hn::Ge(u, zero), hn::Lt(u, width))),
-                                     hn::And(hn::Ge(v, zero), hn::Lt(v, height)));
-        store(hn::IfThenElseZero(in_view, u), hn::IfThenElseZero(in_view, v),
-              hn::IfThenElse(in_view, cam_z, far_away));
-        // Behind the camera it would make the nearest of what is farthest.
-        scale = hn::IfThenElse(in_view, scale, hn::Set(df, 1.0F));
-        look = hn::And(in_view, look);
-      }
-      hn::Store(scale, df, &out.scale[i]);
-      out.look[i] = hn::AllFalse(df, look) ? 0 : 1;
-      any = hn::Or(any, look);
-    }
-  }
-  return !hn::AllFalse(df, any);
-}
-
-bool Project(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
-  return place.all_in_view ? ProjectWith<true>(frame, place, out)
-                           : ProjectWith<false>(frame, place, out);
-}
-
-// s of the lanes i ...; less than -back where nothing is observed.
-hn::VFromD<Floats> Measure(const Projected& projected, const float* depth_of, std::size_t i) {
-  const Floats df;
-  return hn::Mul(hn::Sub(hn::Load(df, depth_of + i), hn::Load(df, &projected.z[i])),
-                 hn::Load(df, &projected.scale[i]));
-}
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
   Projected projected;
   if (!Project(frame, place, projected)) return false;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
-  Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
-  Read<kLanes>(frame.label, projected.pixel, projected.look.data(), label.data());
+  ReadPixels<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
+  ReadPixels<kLanes>(frame.label, projected.pixel, projected.look.data(), label.data());
   const Floats df;
   const Ints di;
   const auto minus_back = hn::Set(df, -back);
@@ -286,9 +135,9 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   if (!Project(frame, place, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
-  Read<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
+  ReadPixels<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
   if (kLabels != Labels::kOne && !rule.one_label) {
-    Read<kLanes>(frame.label, projected.pixel, projected.look.data(), label.data());
+    ReadPixels<kLanes>(frame.label, projected.pixel, projected.look.data(), label.data());
   } else if (kLabels == Labels::kEvery) {
     label.fill(rule.id);
   }
