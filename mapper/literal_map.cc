@@ -85,15 +85,17 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
       active = {observed, 1};
       if (task.lists->inactive[i].id == observed) task.lists->inactive[i] = {};
     }
-    if (active.id != before) task.lists->revision = NewRevision();
+    if (active.id != before) {
+      task.lists->revision = NewRevision();
+      task.changed = true;
+    }
     auto& targets = task.targets;
     const auto at = std::lower_bound(targets.begin(), targets.end(), active.id);
     if (at == targets.end() || *at != active.id) targets.insert(at, active.id);
   }
 }
 
-void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW,
-                            const Task& task) {
+void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) {
   BlockObservation observation;
   const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
@@ -117,7 +119,9 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
         changed = true;
       }
     }
-    if (changed) block->UpdateMasks(config_.back());
+    if (!changed) continue;
+    block->UpdateMasks(config_.back());
+    task.changed = true;
   }
 }
 
@@ -207,7 +211,9 @@ TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
 
 void LiteralMap::NoteFieldChange(const std::vector<Task>& tasks) {
   if (active_.all_are_stale) return;
-  for (const Task& task : tasks) active_.stale.push_back(task.index);
+  for (const Task& task : tasks) {
+    if (task.changed) active_.stale.push_back(task.index);
+  }
   // Nor may they pile up while nobody asks.
   active_.all_are_stale = active_.stale.size() > lists_.size();
 }
