@@ -85,10 +85,7 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
       active = {observed, 1};
       if (task.lists->inactive[i].id == observed) task.lists->inactive[i] = {};
     }
-    if (active.id != before) {
-      task.lists->revision = NewRevision();
-      task.changed = true;
-    }
+    if (active.id != before) task.lists->revision = NewRevision();
     auto& targets = task.targets;
     const auto at = std::lower_bound(targets.begin(), targets.end(), active.id);
     if (at == targets.end() || *at != active.id) targets.insert(at, active.id);

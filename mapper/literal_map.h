@@ -67,7 +67,7 @@ class LiteralMap final : public MapRepresentation {
     ListBlock* lists = nullptr;
     PlannedBlock planned;
     std::vector<InstanceId> targets;  // objects that take an observation here, increasing
-    bool changed = false;             // values, or who is active
+    bool changed = false;  // values; where another object is active now, it took an observation
   };
 
   void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
