@@ -11,6 +11,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "bench/median.h"
 #include "eval/adapters/open3d_peer.h"
@@ -21,7 +22,8 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kRepeats = 5;  // of a mesh from scratch at the end
+constexpr int kRepeats = 5;        // of a mesh from scratch at the end
+constexpr int kSmallChanges = 15;  // at the end
 
 template <typename Function>
 double MillisecondsOf(const Function& function) {
@@ -42,36 +44,43 @@ double ResidentMegabytes() {
 struct KeptTimes {
   std::vector<double> share;       // of changed blocks
   std::vector<double> index_ms;    // the index, where it is brought up to date when it is needed
-  std::vector<double> changes_ms;  // the changed parts, for somebody who follows the scene
+  std::vector<double> update_ms;   // of the parts
+  std::vector<double> changes_ms;  // and the changed ones for somebody who follows the scene
   std::vector<double> all_ms;      // with joining all parts to one mesh
   // Where a copy was meshed from scratch beside it: kept over (scratch times share).
   std::vector<double> whole_ms;
+  std::vector<double> update_ratio;
   std::vector<double> changes_ratio;
   std::vector<double> all_ratio;
 
   void Measure(const MapRepresentation& map, bool also_whole);
-  void Print(const std::string& name) const;
+  // `peer_ms` is a quarter of what Open3D takes for a whole mesh, where that is of the same map.
+  void Print(const std::string& name, std::optional<double> peer_ms) const;
 };
 
 void KeptTimes::Measure(const MapRepresentation& map, bool also_whole) {
   index_ms.push_back(MillisecondsOf([&] { map.ListAt(Eigen::Vector3i::Zero()); }));
-  SceneChanges changes;
-  changes_ms.push_back(MillisecondsOf([&] { changes = map.TakeSceneChanges(); }));
+  MeshWork work;
+  update_ms.push_back(MillisecondsOf([&] { work = map.UpdateMeshes(); }));
+  changes_ms.push_back(update_ms.back() + MillisecondsOf([&] { map.TakeSceneChanges(); }));
   all_ms.push_back(changes_ms.back() + MillisecondsOf([&] { map.SceneMesh(); }));
-  share.push_back(static_cast<double>(changes.work.changed) /
-                  static_cast<double>(changes.work.blocks));
+  share.push_back(static_cast<double>(work.changed) / static_cast<double>(work.blocks));
   if (!also_whole) return;
   const auto copy = map.Clone();
   whole_ms.push_back(MillisecondsOf([&] { copy->SceneMesh(); }));
   const double fair_ms = whole_ms.back() * share.back();
+  update_ratio.push_back(update_ms.back() / fair_ms);
   changes_ratio.push_back(changes_ms.back() / fair_ms);
   all_ratio.push_back(all_ms.back() / fair_ms);
 }
 
-void KeptTimes::Print(const std::string& name) const {
-  std::printf("%-28s %10.3f %10.1f %10.2f %10.2f %10.2f %10.2f %10.2f\n", name.c_str(),
-              Median(share), Median(whole_ms), Median(index_ms), Median(changes_ms),
-              Median(changes_ratio), Median(all_ms), Median(all_ratio));
+void KeptTimes::Print(const std::string& name, std::optional<double> peer_ms) const {
+  std::printf("%-16s %8.3f %8.1f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f", name.c_str(),
+              Median(share), Median(whole_ms), Median(index_ms), Median(update_ms),
+              Median(update_ratio), Median(changes_ms), Median(changes_ratio), Median(all_ms),
+              Median(all_ratio));
+  if (peer_ms) std::printf(" %13.2f", Median(changes_ms) / (*peer_ms * Median(share)));
+  std::printf("\n");
 }
 
 // One method's map and what was measured of it.
@@ -145,15 +154,23 @@ void PrintMeshing(const std::vector<Run>& runs, const std::vector<double>& final
     std::printf("%-28s %10zu %10.1f %12.3f\n", runs[m].name.c_str(), triangles[m], final_ms[m],
                 final_ms[m] / peer_ms);
   }
-  const auto print_kept = [&](const char* title, KeptTimes Run::*times) {
+  const auto print_kept = [&](const char* title, KeptTimes Run::*times,
+                              std::optional<double> quarter_ms) {
     std::printf(
-        "\nkept meshes, %s; medians; ratios are over (from scratch x share of changed blocks)\n"
-        "%-28s %10s %10s %10s %10s %10s %10s %10s\n",
-        title, "", "share", "scratch", "index", "changes", "ratio", "+ joining", "ratio");
-    for (const Run& run : runs) (run.*times).Print(run.name);
+        "\nkept meshes, %s; ms, medians; ratios are over (from scratch x share of changed blocks)\n"
+        "%-16s %8s %8s %8s %8s %8s %8s %8s %8s %8s",
+        title, "", "share", "scratch", "index", "update", "ratio", "+ taking", "ratio", "+ joining",
+        "ratio");
+    if (quarter_ms) std::printf(" %13s", "over Open3D/4");
+    std::printf("\n");
+    for (const Run& run : runs) (run.*times).Print(run.name, quarter_ms);
   };
-  print_kept("frame by frame", &Run::frames);
-  print_kept("the last frame's largest object observed alone", &Run::small);
+  print_kept("frame by frame", &Run::frames, {});
+  const double faster_ms = grid.finished ? std::min(peer_ms, grid.mesh_ms) : peer_ms;
+  print_kept("the last frame's largest object observed alone", &Run::small, faster_ms / 4);
+  std::printf(
+      "(taking: of the parts that changed. over Open3D/4: that, over a quarter of the faster "
+      "Open3D's time x share)\n");
 }
 
 void PrintMemory(const std::vector<Run>& runs, const Open3dVolume& peer, double peer_growth_mb,
@@ -213,7 +230,7 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
       const cv::Mat labels = LargestObjectAlone(frame);
       const auto copy = run.pipeline->map().Clone();
       copy->TakeSceneChanges();
-      for (int repeat = 0; repeat < kRepeats; ++repeat) {
+      for (int repeat = 0; repeat < kSmallChanges; ++repeat) {
         copy->Fuse(frame, labels);
         run.small.Measure(*copy, true);
       }

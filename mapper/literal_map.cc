@@ -92,8 +92,7 @@ void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Tas
   }
 }
 
-void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW,
-                            const Task& task) {
+void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) {
   BlockObservation observation;
   const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
   if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
@@ -117,7 +116,9 @@ void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_C
         changed = true;
       }
     }
-    if (changed) block->UpdateMasks(config_.back());
+    if (!changed) continue;
+    block->UpdateMasks(config_.back());
+    task.changed = true;
   }
 }
 
@@ -207,7 +208,9 @@ TriangleMesh LiteralMap::ObjectMesh(InstanceId id) const {
 
 void LiteralMap::NoteFieldChange(const std::vector<Task>& tasks) {
   if (active_.all_are_stale) return;
-  for (const Task& task : tasks) active_.stale.push_back(task.index);
+  for (const Task& task : tasks) {
+    if (task.changed) active_.stale.push_back(task.index);
+  }
   // Nor may they pile up while nobody asks.
   active_.all_are_stale = active_.stale.size() > lists_.size();
 }

@@ -67,10 +67,11 @@ class LiteralMap final : public MapRepresentation {
     ListBlock* lists = nullptr;
     PlannedBlock planned;
     std::vector<InstanceId> targets;  // objects that take an observation here, increasing
+    bool changed = false;  // values; where another object is active now, it took an observation
   };
 
   void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
-  void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, const Task& task);
+  void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, Task& task);
   // Gives the active object of the voxel nearest to a point (metres), the background where there is
   // none.
   VoxelLabels ActiveAtVoxels() const;
