@@ -57,7 +57,8 @@ TEST_P(Invariants, ValuesOutOfRangeAreNoticed) {
   ExpectFault("colours", [](Place& p) { p.block->SetColour(p.observed, {}, 200); });
   ExpectFault("is unobserved and holds", [](Place& p) { p.block->distance[p.unobserved] = 0.01F; });
   ExpectFault("is unobserved and holds", [](Place& p) {
-    p.block->SetColour(p.unobserved, {0, 1, 0}, 1);
+    ColourSlice& colours = p.block->MakeColours(p.unobserved / kSliceVoxels);
+    colours.channel[1][p.unobserved % kSliceVoxels] = 1;
   });
   ExpectFault("no voxel with a colour", [](Place& p) {
     const std::size_t z = p.observed / kSliceVoxels;
