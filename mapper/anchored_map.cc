@@ -8,6 +8,7 @@
 #include <list>
 #include <set>
 
+#include "mapper/cover.h"
 #include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
 #include "mapper/map_invariants.h"
@@ -76,13 +77,7 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
     AddReach(id);
     moved_.push_back(id);
   }
-  const std::vector<StaleCover> stale = StaleCovers(fused);
-  const std::vector<BlockMask> covers = NewCovers(stale);
-  for (std::size_t i = 0; i < stale.size(); ++i) {
-    if (covers[i] == stale[i].block->cover) continue;
-    stale[i].block->cover = covers[i];
-    dirty_.push_back(stale[i].index);
-  }
+  for (const CoverChange& change : UpdateCovers(fused, volumes_)) dirty_.push_back(change.index);
   // Where one object alone is listed, its distances do not matter; where several are, they order
   // the list.
   for (const FusedBlock& block : fused) {

@@ -20,10 +20,11 @@ constexpr std::size_t kRoom = kRows + 2 * kStride + 64;
 using Rows = std::array<std::uint16_t, kRoom>;
 using Lanes16 = hn::CappedTag<std::uint16_t, 32>;
 
-void GatherRows(const MasksAround& around, Rows& rows) {
+// Of the slices that the cubes around these need.
+void GatherRows(const MasksAround& around, const SliceRange& slices, Rows& rows) {
   const hn::CappedTag<std::uint16_t, 8> d16;
   const hn::Rebind<std::uint8_t, decltype(d16)> d8;
-  for (std::size_t z = 0; z < 10; ++z) {
+  for (std::size_t z = slices.first; z <= slices.last + 2; ++z) {
     const std::size_t first = z == 0 ? 0 : (z == 9 ? 18 : 9);
     const std::size_t slice = (z + 7) & 7U;
     std::uint16_t* to = &rows[kStride * z];
@@ -56,23 +57,34 @@ auto FourRows(const Rows& rows, std::size_t i, const Combine& combine) {
   return combine(combine(at(0), at(1)), combine(at(kStride), at(kStride + 1)));
 }
 
-BlockMask Corners(const MasksAround& observed_around, const MasksAround& negative_around) {
-  Rows observed{};
+BlockMask Corners(const MasksAround& observed_around, const MasksAround& negative_around,
+                  const SliceRange& slices) {
+  BlockMask corners{};
   Rows negative{};
-  GatherRows(observed_around, observed);
-  GatherRows(negative_around, negative);
+  GatherRows(negative_around, slices, negative);
   const Lanes16 d;
+  // Of the rows that are gathered, and of the cubes between them.
+  const std::size_t begin = kStride * slices.first;
+  const std::size_t end_of_rows = kStride * (slices.last + 3);
+  const std::size_t end_of_cubes = kStride * (slices.last + 2);
+  auto any = hn::Zero(d);
+  for (std::size_t i = begin; i < end_of_rows; i += hn::Lanes(d)) {
+    any = hn::Or(any, hn::LoadU(d, &negative[i]));
+  }
+  if (hn::AllTrue(d, hn::Eq(any, hn::Zero(d)))) return corners;
+  Rows observed{};
+  GatherRows(observed_around, slices, observed);
   Rows positive{};
-  for (std::size_t i = 0; i < kRows; i += hn::Lanes(d)) {
+  for (std::size_t i = begin; i < end_of_rows; i += hn::Lanes(d)) {
     hn::StoreU(hn::AndNot(hn::LoadU(d, &negative[i]), hn::LoadU(d, &observed[i])), d, &positive[i]);
   }
   const auto both = [](auto a, auto b) { return hn::And(a, b); };
   const auto either = [](auto a, auto b) { return hn::Or(a, b); };
   // Bit x of row 16 z + y: whether the cube named by voxel (x - 1, y - 1, z - 1) is crossed.
   Rows crossed{};
-  auto any = hn::Zero(d);
+  any = hn::Zero(d);
   const auto nine = hn::Set(d, 0x1FF);
-  for (std::size_t i = 0; i < kRows; i += hn::Lanes(d)) {
+  for (std::size_t i = begin; i < end_of_cubes; i += hn::Lanes(d)) {
     const auto all = FourRows(observed, i, both);
     const auto inside = FourRows(negative, i, either);
     const auto outside = FourRows(positive, i, either);
@@ -82,12 +94,11 @@ BlockMask Corners(const MasksAround& observed_around, const MasksAround& negativ
     hn::StoreU(cubes, d, &crossed[i]);
     any = hn::Or(any, cubes);
   }
-  BlockMask corners{};
   if (hn::AllTrue(d, hn::Eq(any, hn::Zero(d)))) return corners;
   // A voxel is a corner of the cubes named one lower, and its own, along each axis.
   const hn::CappedTag<std::uint16_t, 8> d16;
   const hn::Rebind<std::uint8_t, decltype(d16)> d8;
-  for (std::size_t z = 0; z < kBlockSide; ++z) {
+  for (std::size_t z = slices.first; z <= slices.last; ++z) {
     for (std::size_t y = 0; y < kBlockSide; y += hn::Lanes(d16)) {
       const auto at = [&](std::size_t k) { return hn::LoadU(d16, &crossed[kStride * z + y + k]); };
       const auto row = hn::Or(hn::Or(at(0), at(1)), hn::Or(at(kStride), at(kStride + 1)));
@@ -150,8 +161,9 @@ BlockMask ChangedSigns(const BlockMask& old_observed, const BlockMask& old_negat
   return changed;
 }
 
-BlockMask CornersOfCrossedCubes(const MasksAround& observed, const MasksAround& negative) {
-  return HWY_DYNAMIC_DISPATCH(Corners)(observed, negative);
+BlockMask CornersOfCrossedCubes(const MasksAround& observed, const MasksAround& negative,
+                                const SliceRange& slices) {
+  return HWY_DYNAMIC_DISPATCH(Corners)(observed, negative, slices);
 }
 
 }  // namespace tsdfpp

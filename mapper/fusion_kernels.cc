@@ -292,16 +292,18 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   auto new_observed = block.observed;
   auto new_negative = std::bit_cast<BlockMask>(negative);
   auto new_band = std::bit_cast<BlockMask>(band);
+  unsigned changed_band = 0;
   for (std::size_t z = 0; z < kBlockSide; ++z) {
     new_observed[z] = (new_observed[z] | now_taken[z]) & ~now_lost[z];
     new_negative[z] &= new_observed[z];
     new_band[z] &= new_negative[z];
+    changed_band |= (block.band[z] != new_band[z] ? 1U : 0U) << z;
   }
   result.changed_signs = ChangedSigns(block.observed, block.negative, new_observed, new_negative);
   block.observed = new_observed;
   block.negative = new_negative;
-  result.changed_band = block.band != new_band;
   block.band = new_band;
+  result.changed_band = static_cast<std::uint8_t>(changed_band);
   return result;
 }
 

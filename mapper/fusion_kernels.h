@@ -62,7 +62,7 @@ struct FusionResult {
   // Voxels whose `observed` or `negative` changed, but for those that have neighbours of one sign
   // only: these are corners of no cube that is, or was, crossed.
   BlockMask changed_signs{};
-  bool changed_band = false;  // whether a voxel's `band` changed
+  std::uint8_t changed_band = 0;  // the slices in which a voxel's `band` changed, a bit each
 };
 
 // Labels of the voxels of a block and the votes for them (docs/map.md, "`tsdf`: one field").

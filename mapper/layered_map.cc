@@ -1,11 +1,6 @@
 #include "mapper/layered_map.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <atomic>
-#include <bit>
 #include <iterator>
 #include <tuple>
 #include <utility>
@@ -13,13 +8,6 @@
 #include "mapper/mesh_tools.h"
 
 namespace tsdfpp {
-namespace {
-
-constexpr std::size_t kBlocksPerTask = 64;
-constexpr std::size_t kCoversPerTask = 64;
-constexpr std::size_t kCoversAhead = 3;  // more than a few do not stay in the cache
-
-}  // namespace
 
 std::vector<Eigen::Vector3i> SortedVoxels(std::vector<Index3> voxels) {
   std::sort(voxels.begin(), voxels.end());
@@ -62,8 +50,7 @@ Pose LayeredMap::ObjectLattice(InstanceId id) const {
 }
 
 MeshWork LayeredMap::UpdateObjectMesh(InstanceId id) const {
-  const ObjectVolume& volume = volumes_.at(id);
-  return meshes_[id].Update(volume.grid, config_.voxel(), volume.T_WL, volume.lattice_is_world);
+  return meshes_[id].Update(volumes_.at(id), config_.voxel());
 }
 
 TriangleMesh LayeredMap::ObjectMesh(InstanceId id) const {
@@ -121,6 +108,7 @@ std::optional<LayeredMap::VisibilityChanges> LayeredMap::WhereVisibilityChanged(
   if (anything_may_be_hidden_ || 4 * changed > blocks) return std::nullopt;
   if (!HasIndex()) return VisibilityChanges{};
   std::uint64_t whose = 0;
+  InstanceId only = kNoInstance;
   std::vector<BlockBox> values;
   for (const auto& [id, object] : meshes_) {
     const auto add = [&, &of = object](const Index3& block) {
@@ -134,7 +122,9 @@ std::optional<LayeredMap::VisibilityChanges> LayeredMap::WhereVisibilityChanged(
     } else {
       for (const Index3& block : object.changed) add(block);
     }
-    if (object.has_moved || !object.changed.empty()) whose |= IdBit(id);
+    if (!object.has_moved && object.changed.empty()) continue;
+    only = whose == 0 ? id : kNoInstance;
+    whose |= IdBit(id);
   }
   std::vector<BlockBox> index;
   for (const Index3& block : index_changes_) index.push_back({block, block, false});
@@ -143,14 +133,17 @@ std::optional<LayeredMap::VisibilityChanges> LayeredMap::WhereVisibilityChanged(
   index.insert(index.end(), values.begin(), values.end());
   auto near = BlockSet::Of(index, 1);
   if (!index_set || !value_set || !near) return std::nullopt;
-  return VisibilityChanges{std::move(*index_set), std::move(*value_set), whose, std::move(index),
-                           std::move(*near)};
+  return VisibilityChanges{std::move(*index_set), std::move(*value_set), whose, only,
+                           std::move(index),      std::move(*near)};
 }
 
 std::vector<MeshPart*> LayeredMap::PartsToLookUp(
-    PlacedMesh& object, const std::optional<VisibilityChanges>& where) const {
+    InstanceId id, PlacedMesh& object, const std::optional<VisibilityChanges>& where) const {
   std::vector<MeshPart*> parts = object.mesh.TakeUnsettled();
   if (!where || object.has_moved) return object.mesh.parts();
+  // It does not hide itself.
+  if (where->index.empty() && where->only == id) return parts;
+  if (!where->near.Meets(ReachOf(object, config_.voxel_m))) return parts;
   // A triangle is looked up less than a block from its own.
   std::optional<BlockSet> near_in_lattice;
   if (!object.lattice_is_world) {
@@ -163,7 +156,7 @@ std::vector<MeshPart*> LayeredMap::PartsToLookUp(
     if (!near_in_lattice) return object.mesh.parts();
   }
   const BlockSet& near = near_in_lattice ? *near_in_lattice : where->near;
-  for (MeshPart* part : near.PartsOf(object.mesh)) {
+  for (MeshPart* part : PartsIn(near, object.mesh)) {
     if (!part->is_settled) continue;
     // Where the index is as it was, the objects that are looked up are those that were.
     const bool others_changed = (part->others & where->whose) != 0;
@@ -209,9 +202,13 @@ void LayeredMap::FindHiddenTriangles(const std::optional<VisibilityChanges>& whe
     return distance && *distance < -voxel;
   };
   for (auto& [self, object] : meshes_) {
-    const auto in_doubt = [&, id = self, is_world = object.lattice_is_world](const MeshPart& part) {
+    const auto place_of = [&, &of = object](const MeshPart& part) {
+      return MovedBox({part.index, part.index, false}, of.lattice_is_world ? nullptr : &of.T_WL,
+                      config_.voxel_m, 0);
+    };
+    const auto in_doubt = [&, id = self](const BlockBox& place) {
       return HasIndex() && std::any_of(objects.begin(), objects.end(), [&](const auto& other) {
-               return other.first != id && (!is_world || other.second.reach.Holds(part.index));
+               return other.first != id && other.second.reach.Meets(place);
              });
     };
     const auto hidden_at = [&, id = self](std::span<const Index3> voxels,
@@ -232,7 +229,7 @@ void LayeredMap::FindHiddenTriangles(const std::optional<VisibilityChanges>& whe
       return others;
     };
     object.mesh.NoteChanges(
-        HideTriangles(PartsToLookUp(object, where), voxel, in_doubt, hidden_at));
+        HideTriangles(PartsToLookUp(self, object, where), voxel, place_of, in_doubt, hidden_at));
     if (object.has_moved) object.mesh.NoteChanges(object.mesh.parts());
   }
 }
@@ -281,67 +278,6 @@ std::vector<Eigen::Vector3i> LayeredMap::ObservedVoxels(InstanceId id) const {
   const auto volume = volumes_.find(id);
   if (volume == volumes_.end()) return {};
   return ObservedVoxelsOf(volume->second.grid);
-}
-
-std::vector<LayeredMap::StaleCover> LayeredMap::StaleCovers(
-    const std::vector<FusedBlock>& fused) const {
-  struct Marks {
-    const TsdfGrid* grid;
-    std::vector<std::atomic<bool>> of_entry;
-  };
-  std::map<InstanceId, Marks> marks;
-  for (const auto& [id, volume] : volumes_) {
-    if (!volume.lattice_is_world) continue;
-    marks.try_emplace(id, Marks{&volume.grid, std::vector<std::atomic<bool>>(volume.grid.size())});
-  }
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, fused.size(), kBlocksPerTask),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const FusedBlock& from = fused[i];
-          const auto of = marks.find(from.id);
-          if (from.touched == 0 || of == marks.end()) continue;
-          const auto numbers = of->second.grid->directory().FindAround(from.index);
-          for (std::uint32_t bits = from.touched; bits != 0; bits &= bits - 1) {
-            const std::int32_t number = numbers[static_cast<std::size_t>(std::countr_zero(bits))];
-            if (number == BlockDirectory::kNone) continue;
-            of->second.of_entry[static_cast<std::size_t>(number)].store(true,
-                                                                        std::memory_order_relaxed);
-          }
-        }
-      },
-      tbb::simple_partitioner());
-  std::vector<StaleCover> stale;
-  for (const auto& [id, of] : marks) {
-    for (std::size_t i = 0; i < of.of_entry.size(); ++i) {
-      if (!of.of_entry[i].load(std::memory_order_relaxed)) continue;
-      const auto& entry = of.grid->entries()[i];
-      stale.push_back({id, entry.index, entry.block.get(), of.grid});
-    }
-  }
-  return stale;
-}
-
-std::vector<BlockMask> LayeredMap::NewCovers(const std::vector<StaleCover>& stale) {
-  std::vector<BlockMask> covers(stale.size());
-  // Covers read the neighbours' values, which no longer change.
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, stale.size(), kCoversPerTask),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        // What is found is fetched while the ones before are worked on.
-        std::array<Surroundings, kCoversAhead> around;
-        const auto find = [&](std::size_t i) {
-          if (i >= range.end()) return;
-          around[i % kCoversAhead] = FindSurroundings(*stale[i].grid, stale[i].index);
-        };
-        for (std::size_t i = range.begin(); i < range.begin() + kCoversAhead; ++i) find(i);
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          covers[i] = CoverOf(around[i % kCoversAhead]);
-          find(i + kCoversAhead);
-        }
-      },
-      tbb::simple_partitioner());
-  return covers;
 }
 
 MapMemory LayeredMap::VolumeMemory() const {

@@ -47,21 +47,11 @@ class LayeredMap : public MapRepresentation {
   }
 
   // Tells the visible scene that other objects may be active in this block of the index than were.
+  // Not needed where that is because the one that was is gone or has moved: the scene sees to what
+  // its blocks hid.
   void NoteIndexChange(const Index3& block) const;
   // False while it need not be told.
   bool NotesIndexChanges() const { return !anything_may_be_hidden_; }
-
-  // A block whose cover may have changed with a frame.
-  struct StaleCover {
-    InstanceId id = kNoInstance;
-    Index3 index;
-    TsdfBlock* block = nullptr;
-    const TsdfGrid* grid = nullptr;
-  };
-  // Of the volumes in the world's lattice, by id, each block once.
-  std::vector<StaleCover> StaleCovers(const std::vector<FusedBlock>& fused) const;
-  // The covers as they are now, one for each of these; their blocks still hold the old ones.
-  static std::vector<BlockMask> NewCovers(const std::vector<StaleCover>& stale);
 
   MapMemory VolumeMemory() const;
   // FindFault() of the volumes; adds their blocks to `blocks`. Covers are those of volumes whose
@@ -75,9 +65,10 @@ class LayeredMap : public MapRepresentation {
   MeshWork UpdateObjectMesh(InstanceId id) const;
   // Where triangles may have become hidden or visible since the last update, in global blocks.
   struct VisibilityChanges {
-    BlockSet index;           // other objects may be active
-    BlockSet values;          // distances of some objects are others ...
-    std::uint64_t whose = 0;  // ... of those with these bits
+    BlockSet index;                 // other objects may be active
+    BlockSet values;                // distances of some objects are others ...
+    std::uint64_t whose = 0;        // ... of those with these bits
+    InstanceId only = kNoInstance;  // if it is one alone, that one
     std::vector<BlockBox> all;
     BlockSet near;  // these and the blocks beside them
   };
@@ -85,7 +76,7 @@ class LayeredMap : public MapRepresentation {
   std::optional<VisibilityChanges> WhereVisibilityChanged() const;
   // The parts of the object whose triangles are to be looked up again; all where `where` is
   // nothing.
-  std::vector<MeshPart*> PartsToLookUp(PlacedMesh& object,
+  std::vector<MeshPart*> PartsToLookUp(InstanceId id, PlacedMesh& object,
                                        const std::optional<VisibilityChanges>& where) const;
   void FindHiddenTriangles(const std::optional<VisibilityChanges>& where) const;
 

@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "mapper/anchored_map.h"
+#include "mapper/cover.h"
 #include "mapper/literal_map.h"
 #include "mapper/single_field_map.h"
 #include "mapper/tsdfpp_map.h"

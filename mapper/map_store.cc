@@ -1,5 +1,6 @@
 // What each map writes to a file and reads from it (docs/map.md, "The map file").
 #include "mapper/anchored_map.h"
+#include "mapper/cover.h"
 #include "mapper/literal_map.h"
 #include "mapper/single_field_map.h"
 #include "mapper/tsdfpp_map.h"

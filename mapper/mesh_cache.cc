@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <tuple>
 #include <utility>
 
@@ -262,17 +263,30 @@ void GridMesh::MarkChanged(const std::vector<Change>& change) {
   }
 }
 
-MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel) {
+MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel,
+                          std::optional<std::uint64_t> revision) {
   MeshWork work;
+  work.blocks = grid.size();
   changed_.clear();
   remade_.clear();
+  if (revision && revision_ == revision) {
+#ifndef NDEBUG
+    // Somebody changed blocks and did not say so.
+    std::vector<Change> missed(grid.size(), kSame);
+    if (!Compare(grid, missed) || std::count(missed.begin(), missed.end(), kSame) !=
+                                      static_cast<std::ptrdiff_t>(missed.size())) {
+      std::abort();
+    }
+#endif
+    return work;
+  }
+  revision_ = revision;
   std::vector<Change> change(grid.size(), kSame);
   if (!Compare(grid, change)) {
     MatchBlocks(grid);
     Compare(grid, change);
   }
   MarkChanged(change);
-  work.blocks = grid.size();
   work.changed = changed_.size();
 
   std::vector<std::uint8_t> changed(cubes_todo_.size());

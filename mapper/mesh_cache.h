@@ -2,7 +2,9 @@
 // byte for byte, as the mesh made from scratch (docs/map.md, "Marching cubes").
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "mapper/mesh_part.h"
@@ -34,8 +36,9 @@ class GridMesh {
   ~GridMesh() = default;
 
   // Brings the parts in line with the grid, whichever grid that is; `voxel` in metres, always the
-  // same. A block counts as changed where its revision is another one.
-  MeshWork Update(const TsdfGrid& grid, float voxel);
+  // same. A block counts as changed where its revision is another one; none is looked at where
+  // `revision`, which names the values of all, is that of the last update.
+  MeshWork Update(const TsdfGrid& grid, float voxel, std::optional<std::uint64_t> revision = {});
 
   // By block, in Index3's order. The caller may change what a part says of the scene.
   const std::vector<MeshPart*>& parts() const { return order_; }
@@ -92,6 +95,7 @@ class GridMesh {
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i
   std::vector<Seen> seen_;                        // of owned_
+  std::optional<std::uint64_t> revision_;         // of the whole grid, if it was told
   Parts order_;
   std::vector<std::uint64_t> keys_;
   Parts cubes_todo_;

@@ -5,19 +5,10 @@
 #include <array>
 #include <vector>
 
+#include "mapper/block_set.h"
 #include "mapper/tsdf_block.h"
 
 namespace tsdfpp {
-
-// Blocks of a lattice, both ends included.
-struct BlockBox {
-  Index3 low;
-  Index3 high;
-  bool is_empty = true;
-
-  void Extend(const Index3& index);
-  bool Holds(const Index3& index) const;
-};
 
 // A part owns the cubes named by its block's voxels, and the vertices on the edges that start at
 // them; the triangles of its cubes also name vertices of the seven blocks further along x, y, z.

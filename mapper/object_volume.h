@@ -14,6 +14,9 @@ struct ObjectVolume {
   std::optional<Pose> T_WO;        // the last
   Pose T_WL = Pose::Identity();    // where the lattice is; moves only for anchored volumes
   bool lattice_is_world = true;    // T_WL is exactly the identity
+  // Names the grid's values, as TsdfBlock::revision does a block's: whoever changes a block's, or
+  // has other blocks, gives the volume a new one, without which kept meshes are not looked at.
+  std::uint64_t revision = NewRevision();
 };
 
 // Whether the numbers of two poses are the same.

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "mapper/mesh_tools.h"
-#include "mapper/object_volume.h"
 
 namespace tsdfpp {
 namespace {
@@ -228,19 +227,16 @@ std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of) {
   return parts;
 }
 
-MeshWork PlacedMesh::Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now,
-                            bool is_world_now) {
-  const bool moves = !SameNumbers(T_WL, T_WL_now) || lattice_is_world != is_world_now;
-  T_WL = T_WL_now;
-  lattice_is_world = is_world_now;
+MeshWork PlacedMesh::Update(const ObjectVolume& volume, float voxel) {
+  const bool moves = !SameNumbers(T_WL, volume.T_WL) || lattice_is_world != volume.lattice_is_world;
+  T_WL = volume.T_WL;
+  lattice_is_world = volume.lattice_is_world;
   has_moved = has_moved || moves;
-  const MeshWork work = mesh.Update(grid, voxel);
+  const MeshWork work = mesh.Update(volume.grid, voxel, volume.revision);
   changed.insert(changed.end(), mesh.changed().begin(), mesh.changed().end());
-  if (work.changed > 0) {
-    for (const Index3& index : mesh.changed()) {
-      const MeshPart* part = mesh.PartAt(index);
-      if (part != nullptr && part->any_negative) negative.Extend(index);
-    }
+  for (const Index3& index : mesh.changed()) {
+    const MeshPart* part = mesh.PartAt(index);
+    if (part != nullptr && part->any_negative) negative.Extend(index);
   }
   ForEachPart(moves ? mesh.parts() : mesh.remade(), [&](MeshPart& part) {
     part.placed.clear();
@@ -260,38 +256,6 @@ void PlacedMesh::FindNegative() {
   }
 }
 
-void BlockBox::Extend(const Index3& index) {
-  if (is_empty) low = high = index;
-  is_empty = false;
-  low = {std::min(low.x, index.x), std::min(low.y, index.y), std::min(low.z, index.z)};
-  high = {std::max(high.x, index.x), std::max(high.y, index.y), std::max(high.z, index.z)};
-}
-
-bool BlockBox::Holds(const Index3& index) const {
-  return !is_empty && index.x >= low.x && index.y >= low.y && index.z >= low.z &&
-         index.x <= high.x && index.y <= high.y && index.z <= high.z;
-}
-
-BlockBox MovedBox(const BlockBox& box, const Pose* T, double voxel_m, int margin) {
-  BlockBox moved;
-  if (box.is_empty) return moved;
-  const Index3 low{box.low.x * kBlockSide - margin, box.low.y * kBlockSide - margin,
-                   box.low.z * kBlockSide - margin};
-  const Index3 high{(box.high.x + 1) * kBlockSide + margin, (box.high.y + 1) * kBlockSide + margin,
-                    (box.high.z + 1) * kBlockSide + margin};
-  if (T == nullptr) {
-    moved.Extend(BlockOf(low));
-    moved.Extend(BlockOf(high + Index3{-1, -1, -1}));
-    return moved;
-  }
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d corner((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
-                                 (i & 4) != 0 ? high.z : low.z);
-    moved.Extend(BlockOf(FloorOf(*T * (corner * voxel_m) / voxel_m)));
-  }
-  return moved;
-}
-
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
   // What is covered is at most a voxel from a negative one, and a look-up voxel at most two from
   // the block of its triangle: not as much as a block together.
@@ -299,76 +263,19 @@ BlockBox ReachOf(const PlacedMesh& object, double voxel_m) {
                   kBlockSide);
 }
 
-std::optional<BlockSet> BlockSet::Of(const std::vector<BlockBox>& boxes, int margin) {
-  constexpr double kMost = 1 << 22;  // blocks in the bounds, a byte each
-  BlockSet set;
-  BlockBox& bounds = set.bounds_;
-  const Index3 down{-margin, -margin, -margin};
-  const Index3 up{margin, margin, margin};
-  for (const BlockBox& box : boxes) {
-    if (box.is_empty) continue;
-    bounds.Extend(box.low + down);
-    bounds.Extend(box.high + up);
-  }
-  if (bounds.is_empty) return set;
-  const auto side = [](int low, int high) { return double{1} + high - low; };
-  if (side(bounds.low.x, bounds.high.x) * side(bounds.low.y, bounds.high.y) *
-          side(bounds.low.z, bounds.high.z) >
-      kMost) {
-    return std::nullopt;
-  }
-  set.held_.assign(set.PlaceOf(bounds.high) + 1, 0);
-  for (const BlockBox& box : boxes) {
-    if (box.is_empty) continue;
-    const Index3 low = box.low + down;
-    const Index3 high = box.high + up;
-    for (int z = low.z; z <= high.z; ++z) {
-      for (int y = low.y; y <= high.y; ++y) {
-        const std::size_t first = set.PlaceOf({low.x, y, z});
-        std::fill_n(set.held_.begin() + static_cast<std::ptrdiff_t>(first), high.x - low.x + 1,
-                    std::uint8_t{1});
-      }
-    }
-  }
-  return set;
-}
-
-std::size_t BlockSet::PlaceOf(const Index3& index) const {
-  const auto along = [](int at, int low) { return static_cast<std::size_t>(at - low); };
-  const std::size_t width = along(bounds_.high.x, bounds_.low.x) + 1;
-  const std::size_t depth = along(bounds_.high.y, bounds_.low.y) + 1;
-  return along(index.x, bounds_.low.x) +
-         width * (along(index.y, bounds_.low.y) + depth * along(index.z, bounds_.low.z));
-}
-
-bool BlockSet::Holds(const Index3& index) const {
-  return bounds_.Holds(index) && held_[PlaceOf(index)] != 0;
-}
-
-bool BlockSet::Meets(const BlockBox& box) const {
-  for (int z = box.low.z; !box.is_empty && z <= box.high.z; ++z) {
-    for (int y = box.low.y; y <= box.high.y; ++y) {
-      for (int x = box.low.x; x <= box.high.x; ++x) {
-        if (Holds({x, y, z})) return true;
-      }
-    }
-  }
-  return false;
-}
-
-std::vector<MeshPart*> BlockSet::PartsOf(const GridMesh& mesh) const {
+std::vector<MeshPart*> PartsIn(const BlockSet& blocks, const GridMesh& mesh) {
   std::vector<MeshPart*> parts;
-  if (bounds_.is_empty) return parts;
+  if (blocks.bounds().is_empty) return parts;
   const std::vector<std::uint64_t>& keys = mesh.keys();
   auto key = keys.begin();
-  const auto [low, high, is_empty] = bounds_;
+  const auto& [low, high, is_empty] = blocks.bounds();
   for (int z = low.z; z <= high.z; ++z) {
     for (int y = low.y; y <= high.y; ++y) {
       const std::uint64_t first = PackIndex({low.x, y, z});
       const std::uint64_t last = PackIndex({high.x, y, z});
       if (key != keys.end() && *key < first) key = std::lower_bound(key, keys.end(), first);
       for (; key != keys.end() && *key <= last; ++key) {
-        if (held_[PlaceOf(UnpackIndex(*key))] == 0) continue;
+        if (!blocks.Holds(UnpackIndex(*key))) continue;
         parts.push_back(mesh.parts()[static_cast<std::size_t>(key - keys.begin())]);
       }
     }
@@ -394,7 +301,8 @@ void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels
 }
 
 std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
-                                     const std::function<bool(const MeshPart&)>& in_doubt,
+                                     const std::function<BlockBox(const MeshPart&)>& place_of,
+                                     const std::function<bool(const BlockBox&)>& in_doubt,
                                      const HiddenAt& hidden_at) {
   // Vertices are named by the triangles of the part and of the lower ones around it: where these
   // are others, or others are hidden, the part's vertices are numbered again.
@@ -406,11 +314,12 @@ std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float 
     hidden.clear();
     part.looked_up = {};
     part.others = 0;
-    if (!part.triangles.empty() && !in_doubt(part)) {
+    const BlockBox place = part.triangles.empty() ? BlockBox{} : place_of(part);
+    if (!place.is_empty && !in_doubt(place)) {
       // Where it would be.
-      part.looked_up.Extend(part.index + Index3{-1, -1, -1});
-      part.looked_up.Extend(part.index + Index3{1, 1, 1});
-    } else if (!part.triangles.empty()) {
+      part.looked_up.Extend(place.low + Index3{-1, -1, -1});
+      part.looked_up.Extend(place.high + Index3{1, 1, 1});
+    } else if (!place.is_empty) {
       const BlockBox box = FindLookUps(part, voxel, voxels);
       part.looked_up = {BlockOf(box.low), BlockOf(box.high), false};
       hidden.resize(voxels.size());

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mapper/mesh_cache.h"
+#include "mapper/object_volume.h"
 #include "mapper/voxel_labels.h"
 
 namespace tsdfpp {
@@ -41,48 +42,28 @@ struct PlacedMesh {
   // Makes `negative` as small as it can be.
   void FindNegative();
 
-  // Brings the mesh in line with the grid and stands it at T_WL.
-  MeshWork Update(const TsdfGrid& grid, float voxel, const Pose& T_WL_now, bool is_world_now);
+  // Brings the mesh in line with the volume's grid and pose; `voxel` in metres.
+  MeshWork Update(const ObjectVolume& volume, float voxel);
 };
 
-// The blocks that a box of blocks touches when `margin` voxels are added on each side and it is
-// moved by T (in metres). No motion where T is nullptr.
-BlockBox MovedBox(const BlockBox& box, const Pose* T, double voxel_m, int margin);
-
-// Where triangles of other objects may have a look-up voxel that this object covers: the blocks
-// around those that hold a negative voxel.
+// Where triangles of other objects may have a look-up voxel that this object covers, and where its
+// own have theirs: the blocks around those that hold a negative voxel.
 BlockBox ReachOf(const PlacedMesh& object, double voxel_m);
 
-// A set of blocks.
-class BlockSet {
- public:
-  // All blocks of the boxes and, with a margin, those at most so many blocks away along each axis.
-  // Nothing where they are so far apart that this takes more than some megabytes.
-  static std::optional<BlockSet> Of(const std::vector<BlockBox>& boxes, int margin);
-
-  bool Holds(const Index3& index) const;
-  // Whether it holds a block of the box.
-  bool Meets(const BlockBox& box) const;
-  // The parts of its blocks.
-  std::vector<MeshPart*> PartsOf(const GridMesh& mesh) const;
-
- private:
-  std::size_t PlaceOf(const Index3& index) const;
-
-  BlockBox bounds_;
-  std::vector<std::uint8_t> held_;  // of the bounds
-};
+// The parts of the set's blocks.
+std::vector<MeshPart*> PartsIn(const BlockSet& blocks, const GridMesh& mesh);
 
 // Which triangles are hidden, from the global voxels where they are looked up: 1 for those, 0 for
 // the others. Returns IdBit of all objects whose values say it. For several threads at once.
 using HiddenAt = std::function<std::uint64_t(std::span<const Index3>, std::span<std::uint8_t>)>;
 
-// Finds out which triangles of some parts of the mesh are hidden: of those that `in_doubt` names;
-// no others are. `voxel` in metres.
+// Finds out which triangles of some parts of the mesh are hidden: of those whose global blocks, by
+// `place_of`, are `in_doubt`; no others are. `voxel` in metres.
 // Returns the parts of which other triangles are visible than before, or whose triangles were made
 // again.
 std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
-                                     const std::function<bool(const MeshPart&)>& in_doubt,
+                                     const std::function<BlockBox(const MeshPart&)>& place_of,
+                                     const std::function<bool(const BlockBox&)>& in_doubt,
                                      const HiddenAt& hidden_at);
 
 // Labels the triangles of the parts whose values changed by what labels of each part's own say of

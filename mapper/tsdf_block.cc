@@ -1,11 +1,7 @@
 #include "mapper/tsdf_block.h"
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
 #include <atomic>
-
-#include "mapper/cover_kernels.h"
 
 #ifdef __SSE2__
 #include <emmintrin.h>
@@ -13,8 +9,6 @@
 
 namespace tsdfpp {
 namespace {
-
-constexpr BlockMask kNoVoxels{};
 
 struct SliceMasks {
   std::uint64_t observed = 0;
@@ -83,32 +77,6 @@ std::size_t BytesOf(const TsdfGrid& grid) {
   std::size_t bytes = grid.TableBytes();
   for (const TsdfGrid::Entry& entry : grid.entries()) bytes += entry.block->Bytes();
   return bytes;
-}
-
-Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block) {
-  Surroundings around;
-  around.band = &kNoVoxels;
-  const std::array<const TsdfBlock*, 27> blocks = grid.FindAround(block);
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    around.observed[i] = blocks[i] == nullptr ? &kNoVoxels : &blocks[i]->observed;
-    around.negative[i] = blocks[i] == nullptr ? &kNoVoxels : &blocks[i]->negative;
-    hwy::Prefetch(around.observed[i]);
-    hwy::Prefetch(around.negative[i]);
-  }
-  if (blocks[13] != nullptr) around.band = &blocks[13]->band;
-  return around;
-}
-
-BlockMask CoverOf(const Surroundings& around) {
-  BlockMask cover = *around.band;
-  const auto any = [](const MasksAround& masks) {
-    return std::any_of(masks.begin(), masks.end(),
-                       [](const BlockMask* mask) { return Any(*mask); });
-  };
-  if (!any(around.negative)) return cover;
-  const BlockMask corners = CornersOfCrossedCubes(around.observed, around.negative);
-  for (std::size_t slice = 0; slice < cover.size(); ++slice) cover[slice] |= corners[slice];
-  return cover;
 }
 
 }  // namespace tsdfpp

@@ -78,7 +78,7 @@ struct alignas(64) TsdfBlock {
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
-  BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see FindCover
+  BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see cover.h
   BlockMask full{};      // of these it is known that the weight is at its cap
 
   // Each slice only while a voxel in it has a colour: most lie too far from a surface.
@@ -164,24 +164,5 @@ using TsdfGrid = BlockGrid<TsdfBlock>;
 
 // Of the blocks and the tables that find them.
 std::size_t BytesOf(const TsdfGrid& grid);
-
-// The masks of a block (number 13) and of the 26 around it, x fastest, then y, then z; never
-// nullptr.
-using MasksAround = std::array<const BlockMask*, 27>;
-
-// What the cover of a block depends on. To find it is to wait for memory: find several, then
-// compute their covers.
-struct Surroundings {
-  MasksAround observed;
-  MasksAround negative;
-  const BlockMask* band = nullptr;
-};
-Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block);
-
-// The cover mask at the lattice points of the block: band, or corner of a crossed cube.
-BlockMask CoverOf(const Surroundings& around);
-inline BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
-  return CoverOf(FindSurroundings(grid, block));
-}
 
 }  // namespace tsdfpp

@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstddef>
 
+#include "mapper/cover.h"
 #include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
 #include "mapper/map_invariants.h"
@@ -32,14 +33,6 @@ void ForEachVoxel(const BlockMask& mask, const Function& function) {
 }
 
 }  // namespace
-
-// A block of one object whose cover changed in a frame.
-struct TsdfppMap::CoverChange {
-  InstanceId id = kNoInstance;
-  Index3 index;
-  BlockMask lost{};
-  BlockMask gained{};
-};
 
 // What a frame did at each block of the index, by increasing id. A block that nothing covers, or
 // did, has no lists.
@@ -221,6 +214,7 @@ void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   const std::vector<Index3> left = Deactivate(id);
   volume.grid = ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m,
                              config_.back(), config_.resampling);
+  volume.revision = NewRevision();
   Activate(id);
   FreeEmptyLists(left);
   CheckInDebugBuilds(*this);
@@ -235,7 +229,6 @@ std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
     ForEachVoxel(entry.block->cover, [&](int place) { ListOf(*lists, place).Remove(id); });
     if (!Any(entry.block->cover)) continue;
     blocks.push_back(entry.index);
-    NoteIndexChange(entry.index);
   }
   return blocks;
 }
@@ -297,28 +290,8 @@ void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   CheckInDebugBuilds(*this);
 }
 
-std::vector<TsdfppMap::CoverChange> TsdfppMap::UpdateCovers(const std::vector<FusedBlock>& fused) {
-  const std::vector<StaleCover> stale = StaleCovers(fused);
-  const std::vector<BlockMask> covers = NewCovers(stale);
-  std::vector<CoverChange> changes;
-  for (std::size_t i = 0; i < stale.size(); ++i) {
-    BlockMask& old = stale[i].block->cover;
-    const BlockMask& now = covers[i];
-    if (now == old) continue;
-    CoverChange& change = changes.emplace_back();
-    change.id = stale[i].id;
-    change.index = stale[i].index;
-    for (std::size_t z = 0; z < now.size(); ++z) {
-      change.lost[z] = old[z] & ~now[z];
-      change.gained[z] = now[z] & ~old[z];
-    }
-    old = now;
-  }
-  return changes;
-}
-
 void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
-  const std::vector<CoverChange> changes = UpdateCovers(fused);
+  const std::vector<CoverChange> changes = UpdateCovers(fused, volumes_);
   Groups groups(*this, fused, changes);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, groups.all().size(), kBlocksPerTask),
@@ -392,7 +365,6 @@ void TsdfppMap::Remove(InstanceId id) {
       ListWithRoom(lists, voxel.place).Append(other, 1);
     }
   }
-  for (const Index3& block : blocks) NoteIndexChange(block);
   FreeEmptyLists(blocks);
   CheckInDebugBuilds(*this);
 }

@@ -45,7 +45,6 @@ class TsdfppMap final : public LayeredMap {
     ListEntry At(std::size_t i) const { return {ids[i], confidences[i]}; }
     InstanceId ActiveAt(int place) const { return ids[static_cast<std::size_t>(place)]; }
   };
-  struct CoverChange;
   class Groups;
 
   ListBlock& ListsOf(const Index3& block);
@@ -60,7 +59,6 @@ class TsdfppMap final : public LayeredMap {
   // Puts the object first where it covers a voxel now.
   void Activate(InstanceId id);
   void UpdateIndex(const std::vector<FusedBlock>& fused);
-  std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused);
   // Frees those of these blocks whose lists are all empty, and the last layers of the others where
   // they are.
   void FreeEmptyLists(const std::vector<Index3>& blocks);

@@ -24,8 +24,6 @@ void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolum
   }
 }
 
-constexpr std::uint32_t kItself = 1U << 13U;  // of the 27 blocks around
-
 // Which of the 27 blocks around hold a neighbour of the voxels.
 std::uint32_t AroundVoxels(const BlockMask& voxels) {
   std::uint64_t any = 0;
@@ -41,6 +39,12 @@ std::uint32_t AroundVoxels(const BlockMask& voxels) {
   const unsigned z = along(voxels.front() != 0, voxels.back() != 0);
   const std::uint32_t row = x * ((y & 1U) | (y & 2U) << 2U | (y & 4U) << 4U);
   return row * ((z & 1U) | (z & 2U) << 8U | (z & 4U) << 16U);
+}
+
+std::uint8_t SlicesOf(const BlockMask& voxels) {
+  unsigned slices = 0;
+  for (unsigned z = 0; z < voxels.size(); ++z) slices |= (voxels[z] != 0 ? 1U : 0U) << z;
+  return static_cast<std::uint8_t>(slices);
 }
 
 struct Candidate {
@@ -98,12 +102,20 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
                       of.index,
                       &block,
                       result.in_band,
-                      AroundVoxels(result.changed_signs) | (result.changed_band ? kItself : 0U),
+                      AroundVoxels(result.changed_signs) |
+                          (result.changed_band != 0 ? 1U << kItselfAround : 0U),
+                      SlicesOf(result.changed_signs),
+                      result.changed_band,
                       block.is_listed_with_others};
         }
       },
       tbb::simple_partitioner());
   std::erase_if(fused, [](const FusedBlock& block) { return block.block == nullptr; });
+  InstanceId last = kNoInstance;
+  for (const FusedBlock& block : fused) {
+    if (block.id != last) volumes.at(block.id).revision = NewRevision();
+    last = block.id;
+  }
   return fused;
 }
 

@@ -34,6 +34,8 @@ inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std
   colours.count[k] = static_cast<std::uint8_t>(std::min(count + 1, weight_cap));
 }
 
+inline constexpr int kItselfAround = 13;  // of the 27 blocks around one
+
 // A block that the frame changed.
 struct FusedBlock {
   InstanceId id = kNoInstance;
@@ -42,6 +44,8 @@ struct FusedBlock {
   BlockMask votes{};  // voxels with an observation of this object in band
   // The 27 blocks around (bit 9 z + 3 y + x, this one in the middle) whose cover may have changed.
   std::uint32_t touched = 0;
+  std::uint8_t sign_slices = 0;        // of FusionResult::changed_signs
+  std::uint8_t band_slices = 0;        // with a voxel that is in the band anew, or no longer
   bool is_listed_with_others = false;  // of the block
 };
 

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapper/cover.h"
 #include "mapper/freeing.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "mapper/cover.h"
 #include "tests/mapper/every_method.h"
 
 namespace tsdfpp {
