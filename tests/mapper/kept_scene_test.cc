@@ -141,6 +141,30 @@ TEST_F(KeptSceneOfFineLists, FollowsMoves) {
   EXPECT_LT(HiddenOfTable(), before + 50);
 }
 
+// Far from where it was born, an object in its own lattice is hidden by what is there.
+TEST(KeptSceneOfAnchored, HidesWhatMovedFarAway) {
+  Scene scene = TableOnly();
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  map->Fuse(RenderToys(scene, 0, 0), RenderToys(scene, 0, 0).mask);
+  const Eigen::Vector3d birth(1.5, 0, 0);
+  AddBall(scene, birth);
+  const Frame frame =
+      reference::Render(scene, reference::LookAt(birth + Eigen::Vector3d(0, 0.3, 0.4), birth), 1);
+  map->SetObjectPose(kBall, scene.T_WO[kBall]);
+  map->Fuse(frame, frame.mask);
+  const auto visible = [&] {
+    const TriangleMesh scene_mesh = map->SceneMesh();
+    return std::count(scene_mesh.face_ids.begin(), scene_mesh.face_ids.end(), kBall);
+  };
+  const auto all = visible();
+  ASSERT_GT(all, 20);
+  EXPECT_EQ(static_cast<std::size_t>(all), map->ObjectMesh(kBall).triangles.size());
+  // Its upper side two voxels below the table's.
+  map->SetObjectPose(
+      kBall, reference::MakePose(0, {0, 0, 1}, {0, 0, kTableTop_m - 0.055 - 2 * kToyVoxel_m}));
+  EXPECT_LT(visible(), all / 2);
+}
+
 TEST(BlockSet, HoldsTheBlocksOfTheBoxesAndThoseNear) {
   Dice dice(5);
   const auto some = [&] {
