@@ -193,12 +193,15 @@ TEST(BlockSet, HoldsTheBlocksOfTheBoxesAndThoseNear) {
     for (int k = 0; k < 200; ++k) {
       const Index3 at = some();
       ASSERT_EQ(set->Holds(at), expected(at));
-      const BlockBox box{at, at + Index3{dice.Whole(2), dice.Whole(2), dice.Whole(2)}, false};
+      // One in ten reaches beyond all of the set.
+      const int side = dice.Whole(10) == 0 ? 40 : 3;
+      const BlockBox box{at, at + Index3{dice.Whole(side), dice.Whole(side), dice.Whole(side)},
+                         false};
       bool meets = false;
-      for (int corner = 0; corner < 8; ++corner) {
-        meets = meets || expected({(corner & 1) != 0 ? box.high.x : box.low.x,
-                                   (corner & 2) != 0 ? box.high.y : box.low.y,
-                                   (corner & 4) != 0 ? box.high.z : box.low.z});
+      for (int z = box.low.z; z <= box.high.z; ++z) {
+        for (int y = box.low.y; y <= box.high.y; ++y) {
+          for (int x = box.low.x; x <= box.high.x; ++x) meets = meets || expected({x, y, z});
+        }
       }
       ASSERT_EQ(set->Meets(box), meets);
     }
