@@ -66,6 +66,13 @@ function(tsdfpp_test name)
     tsdfpp_order_tbb(${name})
   endif()
   tsdfpp_compile_options(${name})
+  tsdfpp_discover_tests(${name} PROPERTIES TIMEOUT 600)
+endfunction()
+
+# tsdfpp_discover_tests(<name> [...]): the tests of a GoogleTest binary, listed when CTest starts; options as of
+# gtest_discover_tests. A binary that loads a hundred libraries from a cold disk needs longer to list its tests than the
+# five seconds it has by default.
+function(tsdfpp_discover_tests name)
   include(GoogleTest)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 600)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 300 ${ARGN})
 endfunction()
