@@ -73,14 +73,6 @@ class BlockGrid {
     return blocks;
   }
 
-  // A block (13) and the 26 around it, x fastest, then y, then z; nullptr where there is none.
-  std::array<const Block*, 27> FindAround(const Index3& index) const {
-    const std::array<std::int32_t, 27> numbers = directory_.FindAround(index);
-    std::array<const Block*, 27> blocks;
-    for (std::size_t i = 0; i < numbers.size(); ++i) blocks[i] = BlockOrNone(numbers[i]);
-    return blocks;
-  }
-
   Block& FindOrAdd(const Index3& index) {
     if (Block* block = Find(index)) return *block;
     return Add(index, std::make_unique<Block>());

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What does not fit in CI's time: the full gates with every sabotage, the audit of the quick ones, the mapper's tests under
-# ASan with UBSan and under TSan, and the long experiments.
+# ASan with UBSan and under TSan, a build in which every file has only the headers that it names, and the long experiments.
 # All cells are kept below OUT (out/nightly by default), so a run that was stopped goes on from there.
 # Usage: bash scripts/nightly.sh [--gates-only] [OUT]; --gates-only leaves out all but the gates.
 set -euo pipefail
@@ -15,6 +15,7 @@ status=0
 if [ "$gates_only" = yes ]; then exit "$status"; fi
 "$tsdfpp" gate results/gates.toml --profile quick --audit --out "$out/gates" || status=$?
 for preset in asan tsan; do ROOMS="core;mapper;tests" bash scripts/sanitizers.sh "$preset" || status=$?; done
+cmake --preset release -B build/plain -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON && cmake --build build/plain || status=$?
 for experiment in eval/experiments/*.toml; do
   "$tsdfpp" sweep "$experiment" --out "$out/experiments/$(basename "$experiment" .toml)" || status=$?
 done

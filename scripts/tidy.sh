@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# clang-tidy over the sources (or those named); slow, so not part of .ci/run. Needs a configured build/release.
+# clang-tidy over the sources (or those named); slow, so not part of .ci/run. It cannot read what GCC precompiled:
+# the commands are those of a build without, in build/plain, which is only configured.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if [ $# -eq 0 ]; then
@@ -7,4 +8,5 @@ if [ $# -eq 0 ]; then
 else
   files=("$@")
 fi
-printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "$(nproc)" clang-tidy -p build/release --quiet
+cmake --preset release -B build/plain -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null
+printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "$(nproc)" clang-tidy -p build/plain --quiet
