@@ -93,6 +93,7 @@ def ids(tables, pictures):
         axes.set_xlabel("ids that the same geometry is split into")
         axes.set_title(title, fontsize=9, loc="left")
     all_axes[1].axhline(1.3, color="#777777", linewidth=0.9, linestyle=":")
+    all_axes[1].set_ylim(top=max(1.4, all_axes[1].get_ylim()[1]))
     legend(figure, all_axes[0], 3)
     save(figure, pictures, "scaling-ids")
 
