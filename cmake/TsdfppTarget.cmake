@@ -101,7 +101,7 @@ function(tsdfpp_test name)
     tsdfpp_order_tbb(${name})
   endif()
   tsdfpp_compile_options(${name})
-  # Tests are compiled oftener than they are run: a third of the time.
+  # Tests are compiled oftener than they are run; it saves a third of that time.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   if(ARG_OTHER_OPTIONS)
     tsdfpp_precompile(${name} ${name} <gtest/gtest.h>)
