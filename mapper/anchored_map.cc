@@ -71,11 +71,7 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   std::set<InstanceId> changed_ids;
-  InstanceId last = kNoInstance;
-  for (const FusedBlock& block : fused) {
-    if (block.id != last) changed_ids.insert(block.id);
-    last = block.id;
-  }
+  for (const FusedBlock& block : fused) changed_ids.insert(block.id);
   for (const InstanceId id : changed_ids) {
     if (volumes_.at(id).lattice_is_world) continue;
     AddReach(id);

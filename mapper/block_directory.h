@@ -70,40 +70,29 @@ class BlockDirectory {
     return numbers;
   }
 
-  // Of the three layers of blocks around one, from the one below (0) to the one above (2).
-  struct Layers {
-    int first = 0;
-    int last = 2;
-  };
-
-  // The numbers of a block (13) and of the 26 around it, x fastest, then y, then z; kNone in other
-  // layers than those asked for.
-  std::array<std::int32_t, 27> FindAround(const Index3& block, const Layers& layers) const {
-    static const Cell kNobody = EmptyCell();
-    std::array<std::int32_t, 27> numbers;
-    numbers.fill(kNone);
+  // The numbers of a block (13) and of the 26 around it, x fastest, then y, then z.
+  std::array<std::int32_t, 27> FindAround(const Index3& block) const {
     // Along each axis the three lie in one cell or in two.
     const Index3 low = block + Index3{-1, -1, -1};
-    const int first = low.z + layers.first;
-    const int last = low.z + layers.last;
-    const bool two_x = (low.x & 3) > 1;
-    const bool two_y = (low.y & 3) > 1;
+    const auto has_two = [](int first) { return (first & 3) > 1; };
     std::array<const Cell*, 8> cells{};
-    for (int z = first >> 2; z <= last >> 2; ++z) {
-      for (int i = 0; i < 4; ++i) {
-        if (((i & 1) != 0 && !two_x) || ((i & 2) != 0 && !two_y)) continue;
-        const Cell* cell = CellOf({low.x + 4 * (i & 1), low.y + 4 * (i >> 1), 4 * z});
-        cells[static_cast<std::size_t>(4 * (z - (low.z >> 2)) + i)] =
-            cell != nullptr ? cell : &kNobody;
+    for (int i = 0; i < 8; ++i) {
+      if (((i & 1) != 0 && !has_two(low.x)) || ((i & 2) != 0 && !has_two(low.y)) ||
+          ((i & 4) != 0 && !has_two(low.z))) {
+        continue;
       }
+      cells[static_cast<std::size_t>(i)] =
+          CellOf(low + Index3{4 * (i & 1), 4 * ((i >> 1) & 1), 4 * (i >> 2)});
     }
-    std::size_t i = 9 * static_cast<std::size_t>(layers.first);
-    for (int z = first; z <= last; ++z) {
+    std::array<std::int32_t, 27> numbers;
+    std::size_t i = 0;
+    for (int z = low.z; z <= low.z + 2; ++z) {
       for (int y = low.y; y <= low.y + 2; ++y) {
-        const int row = 2 * ((y >> 2) - (low.y >> 2)) + 4 * ((z >> 2) - (low.z >> 2));
         for (int x = low.x; x <= low.x + 2; ++x, ++i) {
-          const int cell = row + ((x >> 2) - (low.x >> 2));
-          numbers[i] = cells[static_cast<std::size_t>(cell)]->number[PlaceOf({x, y, z})];
+          const int cell = ((x >> 2) - (low.x >> 2)) + 2 * ((y >> 2) - (low.y >> 2)) +
+                           4 * ((z >> 2) - (low.z >> 2));
+          const Cell* of = cells[static_cast<std::size_t>(cell)];
+          numbers[i] = of == nullptr ? kNone : of->number[PlaceOf({x, y, z})];
         }
       }
     }
@@ -143,12 +132,6 @@ class BlockDirectory {
     std::int32_t cell = kNone;
   };
   static constexpr std::size_t kFirstSlots = 32;
-
-  static Cell EmptyCell() {
-    Cell cell;
-    cell.number.fill(kNone);
-    return cell;
-  }
 
   static std::size_t PlaceOf(const Index3& block) {
     return static_cast<std::size_t>((block.z & 3) * 16 + (block.y & 3) * 4 + (block.x & 3));

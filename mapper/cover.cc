@@ -36,11 +36,10 @@ Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block, const S
   around.negative.fill(&kNoVoxels);
   around.band = &kNoVoxels;
   around.slices = slices;
-  const BlockDirectory::Layers layers{slices.first == 0 ? 0 : 1,
-                                      slices.last + 1 == kBlockSide ? 2 : 1};
-  const std::array<std::int32_t, 27> numbers = grid.directory().FindAround(block, layers);
-  const auto end = 9 * static_cast<std::size_t>(layers.last + 1);
-  for (auto i = 9 * static_cast<std::size_t>(layers.first); i < end; ++i) {
+  const std::array<std::int32_t, 27> numbers = grid.directory().FindAround(block);
+  const std::size_t first = slices.first == 0 ? 0 : 9;
+  const std::size_t last = slices.last + 1 == kBlockSide ? 26 : 17;
+  for (std::size_t i = first; i <= last; ++i) {
     if (numbers[i] == BlockDirectory::kNone) continue;
     const TsdfBlock& at = *grid.entries()[static_cast<std::size_t>(numbers[i])].block;
     around.observed[i] = &at.observed;
@@ -98,9 +97,7 @@ std::vector<StaleCover> StaleCovers(const std::vector<FusedBlock>& fused,
           const FusedBlock& from = fused[i];
           const auto of = marks.find(from.id);
           if (from.touched == 0 || of == marks.end()) continue;
-          const auto numbers = of->second.grid->directory().FindAround(
-              from.index,
-              {std::countr_zero(from.touched) / 9, (31 - std::countl_zero(from.touched)) / 9});
+          const auto numbers = of->second.grid->directory().FindAround(from.index);
           for (std::uint32_t bits = from.touched; bits != 0; bits &= bits - 1) {
             const int around = std::countr_zero(bits);
             const std::int32_t number = numbers[static_cast<std::size_t>(around)];
