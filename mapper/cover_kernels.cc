@@ -20,6 +20,12 @@ constexpr std::size_t kRoom = kRows + 2 * kStride + 64;
 using Rows = std::array<std::uint16_t, kRoom>;
 using Lanes16 = hn::CappedTag<std::uint16_t, 32>;
 
+// Of the rows from `begin` up to `end`, and whole vectors beyond.
+void Clear(Rows& rows, std::size_t begin, std::size_t end) {
+  const Lanes16 d;
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) hn::StoreU(hn::Zero(d), d, &rows[i]);
+}
+
 // Of the slices that the cubes around these need.
 void GatherRows(const MasksAround& around, const SliceRange& slices, Rows& rows) {
   const hn::CappedTag<std::uint16_t, 8> d16;
@@ -60,28 +66,34 @@ auto FourRows(const Rows& rows, std::size_t i, const Combine& combine) {
 BlockMask Corners(const MasksAround& observed_around, const MasksAround& negative_around,
                   const SliceRange& slices) {
   BlockMask corners{};
-  Rows negative{};
-  GatherRows(negative_around, slices, negative);
   const Lanes16 d;
   // Of the rows that are gathered, and of the cubes between them.
   const std::size_t begin = kStride * slices.first;
   const std::size_t end_of_rows = kStride * (slices.last + 3);
   const std::size_t end_of_cubes = kStride * (slices.last + 2);
+  // Vectors read one slice and one row further.
+  const std::size_t end_of_reads = end_of_rows + kStride + 1;
+  Rows negative;
+  Clear(negative, begin, end_of_reads);
+  GatherRows(negative_around, slices, negative);
   auto any = hn::Zero(d);
   for (std::size_t i = begin; i < end_of_rows; i += hn::Lanes(d)) {
     any = hn::Or(any, hn::LoadU(d, &negative[i]));
   }
   if (hn::AllTrue(d, hn::Eq(any, hn::Zero(d)))) return corners;
-  Rows observed{};
+  Rows observed;
+  Clear(observed, begin, end_of_reads);
   GatherRows(observed_around, slices, observed);
-  Rows positive{};
+  Rows positive;
+  Clear(positive, begin, end_of_reads);
   for (std::size_t i = begin; i < end_of_rows; i += hn::Lanes(d)) {
     hn::StoreU(hn::AndNot(hn::LoadU(d, &negative[i]), hn::LoadU(d, &observed[i])), d, &positive[i]);
   }
   const auto both = [](auto a, auto b) { return hn::And(a, b); };
   const auto either = [](auto a, auto b) { return hn::Or(a, b); };
   // Bit x of row 16 z + y: whether the cube named by voxel (x - 1, y - 1, z - 1) is crossed.
-  Rows crossed{};
+  Rows crossed;
+  Clear(crossed, begin, end_of_reads);
   any = hn::Zero(d);
   const auto nine = hn::Set(d, 0x1FF);
   for (std::size_t i = begin; i < end_of_cubes; i += hn::Lanes(d)) {

@@ -1,6 +1,8 @@
 // Reading a frame's images at the pixels of voxels: for the fusion kernels alone.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -17,13 +19,23 @@ namespace tsdfpp {
 #define TSDFPP_PLAIN_LOADS
 #endif
 
-// table[pixel], `kLanes` at a time, where these are to be looked at.
+// table[pixel], `kLanes` at a time, where these are to be looked at. Two pixels a load and a store,
+// of which there are otherwise as many as the loads from the table.
 template <std::size_t kLanes, typename From, typename To>
 TSDFPP_PLAIN_LOADS void ReadPixels(const From* table, const Lanes& pixel, const std::uint8_t* look,
                                    To* out) {
   for (std::size_t i = 0; i < kBlockVoxels; i += kLanes) {
     if (look[i] == 0) continue;
-    for (std::size_t k = i; k < i + kLanes; ++k) out[k] = table[pixel[k]];
+    if constexpr (kLanes == 1 || std::endian::native != std::endian::little) {
+      for (std::size_t k = i; k < i + kLanes; ++k) out[k] = table[pixel[k]];
+    } else {
+      for (std::size_t k = i; k < i + kLanes; k += 2) {
+        std::uint64_t pixels;
+        std::memcpy(&pixels, &pixel[k], sizeof(pixels));
+        const std::array<To, 2> both{table[pixels & 0xFFFFFFFFU], table[pixels >> 32U]};
+        std::memcpy(&out[k], &both, sizeof(both));
+      }
+    }
   }
 }
 

@@ -32,7 +32,9 @@ using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
   Projected projected;
-  if (!Project(frame, place, projected)) return false;
+  if (!Project(
+          frame, place, [](std::size_t) {}, projected))
+    return false;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   ReadPixels<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
@@ -128,11 +130,16 @@ template <Labels kLabels>
 FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                       TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
   FusionResult result;
-  for (const auto& slice : block.colours) {
-    if (slice != nullptr) hwy::Prefetch(slice->count.data());
-  }
+  // The next block is fetched a few lines at a time: many at once would wait for each other.
+  if (next != nullptr) hwy::Prefetch(&next->colours);
+  const auto fetch_values = [&](std::size_t z) {
+    if (next == nullptr) return;
+    hwy::Prefetch(&next->distance[kSliceVoxels * z]);
+    hwy::Prefetch(&next->distance[kSliceVoxels * z + kSliceVoxels / 2]);
+    hwy::Prefetch(&next->weight[kSliceVoxels * z]);
+  };
   Projected projected;
-  if (!Project(frame, place, projected)) return result;
+  if (!Project(frame, place, fetch_values, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   ReadPixels<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());
@@ -175,13 +182,13 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     hwy::Prefetch(&next->band);
     hwy::Prefetch(&next->cover);
     hwy::Prefetch(&next->full);
-    hwy::Prefetch(&next->colours);
+    hwy::Prefetch(&next->revision);
   }
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
-    // A line at a time: many at once would wait for each other.
-    if (next != nullptr) {
-      if (i % 32 == 0) hwy::Prefetch(&next->distance[i]);
-      if (i % 64 == 32) hwy::Prefetch(&next->weight[i]);
+    if (next != nullptr && i % kSliceVoxels == 0) {
+      if (const ColourSlice* slice = next->colours[i / kSliceVoxels].get()) {
+        hwy::Prefetch(slice->count.data());
+      }
     }
     if (projected.look[i] == 0) continue;
     const auto s = Measure(projected, depth.data(), i);

@@ -49,9 +49,10 @@ struct Projected {
 };
 constexpr std::size_t kLanes = hn::MaxLanes(Floats());
 
-// False where none is to be looked at.
-template <bool kAllInView>
-bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
+// False where none is to be looked at. Calls each_slice(z) before each slice.
+template <bool kAllInView, class EachSlice>
+bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, const EachSlice& each_slice,
+                 Projected& out) {
   const Floats df;
   const Ints di;
   std::array<float, 12> m;
@@ -81,6 +82,7 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
   const auto behind = hn::Set(df, place.behind_m);
   auto any = hn::MaskFromVec(hn::Zero(df));
   for (std::size_t z = 0; z < kBlockSide; ++z) {
+    each_slice(z);
     const float pz = static_cast<float>(place.first.z + static_cast<int>(z)) * place.voxel;
     const std::array z_term{hn::Set(df, m[2] * pz), hn::Set(df, m[6] * pz),
                             hn::Set(df, m[10] * pz)};
@@ -127,9 +129,11 @@ bool ProjectWith(const KernelFrame& frame, const BlockPlace& place, Projected& o
   return !hn::AllFalse(df, any);
 }
 
-bool Project(const KernelFrame& frame, const BlockPlace& place, Projected& out) {
-  return place.all_in_view ? ProjectWith<true>(frame, place, out)
-                           : ProjectWith<false>(frame, place, out);
+template <class EachSlice>
+bool Project(const KernelFrame& frame, const BlockPlace& place, const EachSlice& each_slice,
+             Projected& out) {
+  return place.all_in_view ? ProjectWith<true>(frame, place, each_slice, out)
+                           : ProjectWith<false>(frame, place, each_slice, out);
 }
 
 // s of the lanes i ...; less than -back where nothing is observed.
