@@ -144,9 +144,12 @@ std::vector<MeshPart*> LayeredMap::PartsToLookUp(
   // It does not hide itself.
   if (where->index.empty() && where->only == id) return parts;
   if (!where->near.Meets(ReachOf(object, config_.voxel_m))) return parts;
+  // Moving the boxes to its lattice takes longer than asking all parts of a small object.
+  const bool asks_all =
+      !object.lattice_is_world && object.mesh.parts().size() < 8 * where->all.size();
   // A triangle is looked up less than a block from its own.
   std::optional<BlockSet> near_in_lattice;
-  if (!object.lattice_is_world) {
+  if (!object.lattice_is_world && !asks_all) {
     const Pose T_LW = object.T_WL.inverse();
     std::vector<BlockBox> boxes;
     for (const BlockBox& box : where->all) {
@@ -156,7 +159,7 @@ std::vector<MeshPart*> LayeredMap::PartsToLookUp(
     if (!near_in_lattice) return object.mesh.parts();
   }
   const BlockSet& near = near_in_lattice ? *near_in_lattice : where->near;
-  for (MeshPart* part : PartsIn(near, object.mesh)) {
+  for (MeshPart* part : asks_all ? object.mesh.parts() : PartsIn(near, object.mesh)) {
     if (!part->is_settled) continue;
     // Where the index is as it was, the objects that are looked up are those that were.
     const bool others_changed = (part->others & where->whose) != 0;

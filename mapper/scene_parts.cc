@@ -48,22 +48,47 @@ class CornersOf {
 // front of each one's centroid. Returns a box around them.
 BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<Index3>& voxels) {
   constexpr int kMost = std::numeric_limits<int>::max();
+  constexpr std::size_t kAtOnce = 64;
+  using Numbers = std::array<float, kAtOnce>;
   const float per_voxel = 1 / voxel;
   const CornersOf corner(part);
   Index3 low{kMost, kMost, kMost};
   Index3 high{-kMost, -kMost, -kMost};
   voxels.resize(part.triangles.size());
-  for (std::size_t t = 0; t < part.triangles.size(); ++t) {
-    const Eigen::Vector3f a = corner(part.triangles[t][0]) * per_voxel;
-    const Eigen::Vector3f b = corner(part.triangles[t][1]) * per_voxel;
-    const Eigen::Vector3f c = corner(part.triangles[t][2]) * per_voxel;
-    const Eigen::Vector3f normal = (b - a).cross(c - a);
-    const float squared = normal.squaredNorm();
-    const float half = squared > 0 ? 0.5F / std::sqrt(squared) : 0;
-    const Index3 v = NearestVoxel((a + b + c) * (1.0F / 3) + half * normal, 1);
-    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
-    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
-    voxels[t] = v;
+  std::array<std::array<Numbers, 3>, 3> at;  // coordinates of the corners, by axis
+  std::array<std::array<int, kAtOnce>, 3> found;
+  for (std::size_t first = 0; first < part.triangles.size(); first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, part.triangles.size() - first);
+    for (std::size_t t = 0; t < count; ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Eigen::Vector3f& p_W = corner(part.triangles[first + t][k]);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          at[axis][k][t] = p_W[static_cast<Eigen::Index>(axis)];
+        }
+      }
+    }
+    // Compilers make vectors of this.
+    for (std::size_t t = 0; t < count; ++t) {
+      const auto of = [&](std::size_t axis, std::size_t k) { return at[axis][k][t] * per_voxel; };
+      const auto side = [&](std::size_t axis, std::size_t k) { return of(axis, k) - of(axis, 0); };
+      const auto normal = [&](std::size_t axis) {
+        const std::size_t u = (axis + 1) % 3;
+        const std::size_t v = (axis + 2) % 3;
+        return side(u, 1) * side(v, 2) - side(v, 1) * side(u, 2);
+      };
+      const float squared = normal(0) * normal(0) + (normal(1) * normal(1) + normal(2) * normal(2));
+      const float half = squared > 0 ? 0.5F / std::sqrt(squared) : 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float centroid = (of(axis, 0) + of(axis, 1) + of(axis, 2)) * (1.0F / 3);
+        found[axis][t] = NearestAlong(centroid + half * normal(axis), 1);
+      }
+    }
+    for (std::size_t t = 0; t < count; ++t) {
+      const Index3 v{found[0][t], found[1][t], found[2][t]};
+      low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+      high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+      voxels[first + t] = v;
+    }
   }
   return {low, high, false};
 }
