@@ -9,7 +9,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 16;
+constexpr std::size_t kBlocksPerTask = 32;
 constexpr std::size_t kAhead = 4;
 
 void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolumes& volumes) {
@@ -92,7 +92,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           rule.weight_cap = static_cast<float>(config.weight_cap);
           TsdfBlock& block = *of.block;
           const TsdfBlock* next =
-              k + 1 == planned.size() ? nullptr : candidates[planned[k + 1].number].block;
+              k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].block;
           if (k + kAhead < range.end()) hwy::Prefetch(&candidates[planned[k + kAhead].number]);
           const BlockPlace place = PlaceOf(*of.T_CL, of.index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
