@@ -3,17 +3,17 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <limits>
 #include <map>
-#include <sstream>
+#include <memory>
 
+#include "bench/peer_process.h"
+#include "bench/side_by_side_cases.h"
 #include "core/files.h"
 #include "eval/adapters/open3d_peer.h"
 #include "eval/adapters/voxel_block_grid.h"
@@ -26,63 +26,11 @@ namespace {
 constexpr const char* kHowToRead =
     R"(Milliseconds a frame by numbers of threads (T), with all objects, colour and allocation of blocks; of the runs the one with the least worst frame.
 The first four columns are of pose updates and fusion together; *fusion* is the median of fusion alone, as the volumes of Open3D, which move nothing, are timed. `tsdf++/anchored` and `volumes` move nothing either when a pose changes: what the move does to the index is part of the fusion that follows.
-Each map takes ten frames in a row, then the next has its turn.
-Open3D integrates the same frames with colour, one volume for all, in the same way, in a process of its own, its OpenMP threads sleeping while they wait or spinning; of all its runs the one with the least median.
+Each map takes ten frames in a row, then the next has its turn, Open3D's among them, so that what slows the machine for a while slows all.
+Open3D integrates the same frames with colour, one volume for all, in two processes of its own, one with OpenMP threads that sleep while they wait and one with threads that spin, both stopped while it is not their turn; the one with the lesser median counts.
 x faster: the median of the faster of Open3D's two over the row's; first over the one of all, then over that of fusion. MB: occupied blocks, with our lists and tables.
 )";
-// Frames are made, then mapped in a row: a map that takes turns with others, or with the renderer,
-// at each frame pays for what they leave in the caches, which a mapper on a robot does not.
-constexpr int kFramesInARow = 10;
 constexpr int kBlockSide_voxels = 16;  // of VoxelBlockGrid: Open3D's own default
-
-struct Case {
-  std::string name;
-  std::string title;
-  double voxel_m = 0;
-  double truncation_voxels = 0;
-  bool one_object = false;  // the first object's pixels alone
-};
-
-const std::vector<Case>& AllCases() {
-  static const std::vector<Case> cases{
-      {"1cm", "1 cm, truncation 10 voxels", 0.01, 10, false},
-      {"5mm", "5 mm, truncation 6 voxels", 0.005, 6, false},
-      {"2mm", "2 mm, truncation 6 voxels, one object alone", 0.002, 6, true}};
-  return cases;
-}
-
-Expected<std::vector<Case>> CasesOf(const SideBySideOptions& options) {
-  std::vector<Case> cases;
-  for (const std::string& name : options.cases) {
-    const auto found = std::find_if(AllCases().begin(), AllCases().end(),
-                                    [&](const Case& c) { return c.name == name; });
-    if (found == AllCases().end()) {
-      return UsageError("case '{}' is unknown, expected one of {}", name,
-                        fmt::join(CaseNames(), ", "));
-    }
-    cases.push_back(*found);
-  }
-  return cases;
-}
-
-Expected<Frame> ReadFrame(FrameSource& source, const Case& of, int i) {
-  TSDFPP_ASSIGN(Frame frame, source.Read(source.info().first_index + i));
-  if (of.one_object) {
-    const InstanceId object = source.info().objects.at(1).id;
-    frame.depth.setTo(0, frame.mask != object);
-  }
-  return frame;
-}
-
-// From frame `first` on, as many as are mapped in a row, before `last`.
-Expected<std::vector<Frame>> ReadFrames(FrameSource& source, const Case& of, int first, int last) {
-  std::vector<Frame> frames;
-  for (int i = first; i < std::min(first + kFramesInARow, last); ++i) {
-    TSDFPP_ASSIGN(Frame frame, ReadFrame(source, of, i));
-    frames.push_back(std::move(frame));
-  }
-  return frames;
-}
 
 // Milliseconds of frames.
 struct Times {
@@ -111,7 +59,7 @@ double Milliseconds(Clock::time_point from) {
   return std::chrono::duration<double, std::milli>(Clock::now() - from).count();
 }
 
-MapConfig ConfigOf(const Case& of) {
+MapConfig ConfigOf(const SideBySideCase& of) {
   MapConfig config;
   config.voxel_m = of.voxel_m;
   config.trunc_front_voxels = of.truncation_voxels;
@@ -119,71 +67,75 @@ MapConfig ConfigOf(const Case& of) {
   return config;
 }
 
-// Every method in turn.
-Expected<void> MeasureMethods(FrameSource& source, const Case& of, const SideBySideOptions& options,
-                              const std::vector<Method>& methods, int threads, Table& measured) {
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                  static_cast<std::size_t>(threads));
-  const int last = std::min(source.info().frame_count, options.frames);
-  for (int run = 0; run < options.runs; ++run) {
-    std::vector<std::unique_ptr<Pipeline>> pipelines;
-    std::vector<Times> times(methods.size());
-    for (const Method method : methods) {
-      pipelines.push_back(std::make_unique<Pipeline>(
-          PipelineConfig{method, ConfigOf(of), PoseSource::kGiven, {}}, source.info().objects));
-    }
-    for (int first = 0; first < last; first += kFramesInARow) {
-      TSDFPP_ASSIGN(const auto frames, ReadFrames(source, of, first, last));
-      for (std::size_t m = 0; m < pipelines.size(); ++m) {
-        for (int k = 0; k < static_cast<int>(frames.size()); ++k) {
-          const auto start = Clock::now();
-          const StepTimes steps = pipelines[m]->Process(frames[static_cast<std::size_t>(k)]);
-          if (first + k < options.warm_up) continue;
-          times[m].ms.push_back(Milliseconds(start));
-          times[m].fusion_ms.push_back(1e3 * steps.fuse_s);
-        }
-      }
-    }
-    for (std::size_t m = 0; m < pipelines.size(); ++m) {
-      const std::string name(MethodName(methods[m]));
-      times[m].bytes = pipelines[m]->map().Memory().bytes;
-      Times& best = measured[name][threads];
-      if (best.ms.empty() || times[m].Worst() < best.Worst()) best = times[m];
+// Open3D's process, and what it took so far.
+struct Peer {
+  std::unique_ptr<PeerProcess> process;
+  std::map<std::string, Times> times;
+};
+
+Expected<std::vector<Peer>> StartPeers(const SideBySideCase& of, const SideBySideOptions& options,
+                                       int threads) {
+  std::vector<Peer> peers;
+  for (const OpenMpWait wait : {OpenMpWait::kPassive, OpenMpWait::kActive}) {
+    TSDFPP_ASSIGN(auto process, PeerProcess::Start({"--scene", options.scene, "--cases", of.name,
+                                                    "--frames", fmt::format("{}", options.frames),
+                                                    "--threads", fmt::format("{}", threads)},
+                                                   wait, threads));
+    peers.push_back({std::move(process), {}});
+  }
+  return peers;
+}
+
+Expected<void> IntegrateNext(std::vector<Peer>& peers) {
+  for (Peer& peer : peers) {
+    TSDFPP_ASSIGN(const auto all, peer.process->IntegrateNext());
+    for (const PeerTimes& said : all) {
+      Times& times = peer.times[said.name];
+      times.ms.insert(times.ms.end(), said.ms.begin(), said.ms.end());
+      times.fusion_ms = times.ms;
+      times.bytes = said.bytes;
     }
   }
   return {};
 }
 
-// Open3D's times, from a process whose threads wait by `policy`.
-Expected<void> MeasurePeers(const Case& of, const SideBySideOptions& options, const char* policy,
-                            Table& table) {
-  const std::string command = fmt::format(
-      "OMP_WAIT_POLICY={} OMP_NUM_THREADS={} /proc/{}/exe peers --scene '{}' --cases {} --frames "
-      "{} "
-      "--threads {}",
-      policy, *std::max_element(options.threads.begin(), options.threads.end()), getpid(),
-      options.scene, of.name, options.frames, fmt::join(options.threads, ","));
-  std::FILE* pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return EnvironmentError("cannot start Open3D's process");
-  std::string output;
-  std::array<char, 4096> buffer;
-  while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe)) {
-    output.append(buffer.data(), got);
+// The same frames through Open3D's processes and every method, in turn.
+Expected<void> Measure(FrameSource& source, const SideBySideCase& of,
+                       const SideBySideOptions& options, const std::vector<Method>& methods,
+                       int threads, Table& of_peers, Table& of_methods) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads));
+  const int last = std::min(source.info().frame_count, options.frames);
+  TSDFPP_ASSIGN(std::vector<Peer> peers, StartPeers(of, options, threads));
+  std::vector<std::unique_ptr<Pipeline>> pipelines;
+  std::vector<Times> times(methods.size());
+  for (const Method method : methods) {
+    pipelines.push_back(std::make_unique<Pipeline>(
+        PipelineConfig{method, ConfigOf(of), PoseSource::kGiven, {}}, source.info().objects));
   }
-  if (pclose(pipe) != 0) return EnvironmentError("Open3D's process failed: {}", command);
-  std::istringstream lines(output);
-  for (std::string line; std::getline(lines, line);) {
-    const std::size_t tab = line.find('\t');
-    if (tab == std::string::npos) continue;  // Open3D's own messages
-    std::istringstream numbers(line.substr(tab));
-    int threads = 0;
-    Times times;
-    numbers >> threads >> times.bytes;
-    for (double ms = 0; numbers >> ms;) times.ms.push_back(ms);
-    times.fusion_ms = times.ms;
-    if (times.ms.empty()) return EnvironmentError("Open3D's process printed: {}", line);
-    Times& best = table[line.substr(0, tab)][threads];
-    if (best.ms.empty() || times.Median() < best.Median()) best = times;
+  for (int first = 0; first < last; first += kFramesInARow) {
+    TSDFPP_RETURN_IF_ERROR(IntegrateNext(peers));
+    TSDFPP_ASSIGN(const auto frames, ReadFramesInARow(source, of, first, last));
+    for (std::size_t m = 0; m < pipelines.size(); ++m) {
+      for (int k = 0; k < static_cast<int>(frames.size()); ++k) {
+        const auto start = Clock::now();
+        const StepTimes steps = pipelines[m]->Process(frames[static_cast<std::size_t>(k)]);
+        if (first + k < options.warm_up) continue;
+        times[m].ms.push_back(Milliseconds(start));
+        times[m].fusion_ms.push_back(1e3 * steps.fuse_s);
+      }
+    }
+  }
+  for (std::size_t m = 0; m < pipelines.size(); ++m) {
+    times[m].bytes = pipelines[m]->map().Memory().bytes;
+    Times& best = of_methods[std::string(MethodName(methods[m]))][threads];
+    if (best.ms.empty() || times[m].Worst() < best.Worst()) best = times[m];
+  }
+  for (const Peer& peer : peers) {
+    for (const auto& [name, took] : peer.times) {
+      Times& best = of_peers[name][threads];
+      if (best.ms.empty() || took.Median() < best.Median()) best = took;
+    }
   }
   return {};
 }
@@ -221,7 +173,7 @@ std::string RowsOf(const Table& table, const std::vector<int>& threads,
   return rows;
 }
 
-std::string TablesOf(const Case& of, const SideBySideOptions& options, const Table& peers,
+std::string TablesOf(const SideBySideCase& of, const SideBySideOptions& options, const Table& peers,
                      const Table& measured) {
   std::map<int, double> faster_peer;
   for (const int count : options.threads) {
@@ -249,48 +201,38 @@ std::string TablesOf(const Case& of, const SideBySideOptions& options, const Tab
 
 }  // namespace
 
-std::vector<std::string> CaseNames() {
-  std::vector<std::string> names;
-  for (const Case& of : AllCases()) names.push_back(of.name);
-  return names;
-}
-
 Expected<void> RunPeers(const SideBySideOptions& options) {
-  TSDFPP_ASSIGN(const std::vector<Case> cases, CasesOf(options));
+  TSDFPP_ASSIGN(const std::vector<SideBySideCase> cases, CasesNamed(options.cases));
   TSDFPP_ASSIGN(auto source, OpenSource(options.scene));
   const int last = std::min(source->info().frame_count, options.frames);
-  for (const Case& of : cases) {
+  for (const SideBySideCase& of : cases) {
     const double truncation_m = of.truncation_voxels * of.voxel_m;
     for (const int threads : options.threads) {
       SetOpen3dThreads(threads);
       Open3dVolume scalable(of.voxel_m, truncation_m);
       VoxelBlockGridPeer grid(of.voxel_m, truncation_m, kBlockSide_voxels);
-      Times scalable_times;
-      Times grid_times;
-      for (int first = 0; first < last; first += kFramesInARow) {
-        TSDFPP_ASSIGN(const auto frames, ReadFrames(*source, of, first, last));
-        const auto integrate = [&](auto& volume, Times& times) {
-          int i = first;
-          for (const Frame& frame : frames) {
-            const double seconds = volume.Integrate(frame);
-            if (i++ >= options.warm_up) times.ms.push_back(1e3 * seconds);
+      for (int first = 0; first < last && AwaitPeerTurn(); first += kFramesInARow) {
+        TSDFPP_ASSIGN(const auto frames, ReadFramesInARow(*source, of, first, last));
+        const auto integrate = [&](const char* name, auto& volume) {
+          PeerTimes times{name, 0, {}};
+          for (int k = 0; k < static_cast<int>(frames.size()); ++k) {
+            const double seconds = volume.Integrate(frames[static_cast<std::size_t>(k)]);
+            if (first + k >= options.warm_up) times.ms.push_back(1e3 * seconds);
           }
+          times.bytes = volume.OccupiedBytes();
+          SayPeerTimes(times);
         };
-        integrate(scalable, scalable_times);
-        integrate(grid, grid_times);
+        integrate("Open3D ScalableTSDFVolume", scalable);
+        integrate("Open3D VoxelBlockGrid", grid);
+        EndPeerTurn();
       }
-      const auto print = [&](const char* name, std::size_t bytes, const Times& times) {
-        fmt::print("{}\t{} {} {}\n", name, threads, bytes, fmt::join(times.ms, " "));
-      };
-      print("Open3D ScalableTSDFVolume", scalable.OccupiedBytes(), scalable_times);
-      print("Open3D VoxelBlockGrid", grid.OccupiedBytes(), grid_times);
     }
   }
   return {};
 }
 
 Expected<void> RunSideBySide(const SideBySideOptions& options) {
-  TSDFPP_ASSIGN(const std::vector<Case> cases, CasesOf(options));
+  TSDFPP_ASSIGN(const std::vector<SideBySideCase> cases, CasesNamed(options.cases));
   std::vector<Method> methods;
   for (const std::string& name : options.methods) {
     TSDFPP_ASSIGN(const Method method, MethodFromName(name));
@@ -314,15 +256,13 @@ Expected<void> RunSideBySide(const SideBySideOptions& options) {
       fmt::join(options.methods, ","), options.runs, Machine(), k.width, k.height,
       first + options.warm_up, first + last - 1);
   page += kHowToRead;
-  for (const Case& of : cases) {
+  for (const SideBySideCase& of : cases) {
     Table peers;
-    for (int run = 0; run < options.runs; ++run) {
-      TSDFPP_RETURN_IF_ERROR(MeasurePeers(of, options, "passive", peers));
-      TSDFPP_RETURN_IF_ERROR(MeasurePeers(of, options, "active", peers));
-    }
     Table measured;
     for (const int threads : options.threads) {
-      TSDFPP_RETURN_IF_ERROR(MeasureMethods(*source, of, options, methods, threads, measured));
+      for (int run = 0; run < options.runs; ++run) {
+        TSDFPP_RETURN_IF_ERROR(Measure(*source, of, options, methods, threads, peers, measured));
+      }
     }
     const std::string tables = TablesOf(of, options, peers, measured);
     fmt::print("{}\n", tables);

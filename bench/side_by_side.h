@@ -11,7 +11,7 @@ namespace tsdfpp {
 
 struct SideBySideOptions {
   std::string scene = "scenes/toycar3.toml";
-  std::vector<std::string> cases{"1cm", "5mm", "2mm"};  // of CaseNames()
+  std::vector<std::string> cases{"1cm", "5mm", "2mm"};  // of SideBySideCases()
   int frames = 120;                                     // from the first on
   int warm_up = 10;                                     // frames mapped but not counted
   int runs = 1;  // of everything; the one with the least worst frame counts
@@ -21,19 +21,17 @@ struct SideBySideOptions {
   std::filesystem::path page;  // where given, the tables are written there as well
 };
 
-// "1cm" (truncation 10 voxels), "5mm" (6 voxels), "2mm" (6 voxels, the first object alone).
-std::vector<std::string> CaseNames();
-
 // For each case: milliseconds a frame (median, 99th percentile, worst) of pose update and fusion of
 // each method, with given poses, the median of fusion alone, and those of integration with colour
 // of Open3D's two volumes, each for the numbers of threads; their ratio to the faster of Open3D's;
-// and memory. Open3D runs in a process of its own, once with OpenMP threads that sleep while they
-// wait and once with threads that spin; the faster counts. Errors: those of the source; kUsage for
-// names that there are not; kEnvironment where that process fails.
+// and memory. Open3D runs in processes of its own (bench/peer_process.h), one with OpenMP threads
+// that sleep while they wait and one with threads that spin; the faster counts. All take turns
+// every kFramesInARow frames. Errors: those of the source; kUsage for names that there are not;
+// kEnvironment where such a process fails.
 Expected<void> RunSideBySide(const SideBySideOptions& options);
 
-// What that process does: for each number of threads, a line with a volume's name, its bytes and
-// its milliseconds frame by frame.
+// What such a process does: at each turn of each case and number of threads, the times of the next
+// frames.
 Expected<void> RunPeers(const SideBySideOptions& options);
 
 }  // namespace tsdfpp
