@@ -56,8 +56,7 @@ void AddSideBySide(CLI::App& app, Chosen& chosen) {
   run->add_option("--methods", options->methods, "Some of the methods")
       ->delimiter(',')
       ->capture_default_str();
-  AddCount(run, "--runs", options->runs, "Of all; the one with the least worst frame counts", 1,
-           100);
+  AddCount(run, "--runs", options->runs, "Of all; medians are over their frames", 1, 100);
   run->add_option("--page", options->page, "Write the tables to this file as well");
   run->callback([=, &chosen] { chosen = [=] { return RunSideBySide(*options); }; });
   peers->callback([=, &chosen] { chosen = [=] { return RunPeers(*options); }; });

@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
@@ -24,7 +25,7 @@ namespace tsdfpp {
 namespace {
 
 constexpr const char* kHowToRead =
-    R"(Milliseconds a frame by numbers of threads (T), with all objects, colour and allocation of blocks; of the runs the one with the least worst frame.
+    R"(Milliseconds a frame by numbers of threads (T), with all objects, colour and allocation of blocks: medians over the frames of all runs; p99 and worst of the run with the least worst frame.
 The first four columns are of pose updates and fusion together; *fusion* is the median of fusion alone, as the volumes of Open3D, which move nothing, are timed. `tsdf++/anchored` and `volumes` move nothing either when a pose changes: what the move does to the index is part of the fusion that follows.
 Each map takes ten frames in a row, then the next has its turn, Open3D's among them, so that what slows the machine for a while slows all.
 Open3D integrates the same frames with colour, one volume for all, in two processes of its own, one with OpenMP threads that sleep while they wait and one with threads that spin, both stopped while it is not their turn; the one with the lesser median counts.
@@ -32,27 +33,45 @@ x faster: the median of the faster of Open3D's two over the row's; first over th
 )";
 constexpr int kBlockSide_voxels = 16;  // of VoxelBlockGrid: Open3D's own default
 
+double QuantileOf(std::vector<double> values, double quantile) {
+  std::sort(values.begin(), values.end());
+  const auto last = static_cast<double>(values.size() - 1);
+  return values[static_cast<std::size_t>(quantile * last + 0.5)];
+}
+
 // Milliseconds of frames.
-struct Times {
+struct Run {
   std::vector<double> ms;
   std::vector<double> fusion_ms;  // poses left out
   std::size_t bytes = 0;
 
-  double At(double quantile) const { return QuantileOf(ms, quantile); }
-  double Median() const { return At(0.5); }
-  double Worst() const { return At(1); }
-  double MedianOfFusion() const { return QuantileOf(fusion_ms, 0.5); }
+  double Worst() const { return QuantileOf(ms, 1); }
+};
+class Times {
+ public:
+  void Add(Run run) {
+    all_.ms.insert(all_.ms.end(), run.ms.begin(), run.ms.end());
+    all_.fusion_ms.insert(all_.fusion_ms.end(), run.fusion_ms.begin(), run.fusion_ms.end());
+    if (steadiest_.ms.empty() || run.Worst() < steadiest_.Worst()) steadiest_ = std::move(run);
+  }
+  double Median() const { return QuantileOf(all_.ms, 0.5); }
+  double MedianOfFusion() const { return QuantileOf(all_.fusion_ms, 0.5); }
+  // Of the run with the least worst frame.
+  double P99() const { return QuantileOf(steadiest_.ms, 0.99); }
+  double Worst() const { return steadiest_.Worst(); }
+  std::size_t Bytes() const { return steadiest_.bytes; }
 
  private:
-  static double QuantileOf(std::vector<double> values, double quantile) {
-    std::sort(values.begin(), values.end());
-    const auto last = static_cast<double>(values.size() - 1);
-    return values[static_cast<std::size_t>(quantile * last + 0.5)];
-  }
+  Run all_;
+  Run steadiest_;
 };
 
 // By name and number of threads.
 using Table = std::map<std::string, std::map<int, Times>>;
+// Open3D's, by how its threads wait.
+using PeerTables = std::map<OpenMpWait, Table>;
+
+constexpr std::array<OpenMpWait, 2> kWaits{OpenMpWait::kPassive, OpenMpWait::kActive};
 
 using Clock = std::chrono::steady_clock;
 double Milliseconds(Clock::time_point from) {
@@ -69,19 +88,20 @@ MapConfig ConfigOf(const SideBySideCase& of) {
 
 // Open3D's process, and what it took so far.
 struct Peer {
+  OpenMpWait wait;
   std::unique_ptr<PeerProcess> process;
-  std::map<std::string, Times> times;
+  std::map<std::string, Run> runs;
 };
 
 Expected<std::vector<Peer>> StartPeers(const SideBySideCase& of, const SideBySideOptions& options,
                                        int threads) {
   std::vector<Peer> peers;
-  for (const OpenMpWait wait : {OpenMpWait::kPassive, OpenMpWait::kActive}) {
+  for (const OpenMpWait wait : kWaits) {
     TSDFPP_ASSIGN(auto process, PeerProcess::Start({"--scene", options.scene, "--cases", of.name,
                                                     "--frames", fmt::format("{}", options.frames),
                                                     "--threads", fmt::format("{}", threads)},
                                                    wait, threads));
-    peers.push_back({std::move(process), {}});
+    peers.push_back({wait, std::move(process), {}});
   }
   return peers;
 }
@@ -90,10 +110,10 @@ Expected<void> IntegrateNext(std::vector<Peer>& peers) {
   for (Peer& peer : peers) {
     TSDFPP_ASSIGN(const auto all, peer.process->IntegrateNext());
     for (const PeerTimes& said : all) {
-      Times& times = peer.times[said.name];
-      times.ms.insert(times.ms.end(), said.ms.begin(), said.ms.end());
-      times.fusion_ms = times.ms;
-      times.bytes = said.bytes;
+      Run& run = peer.runs[said.name];
+      run.ms.insert(run.ms.end(), said.ms.begin(), said.ms.end());
+      run.fusion_ms = run.ms;
+      run.bytes = said.bytes;
     }
   }
   return {};
@@ -102,13 +122,13 @@ Expected<void> IntegrateNext(std::vector<Peer>& peers) {
 // The same frames through Open3D's processes and every method, in turn.
 Expected<void> Measure(FrameSource& source, const SideBySideCase& of,
                        const SideBySideOptions& options, const std::vector<Method>& methods,
-                       int threads, Table& of_peers, Table& of_methods) {
+                       int threads, PeerTables& of_peers, Table& of_methods) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads));
   const int last = std::min(source.info().frame_count, options.frames);
   TSDFPP_ASSIGN(std::vector<Peer> peers, StartPeers(of, options, threads));
   std::vector<std::unique_ptr<Pipeline>> pipelines;
-  std::vector<Times> times(methods.size());
+  std::vector<Run> runs(methods.size());
   for (const Method method : methods) {
     pipelines.push_back(std::make_unique<Pipeline>(
         PipelineConfig{method, ConfigOf(of), PoseSource::kGiven, {}}, source.info().objects));
@@ -121,23 +141,33 @@ Expected<void> Measure(FrameSource& source, const SideBySideCase& of,
         const auto start = Clock::now();
         const StepTimes steps = pipelines[m]->Process(frames[static_cast<std::size_t>(k)]);
         if (first + k < options.warm_up) continue;
-        times[m].ms.push_back(Milliseconds(start));
-        times[m].fusion_ms.push_back(1e3 * steps.fuse_s);
+        runs[m].ms.push_back(Milliseconds(start));
+        runs[m].fusion_ms.push_back(1e3 * steps.fuse_s);
       }
     }
   }
   for (std::size_t m = 0; m < pipelines.size(); ++m) {
-    times[m].bytes = pipelines[m]->map().Memory().bytes;
-    Times& best = of_methods[std::string(MethodName(methods[m]))][threads];
-    if (best.ms.empty() || times[m].Worst() < best.Worst()) best = times[m];
+    runs[m].bytes = pipelines[m]->map().Memory().bytes;
+    of_methods[std::string(MethodName(methods[m]))][threads].Add(std::move(runs[m]));
   }
   for (const Peer& peer : peers) {
-    for (const auto& [name, took] : peer.times) {
-      Times& best = of_peers[name][threads];
-      if (best.ms.empty() || took.Median() < best.Median()) best = took;
-    }
+    for (const auto& [name, run] : peer.runs) of_peers[peer.wait][name][threads].Add(run);
   }
   return {};
+}
+
+// Of each number of threads those with the lesser median.
+Table FasterOf(const PeerTables& tables) {
+  Table faster;
+  for (const auto& [wait, table] : tables) {
+    for (const auto& [name, by_threads] : table) {
+      for (const auto& [threads, times] : by_threads) {
+        const auto [at, is_first] = faster[name].try_emplace(threads, times);
+        if (!is_first && times.Median() < at->second.Median()) at->second = times;
+      }
+    }
+  }
+  return faster;
 }
 
 std::string Machine() {
@@ -160,15 +190,15 @@ std::string RowsOf(const Table& table, const std::vector<int>& threads,
     for (const int count : threads) {
       const Times& times = by_threads.at(count);
       rows += fmt::format(" {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |", times.Median(),
-                          times.At(0.99), times.Worst(), faster_peer.at(count) / times.Median(),
+                          times.P99(), times.Worst(), faster_peer.at(count) / times.Median(),
                           times.MedianOfFusion(), faster_peer.at(count) / times.MedianOfFusion());
     }
     if (threads.size() > 1) {
       rows += fmt::format(" {:.2f} |", by_threads.at(threads.front()).Median() /
                                            by_threads.at(threads.back()).Median());
     }
-    rows +=
-        fmt::format(" {:.0f} |\n", 1e-6 * static_cast<double>(by_threads.at(threads.back()).bytes));
+    rows += fmt::format(" {:.0f} |\n",
+                        1e-6 * static_cast<double>(by_threads.at(threads.back()).Bytes()));
   }
   return rows;
 }
@@ -257,14 +287,14 @@ Expected<void> RunSideBySide(const SideBySideOptions& options) {
       first + options.warm_up, first + last - 1);
   page += kHowToRead;
   for (const SideBySideCase& of : cases) {
-    Table peers;
+    PeerTables peers;
     Table measured;
     for (const int threads : options.threads) {
       for (int run = 0; run < options.runs; ++run) {
         TSDFPP_RETURN_IF_ERROR(Measure(*source, of, options, methods, threads, peers, measured));
       }
     }
-    const std::string tables = TablesOf(of, options, peers, measured);
+    const std::string tables = TablesOf(of, options, FasterOf(peers), measured);
     fmt::print("{}\n", tables);
     std::fflush(stdout);
     page += '\n';

@@ -71,7 +71,11 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   std::set<InstanceId> changed_ids;
-  for (const FusedBlock& block : fused) changed_ids.insert(block.id);
+  InstanceId last = kNoInstance;
+  for (const FusedBlock& block : fused) {
+    if (block.id != last) changed_ids.insert(block.id);
+    last = block.id;
+  }
   for (const InstanceId id : changed_ids) {
     if (volumes_.at(id).lattice_is_world) continue;
     AddReach(id);
@@ -103,9 +107,7 @@ void AnchoredMap::RefreshIndex() const {
     const ObjectVolume& volume = volumes_.at(id);
     if (volume.lattice_is_world) {
       // Back at its birth: its cover masks have not been kept.
-      for (const auto& entry : volume.grid.entries()) {
-        entry.block->cover = FindCover(volume.grid, entry.index);
-      }
+      RenewCovers(volume.grid);
     } else {
       reach_[id] = BlocksTouchedBy(VoxelReader(volume.grid), volume.T_WL, config_.voxel_m, true);
     }

@@ -70,35 +70,6 @@ class BlockDirectory {
     return numbers;
   }
 
-  // The numbers of a block (13) and of the 26 around it, x fastest, then y, then z.
-  std::array<std::int32_t, 27> FindAround(const Index3& block) const {
-    // Along each axis the three lie in one cell or in two.
-    const Index3 low = block + Index3{-1, -1, -1};
-    const auto has_two = [](int first) { return (first & 3) > 1; };
-    std::array<const Cell*, 8> cells{};
-    for (int i = 0; i < 8; ++i) {
-      if (((i & 1) != 0 && !has_two(low.x)) || ((i & 2) != 0 && !has_two(low.y)) ||
-          ((i & 4) != 0 && !has_two(low.z))) {
-        continue;
-      }
-      cells[static_cast<std::size_t>(i)] =
-          CellOf(low + Index3{4 * (i & 1), 4 * ((i >> 1) & 1), 4 * (i >> 2)});
-    }
-    std::array<std::int32_t, 27> numbers;
-    std::size_t i = 0;
-    for (int z = low.z; z <= low.z + 2; ++z) {
-      for (int y = low.y; y <= low.y + 2; ++y) {
-        for (int x = low.x; x <= low.x + 2; ++x, ++i) {
-          const int cell = ((x >> 2) - (low.x >> 2)) + 2 * ((y >> 2) - (low.y >> 2)) +
-                           4 * ((z >> 2) - (low.z >> 2));
-          const Cell* of = cells[static_cast<std::size_t>(cell)];
-          numbers[i] = of == nullptr ? kNone : of->number[PlaceOf({x, y, z})];
-        }
-      }
-    }
-    return numbers;
-  }
-
   // Enters a block, or changes its number.
   void Set(const Index3& block, std::int32_t number) {
     Cell& cell = CellToWrite(block);

@@ -7,168 +7,242 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <map>
-#include <optional>
+#include <cstring>
 
-#include "mapper/cover_kernels.h"
+#include "mapper/cube_masks.h"
 
 namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 64;
-constexpr std::size_t kCoversPerTask = 64;
-constexpr std::size_t kCoversAhead = 3;  // more than a few do not stay in the cache
+constexpr std::size_t kAhead = 4;  // more than a few do not stay in the cache
 
-constexpr BlockMask kNoVoxels{};
+// What is to be found anew of a block, a bit each.
+constexpr std::uint8_t kCubes = 1;
+constexpr std::uint8_t kCover = 2;
 
-// What the cover of these slices of a block depends on. To find it is to wait for memory: find
-// several, then compute their covers.
-struct Surroundings {
-  MasksAround observed{};
-  MasksAround negative{};
-  const BlockMask* band = nullptr;
-  SliceRange slices;
+// The blocks of one volume, by their numbers.
+struct Stale {
+  InstanceId id = kNoInstance;
+  const TsdfGrid* grid = nullptr;
+  std::vector<std::uint8_t> what;
+
+  // From any thread.
+  void Mark(std::size_t number, std::uint8_t bit) {
+    const std::atomic_ref<std::uint8_t> at(what[number]);
+    if ((at.load(std::memory_order_relaxed) & bit) == 0) {
+      at.fetch_or(bit, std::memory_order_relaxed);
+    }
+  }
 };
 
-Surroundings FindSurroundings(const TsdfGrid& grid, const Index3& block, const SliceRange& slices) {
-  Surroundings around;
-  around.observed.fill(&kNoVoxels);
-  around.negative.fill(&kNoVoxels);
-  around.band = &kNoVoxels;
-  around.slices = slices;
-  const std::array<std::int32_t, 27> numbers = grid.directory().FindAround(block);
-  const std::size_t first = slices.first == 0 ? 0 : 9;
-  const std::size_t last = slices.last + 1 == kBlockSide ? 26 : 17;
-  for (std::size_t i = first; i <= last; ++i) {
-    if (numbers[i] == BlockDirectory::kNone) continue;
-    const TsdfBlock& at = *grid.entries()[static_cast<std::size_t>(numbers[i])].block;
-    around.observed[i] = &at.observed;
-    around.negative[i] = &at.negative;
-    hwy::Prefetch(&at.observed);
-    hwy::Prefetch(&at.negative);
-    if (i == 13) around.band = &at.band;
+struct Place {
+  Stale* volume = nullptr;
+  std::size_t number = 0;
+
+  const TsdfGrid& grid() const { return *volume->grid; }
+  const Index3& index() const { return grid().entries()[number].index; }
+  TsdfBlock& block() const { return *grid().entries()[number].block; }
+};
+
+// By volume and number.
+std::vector<Place> PlacesOf(std::vector<Stale>& volumes, std::uint8_t bit) {
+  std::vector<Place> places;
+  for (Stale& volume : volumes) {
+    const std::vector<std::uint8_t>& what = volume.what;
+    constexpr std::size_t kStep = sizeof(std::uint64_t);  // most are not stale
+    for (std::size_t first = 0; first < what.size(); first += kStep) {
+      const std::size_t end = std::min(first + kStep, what.size());
+      std::uint64_t any = 0;
+      std::memcpy(&any, &what[first], end - first);
+      if (any == 0) continue;
+      for (std::size_t i = first; i < end; ++i) {
+        if ((what[i] & bit) != 0) places.push_back({&volume, i});
+      }
+    }
   }
-  return around;
+  return places;
 }
 
-// The cover in these slices; nothing in the others.
-BlockMask CoverOf(const Surroundings& around) {
-  BlockMask cover = CornersOfCrossedCubes(around.observed, around.negative, around.slices);
-  for (std::size_t z = around.slices.first; z <= around.slices.last; ++z) {
-    cover[z] |= (*around.band)[z];
+using Numbers = std::array<std::int32_t, 8>;
+
+// Of a block and of the seven lower ones: bits 0, 1, 2 of the place are steps back along x, y, z.
+Numbers FindLower(const TsdfGrid& grid, const Index3& block) {
+  Numbers numbers = grid.directory().FindUpper(block + Index3{-1, -1, -1});
+  std::reverse(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+// One mask of these blocks, fetched; none of its voxels where there is no block.
+std::array<const BlockMask*, 8> MasksOf(const TsdfGrid& grid, const Numbers& numbers,
+                                        BlockMask TsdfBlock::*mask) {
+  std::array<const BlockMask*, 8> masks;
+  for (std::size_t i = 0; i < masks.size(); ++i) {
+    masks[i] = &kNoVoxels;
+    if (numbers[i] == BlockDirectory::kNone) continue;
+    masks[i] = &(grid.entries()[static_cast<std::size_t>(numbers[i])].block.get()->*mask);
+    hwy::Prefetch(masks[i]);
   }
+  return masks;
+}
+
+struct UpperBlocks {
+  Numbers numbers{};
+  UpperMasks observed{};
+  UpperMasks negative{};
+};
+UpperBlocks FindUpper(const TsdfGrid& grid, const Index3& block) {
+  const Numbers numbers = grid.directory().FindUpper(block);
+  return {numbers, MasksOf(grid, numbers, &TsdfBlock::observed),
+          MasksOf(grid, numbers, &TsdfBlock::negative)};
+}
+
+// Work on each of the places, in parallel, with what is found of it: to find that is to wait for
+// memory, and so it is done some places ahead.
+template <typename Find, typename Work>
+void ForEachFound(const std::vector<Place>& places, const Find& find, const Work& work) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, places.size(), kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        std::array<decltype(find(places.front())), kAhead> found;
+        const auto find_at = [&](std::size_t i) {
+          if (i < range.end()) found[i % kAhead] = find(places[i]);
+        };
+        for (std::size_t i = range.begin(); i < range.begin() + kAhead; ++i) find_at(i);
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          work(i, found[i % kAhead]);
+          find_at(i + kAhead);
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+// Marks the blocks with a corner of one of these cubes; `upper` are the cubes' block and those
+// above.
+void MarkCovers(Stale& volume, const Numbers& upper, const BlockMask& cubes) {
+  std::uint64_t any = 0;
+  for (const std::uint64_t slice : cubes) any |= slice;
+  constexpr std::uint64_t kLastColumn = kFirstColumn << 7U;
+  const unsigned beyond = ((any & kLastColumn) != 0 ? 1U : 0U) | (any >> 56U != 0 ? 2U : 0U) |
+                          (cubes.back() != 0 ? 4U : 0U);
+  for (unsigned step = 0; step < upper.size(); ++step) {
+    const std::int32_t number = upper[step];
+    if ((step & ~beyond) != 0 || number == BlockDirectory::kNone) continue;
+    volume.Mark(static_cast<std::size_t>(number), kCover);
+  }
+}
+
+// Finds the marked blocks' crossed cubes, and marks the covers that change with them.
+void RenewCubes(std::vector<Stale>& volumes) {
+  const std::vector<Place> places = PlacesOf(volumes, kCubes);
+  ForEachFound(
+      places, [](const Place& place) { return FindUpper(place.grid(), place.index()); },
+      [&](std::size_t i, const UpperBlocks& upper) {
+        BlockMask& crossed = places[i].block().crossed;
+        const BlockMask now = FindCubeMasks(upper.observed, upper.negative).crossed;
+        if (crossed == now) return;
+        BlockMask changed;
+        for (std::size_t z = 0; z < changed.size(); ++z) changed[z] = crossed[z] ^ now[z];
+        crossed = now;
+        MarkCovers(*places[i].volume, upper.numbers, changed);
+      });
+}
+
+BlockMask CoverOf(const BlockMask& band, const LowerMasks& crossed) {
+  BlockMask cover = CornersOfCubes(crossed);
+  for (std::size_t z = 0; z < cover.size(); ++z) cover[z] |= band[z];
   return cover;
 }
 
-// A block whose cover may have changed, in these slices.
-struct StaleCover {
-  InstanceId id = kNoInstance;
-  Index3 index;
-  TsdfBlock* block = nullptr;
-  const TsdfGrid* grid = nullptr;
-  SliceRange slices;
-};
-
-// The slices of the block whose cover may have changed, for each of the 27 blocks around.
-std::uint8_t SlicesTouched(const FusedBlock& from, int around) {
-  const unsigned own = from.sign_slices;
-  if (around < 9) return 1U << (kBlockSide - 1);
-  if (around >= 18) return 1;
-  const unsigned band = around == kItselfAround ? from.band_slices : 0U;
-  return static_cast<std::uint8_t>(own | own << 1U | own >> 1U | band);
+LowerMasks FindLowerCubes(const Place& place) {
+  const TsdfGrid& grid = place.grid();
+  return MasksOf(grid, FindLower(grid, place.index()), &TsdfBlock::crossed);
 }
 
-std::vector<StaleCover> StaleCovers(const std::vector<FusedBlock>& fused,
-                                    const ObjectVolumes& volumes) {
-  using Slices = std::atomic<std::uint8_t>;
-  struct Marks {
-    const TsdfGrid* grid;
-    std::vector<Slices> of_entry;
-  };
-  std::map<InstanceId, Marks> marks;
+// Finds the marked blocks' covers.
+std::vector<CoverChange> RenewCovers(std::vector<Stale>& volumes) {
+  const std::vector<Place> places = PlacesOf(volumes, kCover);
+  std::vector<CoverChange> changes(places.size());
+  ForEachFound(places, FindLowerCubes, [&](std::size_t i, const LowerMasks& crossed) {
+    TsdfBlock& block = places[i].block();
+    const BlockMask now = CoverOf(block.band, crossed);
+    if (block.cover == now) return;
+    CoverChange& change = changes[i];
+    change.id = places[i].volume->id;
+    change.index = places[i].index();
+    for (std::size_t z = 0; z < now.size(); ++z) {
+      change.lost[z] = block.cover[z] & ~now[z];
+      change.gained[z] = now[z] & ~block.cover[z];
+    }
+    block.cover = now;
+  });
+  std::erase_if(changes, [](const CoverChange& change) { return change.id == kNoInstance; });
+  return changes;
+}
+
+Stale NothingStale(InstanceId id, const TsdfGrid& grid) {
+  return {id, &grid, std::vector<std::uint8_t>(grid.size())};
+}
+
+// Marks what a fused block may have changed.
+void MarkStale(const FusedBlock& from, Stale& volume) {
+  if (from.band_changed) volume.Mark(from.number, kCover);
+  if (from.stale_cubes == 0) return;
+  volume.Mark(from.number, kCubes);
+  if (from.stale_cubes == 1) return;  // its own
+  const Numbers lower = FindLower(*volume.grid, from.index);
+  for (unsigned bits = from.stale_cubes; bits != 0; bits &= bits - 1) {
+    const std::int32_t number = lower[static_cast<std::size_t>(std::countr_zero(bits))];
+    if (number != BlockDirectory::kNone) volume.Mark(static_cast<std::size_t>(number), kCubes);
+  }
+}
+
+}  // namespace
+
+BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
+  BlockMask band{};
+  if (const TsdfBlock* at = grid.Find(block)) band = at->band;
+  std::array<BlockMask, 8> crossed;
+  LowerMasks lower;
+  for (int step = 0; step < 8; ++step) {
+    const Index3 back{-(step & 1), -((step >> 1) & 1), -(step >> 2)};
+    const UpperBlocks upper = FindUpper(grid, block + back);
+    const auto i = static_cast<std::size_t>(step);
+    crossed[i] = FindCubeMasks(upper.observed, upper.negative).crossed;
+    lower[i] = &crossed[i];
+  }
+  return CoverOf(band, lower);
+}
+
+void RenewCovers(const TsdfGrid& grid) {
+  Stale stale = NothingStale(kNoInstance, grid);
+  std::fill(stale.what.begin(), stale.what.end(), kCubes | kCover);
+  std::vector<Stale> volumes{std::move(stale)};
+  RenewCubes(volumes);
+  RenewCovers(volumes);
+}
+
+std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused,
+                                      const ObjectVolumes& volumes) {
+  std::vector<Stale> stale;
   for (const auto& [id, volume] : volumes) {
-    if (!volume.lattice_is_world) continue;
-    marks.try_emplace(id, Marks{&volume.grid, std::vector<Slices>(volume.grid.size())});
+    if (volume.lattice_is_world) stale.push_back(NothingStale(id, volume.grid));
   }
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, fused.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const FusedBlock& from = fused[i];
-          const auto of = marks.find(from.id);
-          if (from.touched == 0 || of == marks.end()) continue;
-          const auto numbers = of->second.grid->directory().FindAround(from.index);
-          for (std::uint32_t bits = from.touched; bits != 0; bits &= bits - 1) {
-            const int around = std::countr_zero(bits);
-            const std::int32_t number = numbers[static_cast<std::size_t>(around)];
-            if (number == BlockDirectory::kNone) continue;
-            of->second.of_entry[static_cast<std::size_t>(number)].fetch_or(
-                SlicesTouched(from, around), std::memory_order_relaxed);
-          }
+          if (from.stale_cubes == 0 && !from.band_changed) continue;
+          const auto of =
+              std::lower_bound(stale.begin(), stale.end(), from.id,
+                               [](const Stale& a, InstanceId wanted) { return a.id < wanted; });
+          if (of != stale.end() && of->id == from.id) MarkStale(from, *of);
         }
       },
       tbb::simple_partitioner());
-  std::vector<StaleCover> stale;
-  for (const auto& [id, of] : marks) {
-    for (std::size_t i = 0; i < of.of_entry.size(); ++i) {
-      const std::uint8_t slices = of.of_entry[i].load(std::memory_order_relaxed);
-      if (slices == 0) continue;
-      const auto& entry = of.grid->entries()[i];
-      const auto first = static_cast<std::size_t>(std::countr_zero(slices));
-      const auto end = static_cast<std::size_t>(std::bit_width(slices));
-      stale.push_back({id, entry.index, entry.block.get(), of.grid, {first, end - 1}});
-    }
-  }
-  return stale;
-}
-
-// Nothing where the cover is what it was.
-std::optional<CoverChange> PutCover(const StaleCover& stale, const BlockMask& now) {
-  BlockMask& cover = stale.block->cover;
-  const auto first = static_cast<std::ptrdiff_t>(stale.slices.first);
-  const auto end = static_cast<std::ptrdiff_t>(stale.slices.last) + 1;
-  if (std::equal(cover.begin() + first, cover.begin() + end, now.begin() + first)) return {};
-  CoverChange change{stale.id, stale.index};
-  for (std::size_t z = stale.slices.first; z <= stale.slices.last; ++z) {
-    change.lost[z] = cover[z] & ~now[z];
-    change.gained[z] = now[z] & ~cover[z];
-    cover[z] = now[z];
-  }
-  return change;
-}
-
-}  // namespace
-
-BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
-  return CoverOf(FindSurroundings(grid, block, {}));
-}
-
-std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused,
-                                      const ObjectVolumes& volumes) {
-  const std::vector<StaleCover> stale = StaleCovers(fused, volumes);
-  const std::size_t tasks = (stale.size() + kCoversPerTask - 1) / kCoversPerTask;
-  std::vector<std::vector<CoverChange>> of_task(tasks);
-  // Covers read the neighbours' other masks, which no longer change.
-  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
-    const std::size_t begin = task * kCoversPerTask;
-    const std::size_t end = std::min(begin + kCoversPerTask, stale.size());
-    // What is found is fetched while the ones before are worked on.
-    std::array<Surroundings, kCoversAhead> around;
-    const auto find = [&](std::size_t i) {
-      if (i >= end) return;
-      hwy::Prefetch(&stale[i].block->cover);
-      around[i % kCoversAhead] = FindSurroundings(*stale[i].grid, stale[i].index, stale[i].slices);
-    };
-    for (std::size_t i = begin; i < begin + kCoversAhead; ++i) find(i);
-    for (std::size_t i = begin; i != end; ++i) {
-      const BlockMask now = CoverOf(around[i % kCoversAhead]);
-      if (const auto change = PutCover(stale[i], now)) of_task[task].push_back(*change);
-      find(i + kCoversAhead);
-    }
-  });
-  std::vector<CoverChange> changes;
-  for (const auto& more : of_task) changes.insert(changes.end(), more.begin(), more.end());
-  return changes;
+  RenewCubes(stale);
+  return RenewCovers(stale);
 }
 
 }  // namespace tsdfpp

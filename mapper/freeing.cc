@@ -11,7 +11,7 @@ FrameFreeing::FrameFreeing(const ObjectVolumes& volumes) {
 void FrameFreeing::FreeEmpty(const std::vector<FusedBlock>& fused, ObjectVolumes& volumes) const {
   std::map<InstanceId, std::vector<Index3>> empty;
   for (const FusedBlock& block : fused) {
-    if (!block.block->AnyObserved()) empty[block.id].push_back(block.index);
+    if (block.is_empty) empty[block.id].push_back(block.index);
   }
   for (auto& [id, volume] : volumes) {
     const auto before = blocks_before_.find(id);

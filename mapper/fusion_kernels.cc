@@ -6,7 +6,7 @@
 #include <bit>
 
 #include "core/types.h"
-#include "mapper/cover_kernels.h"
+#include "mapper/cube_masks.h"
 #include "mapper/frame_reads.h"
 
 // One pass of this file an instruction set; the machine's best is chosen at run time. On x86-64 all
@@ -180,7 +180,6 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     hwy::Prefetch(&next->observed);
     hwy::Prefetch(&next->negative);
     hwy::Prefetch(&next->band);
-    hwy::Prefetch(&next->cover);
     hwy::Prefetch(&next->full);
     hwy::Prefetch(&next->revision);
   }
@@ -299,18 +298,16 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   auto new_observed = block.observed;
   auto new_negative = std::bit_cast<BlockMask>(negative);
   auto new_band = std::bit_cast<BlockMask>(band);
-  unsigned changed_band = 0;
   for (std::size_t z = 0; z < kBlockSide; ++z) {
     new_observed[z] = (new_observed[z] | now_taken[z]) & ~now_lost[z];
     new_negative[z] &= new_observed[z];
     new_band[z] &= new_negative[z];
-    changed_band |= (block.band[z] != new_band[z] ? 1U : 0U) << z;
   }
   result.changed_signs = ChangedSigns(block.observed, block.negative, new_observed, new_negative);
+  result.band_changed = block.band != new_band;
   block.observed = new_observed;
   block.negative = new_negative;
   block.band = new_band;
-  result.changed_band = static_cast<std::uint8_t>(changed_band);
   return result;
 }
 

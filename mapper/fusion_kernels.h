@@ -62,7 +62,7 @@ struct FusionResult {
   // Voxels whose `observed` or `negative` changed, but for those that have neighbours of one sign
   // only: these are corners of no cube that is, or was, crossed.
   BlockMask changed_signs{};
-  std::uint8_t changed_band = 0;  // the slices in which a voxel's `band` changed, a bit each
+  bool band_changed = false;  // of a voxel
 };
 
 // Labels of the voxels of a block and the votes for them (docs/map.md, "`tsdf`: one field").
@@ -73,9 +73,9 @@ struct LabelVotes {
   bool any_label_changed = false;
 };
 
-// Observes the voxels of the block and fuses what it sees into it; its masks but for `cover` are
-// then up to date. `next`, or nullptr, is the block that will be fused after it, and fetched into
-// the cache meanwhile. `votes`, where given, lets the observations in band vote.
+// Observes the voxels of the block and fuses what it sees into it; its masks but for `crossed`
+// and `cover` are then up to date. `next`, or nullptr, is the block that will be fused after it,
+// and fetched into the cache meanwhile. `votes`, where given, lets the observations in band vote.
 FusionResult FuseVoxels(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                         TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes = nullptr);
 

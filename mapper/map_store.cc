@@ -100,11 +100,7 @@ void TsdfppMap::Save(Sections& sections) const {
 Expected<void> TsdfppMap::Load(const Sections& sections) {
   TSDFPP_RETURN_IF_ERROR(LayeredMap::Load(sections));
   TSDFPP_RETURN_IF_ERROR(CheckWorldLattices(volumes_));
-  for (auto& [id, volume] : volumes_) {
-    for (const auto& entry : volume.grid.entries()) {
-      entry.block->cover = FindCover(volume.grid, entry.index);
-    }
-  }
+  for (const auto& [id, volume] : volumes_) RenewCovers(volume.grid);
   TSDFPP_ASSIGN(const std::vector<ListsOfBlock> lists,
                 LoadAllLists(sections, kLists, layers_, config_));
   const auto covers = [this](InstanceId id, const Index3& index, int place) {

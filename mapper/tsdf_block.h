@@ -78,6 +78,7 @@ struct alignas(64) TsdfBlock {
   BlockMask observed{};  // weight > 0
   BlockMask negative{};  // observed and distance < 0
   BlockMask band{};      // observed and distance in [-back, 0)
+  BlockMask crossed{};   // the crossed cubes, named by their lowest corners, kept with `cover`
   BlockMask cover{};     // docs/map.md, "Cover", at the lattice points; see cover.h
   BlockMask full{};      // of these it is known that the weight is at its cap
 
@@ -96,9 +97,9 @@ struct alignas(64) TsdfBlock {
   static void* operator new(std::size_t);
   static void operator delete(void* block);
 
-  // Brings the masks but for `cover` in line with the values, and gives the block a new revision;
-  // true where one of observed, negative and band changed. `back` in metres. Frees the colours
-  // where none is left.
+  // Brings the masks but for `crossed` and `cover` in line with the values, and gives the block a
+  // new revision; true where one of observed, negative and band changed. `back` in metres. Frees
+  // the colours where none is left.
   bool UpdateMasks(float back);
   bool AnyNegative() const { return Any(negative); }
   bool AnyObserved() const { return Any(observed); }

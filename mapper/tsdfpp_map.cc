@@ -262,10 +262,7 @@ void TsdfppMap::Activate(InstanceId id) {
         },
         tbb::simple_partitioner());
   };
-  in_parallel([&](std::size_t i) {
-    const TsdfGrid::Entry& entry = grid.entries()[i];
-    entry.block->cover = FindCover(grid, entry.index);
-  });
+  RenewCovers(grid);
   std::vector<ListBlock*> lists(grid.size(), nullptr);
   for (std::size_t i = 0; i < grid.size(); ++i) {
     const TsdfGrid::Entry& entry = grid.entries()[i];

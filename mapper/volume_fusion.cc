@@ -4,7 +4,11 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "mapper/allocation.h"
+#include "mapper/cube_masks.h"
 
 namespace tsdfpp {
 namespace {
@@ -24,34 +28,64 @@ void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolum
   }
 }
 
-// Which of the 27 blocks around hold a neighbour of the voxels.
-std::uint32_t AroundVoxels(const BlockMask& voxels) {
+// See FusedBlock::stale_cubes: the blocks with a cube of which one of the voxels is a corner.
+std::uint8_t BlocksOfCubesAt(const BlockMask& voxels) {
   std::uint64_t any = 0;
   for (const std::uint64_t slice : voxels) any |= slice;
   if (any == 0) return 0;
-  constexpr std::uint64_t kFirstColumn = 0x0101010101010101ULL;
-  // Bit 0: the one below, 1: the same, 2: the one above.
-  const auto along = [](bool first, bool last) {
-    return (first ? 1U : 0U) | 2U | (last ? 4U : 0U);
-  };
-  const unsigned x = along((any & kFirstColumn) != 0, (any & (kFirstColumn << 7U)) != 0);
-  const unsigned y = along((any & 0xFFU) != 0, (any >> 56U) != 0);
-  const unsigned z = along(voxels.front() != 0, voxels.back() != 0);
-  const std::uint32_t row = x * ((y & 1U) | (y & 2U) << 2U | (y & 4U) << 4U);
-  return row * ((z & 1U) | (z & 2U) << 8U | (z & 4U) << 16U);
-}
-
-std::uint8_t SlicesOf(const BlockMask& voxels) {
-  unsigned slices = 0;
-  for (unsigned z = 0; z < voxels.size(); ++z) slices |= (voxels[z] != 0 ? 1U : 0U) << z;
-  return static_cast<std::uint8_t>(slices);
+  // Bit 0: its own, 1: the one before.
+  const unsigned x = (any & kFirstColumn) != 0 ? 3 : 1;
+  const unsigned xy = (any & 0xFFU) != 0 ? x | x << 2U : x;
+  return static_cast<std::uint8_t>(voxels.front() != 0 ? xy | xy << 4U : xy);
 }
 
 struct Candidate {
   Index3 index;
   InstanceId id = kNoInstance;
+  std::uint32_t number = 0;  // in the grid's entries()
   TsdfBlock* block = nullptr;
   const CameraFromLattice* T_CL = nullptr;
+};
+
+// The blocks of all volumes, by id, then number.
+class Candidates {
+ public:
+  Candidates(const FrameView& frame, const ObjectVolumes& volumes) {
+    for (const auto& [id, volume] : volumes) {
+      volumes_.push_back({size_, id, &volume.grid,
+                          CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world)});
+      size_ += volume.grid.size();
+    }
+  }
+
+  std::size_t size() const { return size_; }
+  const TsdfGrid::Entry& EntryAt(std::size_t i) const {
+    const Volume& of = VolumeAt(i);
+    return of.grid->entries()[i - of.first];
+  }
+  Candidate operator[](std::size_t i) const {
+    const Volume& of = VolumeAt(i);
+    const TsdfGrid::Entry& entry = of.grid->entries()[i - of.first];
+    return {entry.index, of.id, static_cast<std::uint32_t>(i - of.first), entry.block.get(),
+            &of.T_CL};
+  }
+
+ private:
+  struct Volume {
+    std::size_t first;  // of its blocks
+    InstanceId id;
+    const TsdfGrid* grid;
+    CameraFromLattice T_CL;
+  };
+  const Volume& VolumeAt(std::size_t i) const {
+    const auto after =
+        std::upper_bound(volumes_.begin(), volumes_.end(), i,
+                         [](std::size_t wanted, const Volume& of) { return wanted < of.first; });
+    return *std::prev(after);
+  }
+
+  std::vector<Volume> volumes_;
+  std::size_t size_ = 0;
 };
 
 }  // namespace
@@ -60,19 +94,11 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
                                         ObjectVolumes& volumes) {
   AllocateBlocks(frame, config, volumes);
 
-  std::vector<Candidate> candidates;
-  std::map<InstanceId, CameraFromLattice> cameras;
-  for (auto& [id, volume] : volumes) {
-    const auto camera =
-        cameras.emplace(id, CameraFromLattice(frame.T_WC, volume.T_WL, volume.lattice_is_world));
-    for (const TsdfGrid::Entry& entry : volume.grid.entries()) {
-      candidates.push_back({entry.index, id, entry.block.get(), &camera.first->second});
-    }
-  }
+  const Candidates candidates(frame, volumes);
   const std::vector<PlannedBlock> planned = PlanBlocks(
       frame, candidates.size(), config.voxel(), config.back(),
       [&](std::size_t i) -> BlockCandidate {
-        const Candidate& of = candidates[i];
+        const Candidate of = candidates[i];
         return {of.index, of.T_CL, of.id, false, config.contradiction ? of.block : nullptr};
       });
   std::vector<FusedBlock> fused(planned.size());
@@ -80,7 +106,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
       tbb::blocked_range<std::size_t>(0, planned.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
-          const Candidate& of = candidates[planned[k].number];
+          const Candidate of = candidates[planned[k].number];
           FusionRule rule;
           rule.id = of.id;
           rule.contradiction = config.contradiction;
@@ -93,20 +119,22 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           TsdfBlock& block = *of.block;
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].block;
-          if (k + kAhead < range.end()) hwy::Prefetch(&candidates[planned[k + kAhead].number]);
+          if (k + kAhead < range.end()) {
+            hwy::Prefetch(&candidates.EntryAt(planned[k + kAhead].number));
+          }
           const BlockPlace place = PlaceOf(*of.T_CL, of.index, config.voxel(), planned[k]);
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();
           fused[k] = {of.id,
                       of.index,
+                      of.number,
                       &block,
                       result.in_band,
-                      AroundVoxels(result.changed_signs) |
-                          (result.changed_band != 0 ? 1U << kItselfAround : 0U),
-                      SlicesOf(result.changed_signs),
-                      result.changed_band,
-                      block.is_listed_with_others};
+                      BlocksOfCubesAt(result.changed_signs),
+                      result.band_changed,
+                      block.is_listed_with_others,
+                      !block.AnyObserved()};
         }
       },
       tbb::simple_partitioner());

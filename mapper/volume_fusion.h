@@ -34,24 +34,24 @@ inline void FuseVoxel(TsdfBlock& block, std::size_t i, float distance, const std
   colours.count[k] = static_cast<std::uint8_t>(std::min(count + 1, weight_cap));
 }
 
-inline constexpr int kItselfAround = 13;  // of the 27 blocks around one
-
 // A block that the frame changed.
 struct FusedBlock {
   InstanceId id = kNoInstance;
   Index3 index;
+  std::uint32_t number = 0;  // in the grid's entries()
   TsdfBlock* block = nullptr;
   BlockMask votes{};  // voxels with an observation of this object in band
-  // The 27 blocks around (bit 9 z + 3 y + x, this one in the middle) whose cover may have changed.
-  std::uint32_t touched = 0;
-  std::uint8_t sign_slices = 0;        // of FusionResult::changed_signs
-  std::uint8_t band_slices = 0;        // with a voxel that is in the band anew, or no longer
+  // Of the block (bit 0) and those one step back along x, y, z (bits 0, 1, 2 of the bit's number):
+  // which may have a cube that is crossed anew, or no longer.
+  std::uint8_t stale_cubes = 0;
+  bool band_changed = false;
   bool is_listed_with_others = false;  // of the block
+  bool is_empty = false;               // no voxel is observed
 };
 
 // Allocates the blocks of the labels in the frame (making volumes for new labels), fuses, applies
 // the contradiction rule if the config asks for it, and returns the blocks in which a voxel
-// changed. Their masks are up to date but for `cover`.
+// changed. Their masks are up to date but for `crossed` and `cover`.
 std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig& config,
                                         ObjectVolumes& volumes);
 

@@ -59,7 +59,7 @@ TEST(BlockGrid, ErasesAndAddsAsAMapDoesAndKeepsTheOrder) {
 }
 
 // Neighbours may lie in other cells of the directory, on either side of zero.
-TEST(BlockGrid, FindsWhatIsAround) {
+TEST(BlockGrid, FindsTheUpperBlocks) {
   Dice dice(5);
   BlockGrid<int> grid;
   const auto any = [&] {
@@ -69,23 +69,14 @@ TEST(BlockGrid, FindsWhatIsAround) {
   int found = 0;
   for (int i = 0; i < 500; ++i) {
     const Index3 index = any();
-    const auto around = grid.directory().FindAround(index);
-    std::size_t k = 0;
-    for (int z = -1; z <= 1; ++z) {
-      for (int y = -1; y <= 1; ++y) {
-        for (int x = -1; x <= 1; ++x, ++k) {
-          ASSERT_EQ(around[k], grid.directory().Find(index + Index3{x, y, z}));
-          if (around[k] != BlockDirectory::kNone) ++found;
-        }
-      }
-    }
     const auto upper = grid.FindUpper(index);
     for (int step = 0; step < 8; ++step) {
       ASSERT_EQ(upper[static_cast<std::size_t>(step)],
                 grid.Find(index + Index3{step & 1, (step >> 1) & 1, step >> 2}));
+      if (upper[static_cast<std::size_t>(step)] != nullptr) ++found;
     }
   }
-  EXPECT_GT(found, 1000);
+  EXPECT_GT(found, 500);
 }
 
 TEST(BlockGrid, ErasingAllLeavesNothing) {
