@@ -96,6 +96,7 @@ struct alignas(64) TsdfBlock {
 
   static void* operator new(std::size_t);
   static void operator delete(void* block);
+  static const std::size_t kRoom;  // bytes that it takes
 
   // Brings the masks but for `crossed` and `cover` in line with the values, and gives the block a
   // new revision; true where one of observed, negative and band changed. `back` in metres. Frees
@@ -143,7 +144,7 @@ struct alignas(64) TsdfBlock {
   std::size_t Bytes() const {
     const auto slices =
         std::count_if(colours.begin(), colours.end(), [](const auto& s) { return s != nullptr; });
-    return sizeof(TsdfBlock) + static_cast<std::size_t>(slices) * sizeof(ColourSlice);
+    return kRoom + static_cast<std::size_t>(slices) * sizeof(ColourSlice);
   }
   Colour ColourAt(int place) const {
     const FixedColour c = FixedColourAt(static_cast<std::size_t>(place));
@@ -154,6 +155,8 @@ struct alignas(64) TsdfBlock {
   }
 };
 
+inline constexpr std::size_t TsdfBlock::kRoom =
+    ObjectPool<sizeof(TsdfBlock), alignof(TsdfBlock)>::kStride;
 inline void* TsdfBlock::operator new(std::size_t) {
   return ObjectPool<sizeof(TsdfBlock), alignof(TsdfBlock)>::Take();
 }
