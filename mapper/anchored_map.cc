@@ -2,12 +2,14 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <limits>
 #include <list>
 #include <set>
 
+#include "mapper/block_set.h"
 #include "mapper/cover.h"
 #include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
@@ -27,6 +29,11 @@ struct AnchoredMap::Participants {
     std::array<double, 12> T_LW;  // rows
     VoxelReader reader;
     const std::vector<Index3>* reach;
+    BlockBox bounds;  // of `reach`
+
+    bool Reaches(const Index3& block) const {
+      return bounds.Holds(block) && std::binary_search(reach->begin(), reach->end(), block);
+    }
   };
   struct Object {
     InstanceId id = kNoInstance;
@@ -103,6 +110,9 @@ void AnchoredMap::Remove(InstanceId id) {
 }
 
 void AnchoredMap::RefreshIndex() const {
+  // Moved, then fused: in the list twice.
+  std::sort(moved_.begin(), moved_.end());
+  moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
   for (const InstanceId id : moved_) {
     const ObjectVolume& volume = volumes_.at(id);
     if (volume.lattice_is_world) {
@@ -115,7 +125,7 @@ void AnchoredMap::RefreshIndex() const {
   }
   moved_.clear();
   if (dirty_.empty()) return;
-  std::sort(dirty_.begin(), dirty_.end());
+  tbb::parallel_sort(dirty_.begin(), dirty_.end());
   dirty_.erase(std::unique(dirty_.begin(), dirty_.end()), dirty_.end());
 
   Participants participants;
@@ -125,8 +135,11 @@ void AnchoredMap::RefreshIndex() const {
     object.id = id;
     object.grid = &volume.grid;
     if (volume.lattice_is_world) continue;
-    object.moved.emplace(
-        Participants::Moved{RowsOf(volume.T_WL.inverse()), VoxelReader(volume.grid), &reach_[id]});
+    const std::vector<Index3>& reach = reach_[id];
+    BlockBox bounds;
+    for (const Index3& block : reach) bounds.Extend(block);
+    object.moved.emplace(Participants::Moved{RowsOf(volume.T_WL.inverse()),
+                                             VoxelReader(volume.grid), &reach, bounds});
   }
   std::vector<IndexBlock> computed(dirty_.size());
   std::vector<IndexBlock*> existing(dirty_.size());
@@ -180,7 +193,7 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
       continue;
     }
     const Participants::Moved& moved = *object.moved;
-    if (!std::binary_search(moved.reach->begin(), moved.reach->end(), index)) continue;
+    if (!moved.Reaches(index)) continue;
     PulledCover& cover = pulled.emplace_back();
     if (CoverOfBlock(moved.reader, moved.T_LW, config_.voxel_m, config_.back(), index, cover)) {
       listed.push_back({object.id, cover.covered, cover.distance.data(), nullptr});

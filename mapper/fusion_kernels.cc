@@ -31,10 +31,9 @@ using Shorts = hn::Rebind<std::uint16_t, Floats>;
 using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
+  const auto fetch_nothing = [](std::size_t) {};
   Projected projected;
-  if (!Project(
-          frame, place, [](std::size_t) {}, projected))
-    return false;
+  if (!Project(frame, place, fetch_nothing, projected)) return false;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
   ReadPixels<kLanes>(frame.depth, projected.pixel, projected.look.data(), depth.data());

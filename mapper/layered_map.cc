@@ -144,9 +144,11 @@ std::vector<MeshPart*> LayeredMap::PartsToLookUp(
   // It does not hide itself.
   if (where->index.empty() && where->only == id) return parts;
   if (!where->near.Meets(ReachOf(object, config_.voxel_m))) return parts;
-  // Moving the boxes to its lattice takes longer than asking all parts of a small object.
+  // Moving the boxes to its lattice takes longer than asking all parts of a small object: a box has
+  // eight corners.
+  constexpr std::size_t kPartsABox = 8;
   const bool asks_all =
-      !object.lattice_is_world && object.mesh.parts().size() < 8 * where->all.size();
+      !object.lattice_is_world && object.mesh.parts().size() < kPartsABox * where->all.size();
   // A triangle is looked up less than a block from its own.
   std::optional<BlockSet> near_in_lattice;
   if (!object.lattice_is_world && !asks_all) {

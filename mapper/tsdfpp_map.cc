@@ -99,7 +99,7 @@ class TsdfppMap::Groups {
     hwy::Prefetch(&group.lists->settled);
     if (group.first_vote == kNone) return;
     const FusedBlock& from = fused[static_cast<std::size_t>(group.first_vote)];
-    hwy::Prefetch(&from.votes);
+    hwy::Prefetch(from.votes);
     hwy::Prefetch(&from.block->cover);
   }
   template <typename Function>
@@ -281,7 +281,8 @@ void TsdfppMap::Activate(InstanceId id) {
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const FrameFreeing freeing(volumes_);
-  const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
+  BlockVotes votes;
+  const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_, &votes);
   UpdateIndex(fused);
   freeing.FreeEmpty(fused, volumes_);
   CheckInDebugBuilds(*this);
@@ -307,7 +308,7 @@ void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
           });
           groups.ForEachVote(group, [&](std::size_t k) {
             const FusedBlock& from = fused[k];
-            BlockMask votes = from.votes;
+            BlockMask votes = *from.votes;
             for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= from.block->cover[z];
             if (Vote(lists, from.id, votes)) group.relisted = true;
           });

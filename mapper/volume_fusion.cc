@@ -91,7 +91,7 @@ class Candidates {
 }  // namespace
 
 std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig& config,
-                                        ObjectVolumes& volumes) {
+                                        ObjectVolumes& volumes, BlockVotes* votes) {
   AllocateBlocks(frame, config, volumes);
 
   const Candidates candidates(frame, volumes);
@@ -102,6 +102,8 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
         return {of.index, of.T_CL, of.id, false, config.contradiction ? of.block : nullptr};
       });
   std::vector<FusedBlock> fused(planned.size());
+  // Each is written below before it is read.
+  if (votes != nullptr) *votes = std::make_unique_for_overwrite<BlockMask[]>(planned.size());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, planned.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
@@ -126,11 +128,13 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
           const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next);
           if (!result.changed) continue;
           block.revision = NewRevision();
+          BlockMask* own_votes = votes == nullptr ? nullptr : &(*votes)[k];
+          if (own_votes != nullptr) *own_votes = result.in_band;
           fused[k] = {of.id,
                       of.index,
                       of.number,
                       &block,
-                      result.in_band,
+                      own_votes,
                       BlocksOfCubesAt(result.changed_signs),
                       result.band_changed,
                       block.is_listed_with_others,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "mapper/map_config.h"
@@ -40,7 +41,7 @@ struct FusedBlock {
   Index3 index;
   std::uint32_t number = 0;  // in the grid's entries()
   TsdfBlock* block = nullptr;
-  BlockMask votes{};  // voxels with an observation of this object in band
+  const BlockMask* votes = nullptr;  // in what FuseIntoVolumes was given, or nullptr
   // Of the block (bit 0) and those one step back along x, y, z (bits 0, 1, 2 of the bit's number):
   // which may have a cube that is crossed anew, or no longer.
   std::uint8_t stale_cubes = 0;
@@ -49,10 +50,14 @@ struct FusedBlock {
   bool is_empty = false;               // no voxel is observed
 };
 
+// Of each fused block, the voxels with an observation of its object in band.
+using BlockVotes = std::unique_ptr<BlockMask[]>;
+
 // Allocates the blocks of the labels in the frame (making volumes for new labels), fuses, applies
 // the contradiction rule if the config asks for it, and returns the blocks in which a voxel
-// changed. Their masks are up to date but for `crossed` and `cover`.
+// changed. Their masks are up to date but for `crossed` and `cover`. `votes`, where given, must
+// outlive them.
 std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig& config,
-                                        ObjectVolumes& volumes);
+                                        ObjectVolumes& volumes, BlockVotes* votes = nullptr);
 
 }  // namespace tsdfpp
