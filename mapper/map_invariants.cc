@@ -163,6 +163,21 @@ std::optional<float> DistanceAtPoint(const TsdfGrid& grid, const Eigen::Vector3d
   return Trilinear(distance, f);
 }
 
+namespace {
+
+Fault FindCubeFault(const std::string& name, const TsdfGrid& grid) {
+  for (const auto& [index, block] : grid.entries()) {
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      const Index3 voxel = VoxelAt(index, place);
+      if (Bit(block->crossed, place) == IsCrossed(grid, voxel)) continue;
+      return fmt::format("{}: whether the cube of voxel {} is crossed is wrong", name, Text(voxel));
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConfig& config,
                     bool with_cover) {
   if (Fault fault = FindHashFault(name, grid)) return fault;
@@ -198,7 +213,7 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
       }
     }
   }
-  return std::nullopt;
+  return with_cover ? FindCubeFault(name, grid) : std::nullopt;
 }
 
 Fault FindListFault(const MapRepresentation& map) {

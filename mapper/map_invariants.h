@@ -16,8 +16,8 @@ void CheckInDebugBuilds(const MapRepresentation& map);
 // The parts of FindFault(); each returns a sentence, or nothing where all is well.
 using Fault = std::optional<std::string>;
 
-// Blocks: found where they are, none empty, values in range, masks those of the values; `cover` too
-// where `with_cover`. `name` begins the sentence.
+// Blocks: found where they are, none empty, values in range, masks those of the values; `crossed`
+// and `cover` too where `with_cover`. `name` begins the sentence.
 Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConfig& config,
                     bool with_cover);
 

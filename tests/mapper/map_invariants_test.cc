@@ -77,6 +77,8 @@ TEST_P(Invariants, MasksThatAreNotOfTheValuesAreNoticed) {
   if (GetParam() == Method::kTsdfpp) {
     ExpectFault("the cover of voxel",
                 [](Place& p) { p.block->cover[p.observed / 64] ^= 1ULL << p.observed % 64; });
+    ExpectFault("whether the cube of voxel",
+                [](Place& p) { p.block->crossed[p.observed / 64] ^= 1ULL << p.observed % 64; });
   }
 }
 
@@ -101,9 +103,7 @@ TEST_P(Invariants, AListThatDoesNotFitTheValuesIsNoticed) {
     entry.block->distance[0] = ToyConfig().front();
     entry.block->UpdateMasks(ToyConfig().back());
   }
-  for (const auto& entry : map->GridOf(id)->entries()) {
-    entry.block->cover = FindCover(*map->GridOf(id), entry.index);
-  }
+  RenewCovers(*map->GridOf(id));
   const auto fault = map->FindFault();
   ASSERT_TRUE(fault.has_value());
   EXPECT_TRUE(fault->find("is listed at voxel") != std::string::npos ||
