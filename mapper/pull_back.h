@@ -28,7 +28,7 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
                    Resampling resampling = Resampling::kAll);
 
 // Moves the values of a volume by T_rel (paper III-E): the new grid, masks up to date but for
-// `cover`.
+// `crossed` and `cover`.
 TsdfGrid ResampleGrid(const TsdfGrid& grid, const Pose& T_rel, double voxel_m, float back,
                       Resampling resampling = Resampling::kAll);
 

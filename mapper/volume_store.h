@@ -15,8 +15,8 @@
 namespace tsdfpp {
 
 void SaveGrid(const TsdfGrid& grid, std::string& bytes);
-// Masks are up to date but for `cover`. Errors: kData, a fragment such as "a block is out of
-// order", for values that no map holds.
+// Masks are up to date but for `crossed` and `cover`. Errors: kData, a fragment such as "a block is
+// out of order", for values that no map holds.
 Expected<TsdfGrid> LoadGrid(ByteReader& bytes, const MapConfig& config);
 
 void SavePose(const Pose& T, std::string& bytes);
