@@ -8,7 +8,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr const char* kScene = "scenes/toycar3.toml";
+constexpr const char* kDecayScene = "scenes/toycar3.toml";
 constexpr int kFusedFrames = 12;  // the cars start at frame 20
 constexpr int kFirstMove = 24;
 constexpr int kMoves = 100;
@@ -169,9 +169,9 @@ class Decay {
 }  // namespace
 
 Expected<void> MeasureDecay(const FigureOptions& options) {
-  TSDFPP_ASSIGN(const Footage fused, Film({kScene, 1, 1, kFusedFrames, {kFusedFrames}}));
+  TSDFPP_ASSIGN(const Footage fused, Film({kDecayScene, 1, 1, kFusedFrames, {kFusedFrames}}));
   // Only the poses of these frames are used.
-  TSDFPP_ASSIGN(Footage path, Film({kScene, 0.1, 1, kFirstMove + kMoves - 1, {}}));
+  TSDFPP_ASSIGN(Footage path, Film({kDecayScene, 0.1, 1, kFirstMove + kMoves - 1, {}}));
   std::erase_if(path.frames, [](const Frame& frame) { return frame.index < kFirstMove; });
   FigureTable table({"map", "moves", "surface left", "distance error mm", "colour error levels",
                      "brighter by levels"});

@@ -8,7 +8,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr const char* kScene = "scenes/stack.toml";
+constexpr const char* kLayersScene = "scenes/stack.toml";
 // Cover over ball over tray; then the pile was pushed to where bare table had been seen.
 constexpr int kThreeSurfaces = 203;
 constexpr int kFourSurfaces = 262;
@@ -108,8 +108,9 @@ void MeasureMap(const MapRepresentation& map, const SceneTruth& truth, bool on_s
 }  // namespace
 
 Expected<void> MeasureLayers(const FigureOptions& options) {
-  TSDFPP_ASSIGN(const Footage footage,
-                Film({kScene, kScale, kStep, kFourSurfaces, {kThreeSurfaces, kFourSurfaces}}));
+  TSDFPP_ASSIGN(
+      const Footage footage,
+      Film({kLayersScene, kScale, kStep, kFourSurfaces, {kThreeSurfaces, kFourSurfaces}}));
   FigureTable table({"surfaces", "profile", "map", "K", "table listed", "table after",
                      "table in mesh", "tray listed", "tray after", "tray in mesh", "ball listed",
                      "ball after", "ball in mesh"});

@@ -6,7 +6,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr const char* kScene = "scenes/mini.toml";
+constexpr const char* kSliceScene = "scenes/mini.toml";
 constexpr InstanceId kCar = 1;
 
 struct Moment {
@@ -29,7 +29,7 @@ std::string DistanceCell(const MapRepresentation& map, InstanceId id, const Eige
 }  // namespace
 
 Expected<void> MeasureSlice(const FigureOptions& options) {
-  TSDFPP_ASSIGN(const Footage footage, Film({kScene, 1, 1, kMoments.back().frame, {}}));
+  TSDFPP_ASSIGN(const Footage footage, Film({kSliceScene, 1, 1, kMoments.back().frame, {}}));
   const auto number = static_cast<std::size_t>(kMoments[1].frame - footage.info.first_index);
   const Pose& T_WO = footage.frames.at(number).T_WO.at(kCar);
   FigureTable table(

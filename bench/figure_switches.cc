@@ -9,7 +9,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr const char* kScene = "scenes/mini.toml";
+constexpr const char* kSwitchesScene = "scenes/mini.toml";
 constexpr int kReveal = 40;
 constexpr std::array<InstanceId, 1> kMovers{1};
 
@@ -80,7 +80,7 @@ struct Switch {
 }  // namespace
 
 Expected<void> MeasureSwitches(const FigureOptions& options) {
-  TSDFPP_ASSIGN(Footage footage, Film({kScene, 1, 1, kReveal, {kReveal}}));
+  TSDFPP_ASSIGN(Footage footage, Film({kSwitchesScene, 1, 1, kReveal, {kReveal}}));
   const std::vector<Switch> switches{
       {"as it is", [](MapConfig&) {}, false},
       {"contradiction = false", [](MapConfig& c) { c.contradiction = false; }, false},
@@ -111,7 +111,7 @@ Expected<void> MeasureSwitches(const FigureOptions& options) {
 }
 
 Expected<void> MeasureSweep(const FigureOptions& options) {
-  TSDFPP_ASSIGN(const Footage footage, Film({kScene, 1, 1, kReveal, {kReveal}}));
+  TSDFPP_ASSIGN(const Footage footage, Film({kSwitchesScene, 1, 1, kReveal, {kReveal}}));
   FigureTable table(Columns({"map", "back voxels"}));
   for (const Method method : {Method::kTsdf, Method::kTsdfMin, Method::kTsdfpp,
                               Method::kTsdfppLiteral, Method::kTsdfppAnchored}) {

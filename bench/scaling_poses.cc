@@ -10,7 +10,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kFrames = 96;
+constexpr int kPosesFrames = 96;
 constexpr int kFirstMove = 24;  // frame number; both cars drive
 
 struct Way {
@@ -31,7 +31,7 @@ constexpr std::array<Car, 2> kCars{{{1, "truck"}, {2, "car"}}};
 }  // namespace
 
 Expected<void> MeasurePoses(const ScalingOptions& options) {
-  TSDFPP_ASSIGN(const Footage footage, Film({kMovingScene, 1, 1, kFrames, {}}));
+  TSDFPP_ASSIGN(const Footage footage, Film({kMovingScene, 1, 1, kPosesFrames, {}}));
   TSDFPP_ASSIGN(const MapConfig config, ScalingConfig());
   FigureTable table({"map", "object", "blocks", "median ms", "p99 ms", "worst ms", "CPU ms"});
   for (const Way& way : kWays) {

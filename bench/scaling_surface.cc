@@ -10,12 +10,12 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kFrames = 20;  // before the cars start
-constexpr int kWarmUp = 10;  // whose blocks are new
-constexpr int kWindows = 8;  // eighths of the image's width
+constexpr int kSurfaceFrames = 20;  // before the cars start
+constexpr int kSurfaceWarmUp = 10;  // whose blocks are new
+constexpr int kWindows = 8;         // eighths of the image's width
 constexpr std::array<double, 2> kVoxels_m{0.01, 0.005};
-constexpr std::array<Method, 4> kMethods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored,
-                                         Method::kVolumes};
+constexpr std::array<Method, 4> kSurfaceMethods{Method::kTsdf, Method::kTsdfpp,
+                                                Method::kTsdfppAnchored, Method::kVolumes};
 
 // The frame with depth in the middle `eighths` of its columns alone.
 Frame Windowed(const Frame& frame, int eighths) {
@@ -52,7 +52,7 @@ double VisibleSurface_m2(const Frame& frame) {
 }  // namespace
 
 Expected<void> MeasureSurface(const ScalingOptions& options) {
-  TSDFPP_ASSIGN(const Footage footage, Film({kMovingScene, 1, 1, kFrames, {}}));
+  TSDFPP_ASSIGN(const Footage footage, Film({kMovingScene, 1, 1, kSurfaceFrames, {}}));
   std::vector<double> area_m2;
   std::vector<std::vector<Frame>> windowed;
   for (int eighths = 1; eighths <= kWindows; ++eighths) {
@@ -65,7 +65,7 @@ Expected<void> MeasureSurface(const ScalingOptions& options) {
   for (const double voxel_m : kVoxels_m) {
     config.voxel_m = voxel_m;
     TSDFPP_RETURN_IF_ERROR(config.Validate());
-    for (const Method method : kMethods) {
+    for (const Method method : kSurfaceMethods) {
       for (std::size_t w = 0; w < windowed.size(); ++w) {
         std::vector<Times> wall(static_cast<std::size_t>(options.runs));
         std::vector<Times> cpu(wall.size());
@@ -75,7 +75,7 @@ Expected<void> MeasureSurface(const ScalingOptions& options) {
             const double start = WallMilliseconds();
             const double cpu_start = CpuMilliseconds();
             pipeline.Process(windowed[w][i]);
-            if (i < kWarmUp) continue;
+            if (i < kSurfaceWarmUp) continue;
             wall[run].ms.push_back(WallMilliseconds() - start);
             cpu[run].ms.push_back(CpuMilliseconds() - cpu_start);
           }

@@ -11,13 +11,13 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kFrames = 128;   // the cars start at frame 20
-constexpr int kWarmUp = 10;    // frames
-constexpr int kCastEvery = 8;  // frames
+constexpr int kThreadsFrames = 128;  // the cars start at frame 20
+constexpr int kThreadsWarmUp = 10;   // frames
+constexpr int kCastEvery = 8;        // frames
 constexpr int kMeshEvery = 32;
 constexpr std::array<int, 2> kThreads{1, 2};
-constexpr std::array<Method, 4> kMethods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored,
-                                         Method::kVolumes};
+constexpr std::array<Method, 4> kThreadsMethods{Method::kTsdf, Method::kTsdfpp,
+                                                Method::kTsdfppAnchored, Method::kVolumes};
 
 struct Step {
   const char* name;
@@ -49,7 +49,7 @@ void RunOnce(Method method, const MapConfig& config, const Footage& footage, int
   int number = 0;
   for (const Frame& frame : footage.frames) {
     const StepTimes times = pipeline.Process(frame);
-    if (++number <= kWarmUp) continue;
+    if (++number <= kThreadsWarmUp) continue;
     steps.Add(0, 1e3 * times.update_poses_s);
     steps.Add(1, 1e3 * times.fuse_s);
     steps.Add(2, 1e3 * (times.update_poses_s + times.fuse_s));
@@ -77,11 +77,11 @@ const Times& BestRun(const std::vector<Times>& runs) {
 }  // namespace
 
 Expected<void> MeasureThreads(const ScalingOptions& options) {
-  TSDFPP_ASSIGN(const Footage footage, Film({kMovingScene, 1, 1, kFrames, {}}));
+  TSDFPP_ASSIGN(const Footage footage, Film({kMovingScene, 1, 1, kThreadsFrames, {}}));
   TSDFPP_ASSIGN(const MapConfig config, ScalingConfig());
   FigureTable table({"map", "step", "1 thread ms", "2 threads ms", "times faster"});
   FigureTable spread({"map", "median ms", "p99 ms", "worst ms", "worst over median"});
-  for (const Method method : kMethods) {
+  for (const Method method : kThreadsMethods) {
     const std::string name(MethodName(method));
     std::array<Steps, kThreads.size()> by_threads;
     // In turn, so that what else the machine does meets both.

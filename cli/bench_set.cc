@@ -11,7 +11,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct BenchSetArguments {
   std::string name;
   std::string sets = "eval/bench-sets";
   std::string run;
@@ -45,7 +45,7 @@ Expected<CommandResult> Describe(const BenchSet& set) {
   return result;
 }
 
-Expected<CommandResult> RunMethods(const BenchSet& set, const Options& options) {
+Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments& options) {
   if (options.out.empty()) return UsageError("--out is required with --run");
   TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
@@ -69,7 +69,7 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const Options& options) 
   return result;
 }
 
-Expected<CommandResult> RunBenchSet(const Options& options) {
+Expected<CommandResult> RunBenchSet(const BenchSetArguments& options) {
   TSDFPP_ASSIGN(const BenchSet set, BenchSet::Load(options.sets, options.name));
   if (!options.run.empty()) return RunMethods(set, options);
   if (!options.leaderboard.empty()) {
@@ -84,7 +84,7 @@ Expected<CommandResult> RunBenchSet(const Options& options) {
 }  // namespace
 
 Run AddBenchSet(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BenchSetArguments>();
   app.add_option("NAME", options->name, "A benchmark, e.g. v1")->required();
   app.add_option("--sets", options->sets, "Folder of the benchmarks")->capture_default_str();
   CLI::Option* run =

@@ -16,7 +16,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct CompareArguments {
   SequenceArguments source;
   std::string out;
   std::string methods = "tsdf,tsdf++,tsdf++/anchored";
@@ -34,7 +34,7 @@ constexpr double kStandInVoxels = 0.5;
 // The source with the plan that was typed, or the paper's where a dataset of somebody else's has
 // none; true surfaces are reconstructed where that has none.
 Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSource> source,
-                                                      const Options& options,
+                                                      const CompareArguments& options,
                                                       CompareConfig& config) {
   const SequenceInfo& info = source->info();
   const bool foreign = IsForeignCofusion(options.source.path);
@@ -67,7 +67,7 @@ Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSourc
   return WithPlan(std::move(source), plan, std::move(models));
 }
 
-Expected<CommandResult> RunCompareCommand(const Options& options) {
+Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   CompareConfig config = options.config;
   config.methods.clear();
   const std::vector<std::string> known = AdapterNames();
@@ -138,7 +138,7 @@ Expected<CommandResult> RunCompareCommand(const Options& options) {
 }  // namespace
 
 Run AddCompare(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareArguments>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
   app.add_option("--methods", options->methods,

@@ -12,7 +12,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct EvaluateArguments {
   SequenceArguments source;
   std::string meshes;
   std::string trajectories;
@@ -23,7 +23,7 @@ struct Options {
   EvaluateConfig config;
 };
 
-Expected<CommandResult> RunEvaluateCommand(const Options& options, bool scale_is_given) {
+Expected<CommandResult> RunEvaluateCommand(const EvaluateArguments& options, bool scale_is_given) {
   EvaluateConfig config = options.config;
   config.meshes = options.meshes;
   if (!options.trajectories.empty()) config.trajectories = options.trajectories;
@@ -60,7 +60,7 @@ Expected<CommandResult> RunEvaluateCommand(const Options& options, bool scale_is
 }  // namespace
 
 Run AddEvaluate(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateArguments>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--meshes", options->meshes, "Folder of meshes (docs/evaluate.md)")
       ->check(NotEmpty("a folder"))

@@ -18,7 +18,7 @@ namespace {
 constexpr int kFreshSeeds = 20;
 constexpr std::uint64_t kFirstFreshSeed = 1001;
 
-struct Options {
+struct GateArguments {
   std::string gates;
   std::string profile = "quick";
   std::string sabotage = "none";
@@ -45,7 +45,7 @@ std::string DateNow() {
   return text;
 }
 
-Expected<void> Check(const Options& options) {
+Expected<void> Check(const GateArguments& options) {
   if (options.update && options.reason.empty()) {
     return UsageError("--update needs --reason TEXT, which goes into the references");
   }
@@ -63,7 +63,7 @@ Expected<void> Check(const Options& options) {
   return {};
 }
 
-Expected<CommandResult> Update(const Options& options, const GateRun& run,
+Expected<CommandResult> Update(const GateArguments& options, const GateRun& run,
                                const References& before) {
   if (!run.controls_hold()) {
     return DataError("{}: a control fails, so there is nothing to refer to", options.gates);
@@ -123,7 +123,7 @@ Expected<CommandResult> Report(const GateRun& run, const References& references,
   return CommandResult{GateJson(run, explanations), GateTable(run, WantsColour()), run.exit_code()};
 }
 
-Expected<CommandResult> RunGateCommand(const Options& options) {
+Expected<CommandResult> RunGateCommand(const GateArguments& options) {
   TSDFPP_RETURN_IF_ERROR(Check(options));
   TSDFPP_ASSIGN(const GatesConfig config, GatesConfig::Load(options.gates));
   TSDFPP_ASSIGN(const References references, LoadReferences(config.references));
@@ -154,7 +154,7 @@ Expected<CommandResult> RunGateCommand(const Options& options) {
 }  // namespace
 
 Run AddGate(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<GateArguments>();
   app.add_option("GATES", options->gates, "Gates (.toml, docs/gates.md)")->required();
   app.add_option("--profile", options->profile, "quick or full")->check(OneOf({"quick", "full"}));
   app.add_option("--sabotage", options->sabotage,

@@ -14,7 +14,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct GenerateArguments {
   std::string scene;
   std::string out;
   std::string sensor;
@@ -27,7 +27,7 @@ struct Options {
   GenerateOptions generate;
 };
 
-Expected<CommandResult> ListScenes(const Options& options) {
+Expected<CommandResult> ListScenes(const GenerateArguments& options) {
   TSDFPP_ASSIGN(const std::vector<SceneFile> scenes, SceneFiles(options.scenes));
   CommandResult result{nlohmann::json::array(), ""};
   for (const SceneFile& scene : scenes) {
@@ -46,7 +46,7 @@ Expected<CommandResult> ListScenes(const Options& options) {
   return result;
 }
 
-Expected<CommandResult> WritePage(const Options& options) {
+Expected<CommandResult> WritePage(const GenerateArguments& options) {
   {
     ProgressBar bar("scenes");
     TSDFPP_RETURN_IF_ERROR(WriteScenePage(options.scenes, options.page,
@@ -56,7 +56,7 @@ Expected<CommandResult> WritePage(const Options& options) {
   return CommandResult{{{"page", file}}, file + "\n"};
 }
 
-std::string Summary(const Options& options, const GenerateResult& made) {
+std::string Summary(const GenerateArguments& options, const GenerateResult& made) {
   std::string text =
       fmt::format("{}: {} frames of {} in {:.1f} s ({:.1f} frames/s, {} jobs; {}, {})\n",
                   options.out, made.info.frame_count, made.info.name, made.render_s,
@@ -69,7 +69,7 @@ std::string Summary(const Options& options, const GenerateResult& made) {
          CertifyText(made.certificate);
 }
 
-Expected<CommandResult> RunGenerate(const Options& options) {
+Expected<CommandResult> RunGenerate(const GenerateArguments& options) {
   if (options.list) return ListScenes(options);
   if (!options.page.empty()) return WritePage(options);
   if (options.scene.empty()) return UsageError("SCENE is required (see tsdfpp generate --help)");
@@ -127,7 +127,7 @@ Expected<CommandResult> RunGenerate(const Options& options) {
 }  // namespace
 
 Run AddGenerate(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<GenerateArguments>();
   options->generate.jobs = 0;
   CLI::Option* scene = app.add_option("SCENE", options->scene, "Scene file (.toml)");
   CLI::Option* out = app.add_option("--out", options->out, "Folder of the new sequence")

@@ -16,7 +16,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct MapArguments {
   SequenceArguments source;
   std::string method = "tsdf++/anchored";
   std::string segmentation = "gt";
@@ -38,7 +38,7 @@ struct Options {
 constexpr std::array<const char*, 7> kSettingsOfTheMap = {
     "--method", "--profile", "--trunc-front", "--trunc-back", "--layers", "--voxel", "--poses"};
 
-Expected<PipelineConfig> ConfigOf(const Options& options) {
+Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
@@ -54,7 +54,7 @@ Expected<PipelineConfig> ConfigOf(const Options& options) {
   return config;
 }
 
-Expected<MapStart> Start(const Options& options, const CLI::App& app) {
+Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   if (options.load.empty()) {
     if (options.source.path.empty()) {
       return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
@@ -71,7 +71,7 @@ Expected<MapStart> Start(const Options& options, const CLI::App& app) {
 }
 
 // Before anything is mapped, which may take long.
-Expected<void> CheckOutputs(const Options& options) {
+Expected<void> CheckOutputs(const MapArguments& options) {
   if (!options.remove.empty() && SplitList(options.remove).empty()) {
     return UsageError("--remove '{}' names no object", options.remove);
   }
@@ -88,7 +88,7 @@ Expected<void> CheckOutputs(const Options& options) {
   return save.has_parent_path() ? MakeWritableFolder(save.parent_path()) : Expected<void>{};
 }
 
-Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
+Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app) {
   TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   TSDFPP_ASSIGN(const MapStart start, Start(options, app));
   const SequenceInfo& info = start.info;
@@ -167,7 +167,7 @@ Expected<CommandResult> RunMap(const Options& options, const CLI::App& app) {
 }  // namespace
 
 Run AddMap(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MapArguments>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source)->required(false);
   app.add_option("--method", options->method,
                  "tsdf, tsdf/min, tsdf++, tsdf++/literal, tsdf++/anchored, volumes")

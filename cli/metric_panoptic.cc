@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct MetricPanopticArguments {
   std::string truth;
   std::string prediction;
   std::string encoding = "class-instance";
@@ -83,7 +83,7 @@ struct Totals {
   int images = 0;
 };
 
-Expected<void> AddCoco(const Options& options, const Annotations& truth,
+Expected<void> AddCoco(const MetricPanopticArguments& options, const Annotations& truth,
                        const Annotations& prediction, Totals& totals) {
   for (const auto& [file, segments] : truth.by_file) {
     const std::string& id = truth.id_of_file.at(file);
@@ -113,7 +113,7 @@ Expected<void> AddCoco(const Options& options, const Annotations& truth,
 }
 
 // (class << 16) + instance, for STQ.
-cv::Mat TubeLabels(const cv::Mat& numbers, const Options& options) {
+cv::Mat TubeLabels(const cv::Mat& numbers, const MetricPanopticArguments& options) {
   cv::Mat labels(numbers.size(), CV_32SC1);
   for (int y = 0; y < numbers.rows; ++y) {
     for (int x = 0; x < numbers.cols; ++x) {
@@ -132,7 +132,7 @@ cv::Mat TubeLabels(const cv::Mat& numbers, const Options& options) {
   return labels;
 }
 
-Expected<void> AddLabelled(const Options& options, Totals& totals) {
+Expected<void> AddLabelled(const MetricPanopticArguments& options, Totals& totals) {
   TSDFPP_ASSIGN(const std::vector<std::string> names, ImagesIn(options.truth));
   TSDFPP_ASSIGN(const std::vector<std::string> predicted, ImagesIn(options.prediction));
   std::vector<std::string> missing;
@@ -197,7 +197,7 @@ void AddMean(const char* title, const MeanPanopticQuality& quality, nlohmann::js
           : fmt::format("{:<10} undefined: {}\n", title, quality.mean.pq.why_not);
 }
 
-Expected<CommandResult> RunPanoptic(Options options) {
+Expected<CommandResult> RunPanoptic(MetricPanopticArguments options) {
   Totals totals;
   std::map<int, bool> is_thing;
   std::set<int> things;
@@ -290,7 +290,7 @@ Expected<CommandResult> RunPanoptic(Options options) {
 }  // namespace
 
 Run AddMetricPanoptic(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MetricPanopticArguments>();
   app.add_option("GT_DIR", options->truth, "Folder of true images (.png)")->required();
   app.add_option("PRED_DIR", options->prediction, "Folder of predicted images, the same names")
       ->required();

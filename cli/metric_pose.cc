@@ -15,7 +15,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct MetricPoseArguments {
   std::string model;
   std::string truth;
   std::string estimate;
@@ -93,7 +93,7 @@ Measured LargestOfDefined(const std::vector<Measured>& errors) {
   return largest ? Measured::Of(*largest) : Measured::Undefined("defined at no pose");
 }
 
-Expected<CommandResult> RunPose(const Options& options) {
+Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
   std::optional<Intrinsics> camera;
   if (!options.camera.empty()) {
     TSDFPP_ASSIGN(camera, CameraFromText(options.camera));
@@ -182,7 +182,7 @@ Expected<CommandResult> RunPose(const Options& options) {
 }  // namespace
 
 Run AddMetricPose(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MetricPoseArguments>();
   app.add_option("MODEL", options->model, "The object's mesh or points: .ply, .obj, .stl, .glb")
       ->required();
   app.add_option("REF", options->truth, "True poses: lines t tx ty tz qx qy qz qw")->required();

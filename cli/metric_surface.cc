@@ -11,7 +11,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct MetricSurfaceArguments {
   std::string reconstruction;
   std::string truth;
   std::string taus = "0.005,0.01,0.02";
@@ -99,7 +99,7 @@ std::string Text(const SurfaceComparison& result, const SurfaceComparisonConfig&
   return text;
 }
 
-Expected<CommandResult> RunSurface(const Options& options, bool scale_is_given) {
+Expected<CommandResult> RunSurface(const MetricSurfaceArguments& options, bool scale_is_given) {
   SurfaceComparisonConfig config = options.config;
   TSDFPP_ASSIGN(config.thresholds_m, PositiveNumbers(options.taus, "--tau"));
   std::sort(config.thresholds_m.begin(), config.thresholds_m.end());
@@ -122,7 +122,7 @@ Expected<CommandResult> RunSurface(const Options& options, bool scale_is_given) 
 }  // namespace
 
 Run AddMetricSurface(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MetricSurfaceArguments>();
   app.add_option("RECONSTRUCTION", options->reconstruction,
                  "Mesh or points: .ply, .obj, .stl, .glb")
       ->required();

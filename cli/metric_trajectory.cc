@@ -9,7 +9,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct MetricTrajectoryArguments {
   std::string truth;
   std::string estimate;
   std::string align = "none";
@@ -68,7 +68,7 @@ nlohmann::json AlignmentJson(const Alignment& alignment) {
           {"rotation_is_unique", alignment.rotation_is_unique}};
 }
 
-Expected<CommandResult> RunTrajectory(const Options& options) {
+Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) {
   TrajectoryOptions measure;
   measure.align = kAlignments.at(options.align);
   measure.max_difference_s = options.max_difference_s;
@@ -134,7 +134,7 @@ Expected<CommandResult> RunTrajectory(const Options& options) {
 }  // namespace
 
 Run AddMetricTrajectory(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MetricTrajectoryArguments>();
   app.add_option("REF", options->truth, "True trajectory: lines t tx ty tz qx qy qz qw")
       ->required();
   app.add_option("EST", options->estimate, "Estimated trajectory, the same")->required();

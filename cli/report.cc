@@ -10,7 +10,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct ReportArguments {
   std::string run;
   std::string compare;
   std::string gates;
@@ -18,7 +18,7 @@ struct Options {
   bool video = false;
 };
 
-Expected<CommandResult> RunVideo(const Options& options) {
+Expected<CommandResult> RunVideo(const ReportArguments& options) {
   const std::filesystem::path out = options.out.empty()
                                         ? std::filesystem::path(options.run) / "report.mp4"
                                         : std::filesystem::path(options.out);
@@ -36,7 +36,7 @@ Expected<CommandResult> RunVideo(const Options& options) {
                                    video.width, video.height)};
 }
 
-Expected<CommandResult> RunReport(const Options& options) {
+Expected<CommandResult> RunReport(const ReportArguments& options) {
   if (options.video) return RunVideo(options);
   std::vector<std::filesystem::path> folders{options.run};
   std::string command = "tsdfpp report " + options.run;
@@ -68,7 +68,7 @@ Expected<CommandResult> RunReport(const Options& options) {
 }  // namespace
 
 Run AddReport(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReportArguments>();
   app.add_option("RUN", options->run, "Folder that tsdfpp compare wrote")
       ->check(NotEmpty("a folder"))
       ->required();

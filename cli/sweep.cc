@@ -9,7 +9,7 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct SweepArguments {
   std::string experiment;
   std::string out;
   int jobs = 0;
@@ -18,7 +18,7 @@ struct Options {
   bool list = false;
 };
 
-Expected<ExperimentConfig> LoadExperiment(const Options& options) {
+Expected<ExperimentConfig> LoadExperiment(const SweepArguments& options) {
   TSDFPP_ASSIGN(ExperimentConfig config, ExperimentConfig::Load(options.experiment));
   if (options.scale > 0) config.frames.scale = options.scale;
   if (options.stride > 0) config.frames.stride = options.stride;
@@ -42,7 +42,7 @@ Expected<CommandResult> ListCells(const ExperimentConfig& config) {
   return result;
 }
 
-Expected<CommandResult> RunSweepCommand(const Options& options) {
+Expected<CommandResult> RunSweepCommand(const SweepArguments& options) {
   TSDFPP_ASSIGN(const ExperimentConfig config, LoadExperiment(options));
   if (options.list) return ListCells(config);
   SweepOptions sweep;
@@ -63,7 +63,7 @@ Expected<CommandResult> RunSweepCommand(const Options& options) {
 }  // namespace
 
 Run AddSweep(CLI::App& app, const CommonOptions&) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SweepArguments>();
   app.add_option("EXPERIMENT", options->experiment, "Experiment file (.toml, docs/experiments.md)")
       ->required();
   app.add_option("--out", options->out,

@@ -6,13 +6,13 @@
 namespace tsdfpp {
 namespace {
 
-struct Options {
+struct VerifyArguments {
   std::string sequence;
   double share = CertifyOptions{}.ray_share;
   bool all = false;
 };
 
-Expected<CommandResult> RunVerify(const Options& options, const CommonOptions& common) {
+Expected<CommandResult> RunVerify(const VerifyArguments& options, const CommonOptions& common) {
   CertifyOptions certify;
   certify.ray_share = options.all ? 1 : options.share;
   Expected<CertifyResult> result;
@@ -33,7 +33,7 @@ Expected<CommandResult> RunVerify(const Options& options, const CommonOptions& c
 }  // namespace
 
 Run AddVerify(CLI::App& app, const CommonOptions& common) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<VerifyArguments>();
   app.add_option("SEQ", options->sequence, "Sequence of ours (folder)")->required();
   CLI::Option* share =
       app.add_option("--share", options->share, "Share of the frames that are compared with rays")

@@ -83,7 +83,7 @@ endfunction()
 function(tsdfpp_order_tbb target)
   set(source ${PROJECT_SOURCE_DIR}/tests/sanitizers/tbb_happens_before.cc)
   target_sources(${target} PRIVATE ${source})
-  set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+  set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
   target_link_libraries(${target} PRIVATE TBB::tbb ${CMAKE_DL_LIBS})
 endfunction()
 

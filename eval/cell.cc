@@ -20,17 +20,17 @@ void Append(std::string& bytes, const cv::Mat& image) {
 
 // The values by the metrics' names.
 nlohmann::json Named(const std::vector<Measured>& values) {
-  nlohmann::json json;
+  nlohmann::json named;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    json[SweepMetrics()[i].name] = ToJson(values[i]);
+    named[SweepMetrics()[i].name] = ToJson(values[i]);
   }
-  return json;
+  return named;
 }
 
-std::vector<Measured> FromNamed(const nlohmann::json& json, std::size_t count) {
+std::vector<Measured> FromNamed(const nlohmann::json& named, std::size_t count) {
   std::vector<Measured> values;
   for (std::size_t i = 0; i < count; ++i) {
-    const nlohmann::json& value = json.at(SweepMetrics()[i].name);
+    const nlohmann::json& value = named.at(SweepMetrics()[i].name);
     values.push_back(value.is_number() ? Measured::Of(value.get<double>())
                                        : Measured::Undefined(value.at("why")));
   }

@@ -25,7 +25,7 @@ struct Recorded {
   json cell;  // its file
 };
 
-Expected<json> ReadJson(const fs::path& path) {
+Expected<json> ReadResult(const fs::path& path) {
   TSDFPP_ASSIGN(const std::string text, ReadFile(path));
   json parsed = json::parse(text, nullptr, false);
   if (!parsed.is_object()) return DataError("{}: is not JSON", path.string());
@@ -53,7 +53,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
       fs::is_directory(options.result, ignored) ? options.result / "results.json" : options.result;
   const std::string where = file.string();
   const fs::path folder = file.parent_path();
-  auto results = ReadJson(file);
+  auto results = ReadResult(file);
   if (!results) return UsageError("{}, expected an experiment's folder", results.error().message);
   try {
     if (results->value("kind", "") != "tsdfpp experiment" ||
@@ -77,7 +77,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     variant.object_error = sequence.at("object_error");
     recorded.program = fmt::format("{}, {}", results->at("program").get<std::string>(),
                                    results->at("renderer").get<std::string>());
-    TSDFPP_ASSIGN(recorded.cell, ReadJson(folder / "cells" / (recorded.id + ".json")));
+    TSDFPP_ASSIGN(recorded.cell, ReadResult(folder / "cells" / (recorded.id + ".json")));
     return recorded;
   } catch (const json::exception& error) {
     return DataError("{}: a field is missing or wrong ({})", where, error.what());

@@ -5,8 +5,8 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <deque>
 #include <limits>
-#include <list>
 #include <set>
 
 #include "mapper/block_set.h"
@@ -19,7 +19,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 8;
+constexpr std::size_t kBlocksPerTask = 32;
 
 }  // namespace
 
@@ -29,18 +29,30 @@ struct AnchoredMap::Participants {
     std::array<double, 12> T_LW;  // rows
     VoxelReader reader;
     const std::vector<Index3>* reach;
-    BlockBox bounds;  // of `reach`
 
     bool Reaches(const Index3& block) const {
-      return bounds.Holds(block) && std::binary_search(reach->begin(), reach->end(), block);
+      return std::binary_search(reach->begin(), reach->end(), block);
     }
   };
   struct Object {
     InstanceId id = kNoInstance;
     const TsdfGrid* grid = nullptr;
-    std::optional<Moved> moved;  // unless its lattice is the world's
+    std::optional<BlockBox> bounds;  // lists nothing outside, where it is known
+    std::optional<Moved> moved;      // unless its lattice is the world's
   };
   std::vector<Object> objects;  // by increasing id
+};
+
+// What the objects list in one block; kept from block to block for its memory.
+struct AnchoredMap::Listed {
+  struct Cover {
+    InstanceId id;
+    const BlockMask* voxels;
+    const float* distance;
+    TsdfBlock* block;  // which the distances are still to be taken from
+  };
+  std::vector<Cover> covers;
+  std::deque<PulledCover> pulled;  // the first ones of this block, the others of ones before
 };
 
 AnchoredMap::AnchoredMap(const MapConfig& config, int layers)
@@ -134,12 +146,18 @@ void AnchoredMap::RefreshIndex() const {
     Participants::Object& object = participants.objects.emplace_back();
     object.id = id;
     object.grid = &volume.grid;
-    if (volume.lattice_is_world) continue;
+    if (volume.lattice_is_world) {
+      // To go through the blocks of a large one would take longer than to look blocks up in it.
+      if (volume.grid.size() > dirty_.size()) continue;
+      BlockBox& bounds = object.bounds.emplace();
+      for (const auto& entry : volume.grid.entries()) bounds.Extend(entry.index);
+      continue;
+    }
     const std::vector<Index3>& reach = reach_[id];
-    BlockBox bounds;
+    BlockBox& bounds = object.bounds.emplace();
     for (const Index3& block : reach) bounds.Extend(block);
-    object.moved.emplace(Participants::Moved{RowsOf(volume.T_WL.inverse()),
-                                             VoxelReader(volume.grid), &reach, bounds});
+    object.moved.emplace(
+        Participants::Moved{RowsOf(volume.T_WL.inverse()), VoxelReader(volume.grid), &reach});
   }
   std::vector<IndexBlock> computed(dirty_.size());
   std::vector<IndexBlock*> existing(dirty_.size());
@@ -147,6 +165,7 @@ void AnchoredMap::RefreshIndex() const {
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, dirty_.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
+        Listed listed;
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           existing[i] = index_.Find(dirty_[i]);
           IndexBlock& ids = existing[i] ? *existing[i] : computed[i];
@@ -154,7 +173,7 @@ void AnchoredMap::RefreshIndex() const {
           const bool was_empty = ids.empty();
           const bool compares = NotesIndexChanges();
           if (compares && !was_empty) std::copy_n(ids.begin(), kBlockVoxels, before.begin());
-          ComputeBlock(dirty_[i], participants, ids);
+          ComputeBlock(dirty_[i], participants, listed, ids);
           if (!compares || was_empty != ids.empty()) continue;
           relisted[i] = was_empty || std::equal(before.begin(), before.end(), ids.begin()) ? 0 : 1;
         }
@@ -176,27 +195,25 @@ void AnchoredMap::RefreshIndex() const {
 }
 
 void AnchoredMap::ComputeBlock(const Index3& index, const Participants& participants,
-                               IndexBlock& ids) const {
-  struct Listed {
-    InstanceId id;
-    BlockMask cover;
-    const float* distance;
-    TsdfBlock* block;  // which the distances are still to be taken from
-  };
-  std::vector<Listed> listed;
-  std::list<PulledCover> pulled;
+                               Listed& scratch, IndexBlock& ids) const {
+  std::vector<Listed::Cover>& listed = scratch.covers;
+  listed.clear();
+  std::size_t pulled = 0;
   for (const Participants::Object& object : participants.objects) {
+    if (object.bounds && !object.bounds->Holds(index)) continue;
     if (!object.moved) {
       TsdfBlock* block = object.grid->Find(index);
       if (block == nullptr || !Any(block->cover)) continue;
-      listed.push_back({object.id, block->cover, nullptr, block});
+      listed.push_back({object.id, &block->cover, nullptr, block});
       continue;
     }
     const Participants::Moved& moved = *object.moved;
     if (!moved.Reaches(index)) continue;
-    PulledCover& cover = pulled.emplace_back();
+    if (pulled == scratch.pulled.size()) scratch.pulled.emplace_back();
+    PulledCover& cover = scratch.pulled[pulled];
     if (CoverOfBlock(moved.reader, moved.T_LW, config_.voxel_m, config_.back(), index, cover)) {
-      listed.push_back({object.id, cover.covered, cover.distance.data(), nullptr});
+      listed.push_back({object.id, &cover.covered, cover.distance.data(), nullptr});
+      ++pulled;
     }
   }
   if (listed.empty()) {
@@ -205,23 +222,23 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
   // No voxel lists more objects than the block has.
   const int layers = std::min(layers_, static_cast<int>(listed.size()));
-  for (const Listed& of : listed) {
+  for (const Listed::Cover& of : listed) {
     if (of.block != nullptr) of.block->is_listed_with_others = listed.size() > 1;
   }
   const auto size = static_cast<std::size_t>(kBlockVoxels * layers);
   if (ids.size() != size) ids = IndexBlock(size);
   if (listed.size() == 1) {
-    ListAlone(listed[0].cover, listed[0].id, ids.data());
+    ListAlone(*listed[0].voxels, listed[0].id, ids.data());
     return;
   }
   std::fill(ids.begin(), ids.end(), kNoInstance);
   std::array<float, kMaxLayers * kBlockVoxels> distance;
   std::fill_n(distance.begin(), size, std::numeric_limits<float>::infinity());
   std::array<float, kBlockVoxels> of_block;
-  for (const Listed& of : listed) {
+  for (const Listed::Cover& of : listed) {
     if (of.block != nullptr) ToFloats(of.block->distance.data(), kBlockVoxels, of_block.data());
     const float* its = of.block != nullptr ? of_block.data() : of.distance;
-    InsertByDistance(of.cover, its, of.id, {layers, distance.data(), ids.data()});
+    InsertByDistance(*of.voxels, its, of.id, {layers, distance.data(), ids.data()});
   }
 }
 

@@ -35,12 +35,14 @@ class AnchoredMap final : public LayeredMap {
   // unused; as many layers as the block has objects, up to K.
   using IndexBlock = std::vector<InstanceId>;
   struct Participants;
+  struct Listed;
 
   // Recomputes the index where `dirty_` says that its inputs changed. Logically const: the index is
   // a function of volumes and poses.
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
-  void ComputeBlock(const Index3& index, const Participants& participants, IndexBlock& ids) const;
+  void ComputeBlock(const Index3& index, const Participants& participants, Listed& scratch,
+                    IndexBlock& ids) const;
 
   int layers_;
   mutable BlockGrid<IndexBlock> index_;

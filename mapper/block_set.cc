@@ -13,11 +13,6 @@ void BlockBox::Extend(const Index3& index) {
   high = {std::max(high.x, index.x), std::max(high.y, index.y), std::max(high.z, index.z)};
 }
 
-bool BlockBox::Holds(const Index3& index) const {
-  return !is_empty && index.x >= low.x && index.y >= low.y && index.z >= low.z &&
-         index.x <= high.x && index.y <= high.y && index.z <= high.z;
-}
-
 bool BlockBox::Meets(const BlockBox& other) const {
   return !is_empty && !other.is_empty && low.x <= other.high.x && low.y <= other.high.y &&
          low.z <= other.high.z && other.low.x <= high.x && other.low.y <= high.y &&

@@ -17,7 +17,10 @@ struct BlockBox {
   bool is_empty = true;
 
   void Extend(const Index3& index);
-  bool Holds(const Index3& index) const;
+  bool Holds(const Index3& index) const {
+    return !is_empty && index.x >= low.x && index.y >= low.y && index.z >= low.z &&
+           index.x <= high.x && index.y <= high.y && index.z <= high.z;
+  }
   // Whether they have a block in common.
   bool Meets(const BlockBox& other) const;
 };

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/units.h"
+
 namespace tsdfpp {
 namespace {
-
-constexpr double kCm2PerM2 = 1e4;
 
 template <typename Keep>
 Selection Narrow(const Selection& within, const Keep& keep) {

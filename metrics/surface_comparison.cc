@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/units.h"
 #include "metrics/mesh_tools.h"
 #include "metrics/normal_agreement.h"
 #include "metrics/point_index.h"
@@ -13,7 +14,6 @@
 namespace tsdfpp {
 namespace {
 
-constexpr double kCm2PerM2 = 1e4;
 // Longest sides that differ more than this are of different units, not of different coverage.
 constexpr double kMostSizeRatio = 50;
 

@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "core/random.h"
+#include "core/units.h"
 #include "metrics/mesh_tools.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kCm2PerM2 = 1e4;
 
 using Piece = std::array<Eigen::Vector3d, 3>;
 

@@ -3,15 +3,13 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
+#include "core/units.h"
 #include "metrics/relative_error.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 // Whether the points (whose mean is zero) are within 1e-5 of their extent of a line.
 bool OnOneLine(const Eigen::Matrix3Xd& centred) {

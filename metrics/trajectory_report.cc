@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <numbers>
+#include "core/units.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 MeasuredSummary Summarise(std::vector<double> errors, double unit, const std::string& why_empty) {
   for (double& error : errors) error *= unit;

@@ -15,7 +15,7 @@ status=0
 if [ "$gates_only" = yes ]; then exit "$status"; fi
 "$tsdfpp" gate results/gates.toml --profile quick --audit --out "$out/gates" || status=$?
 for preset in asan tsan; do ROOMS="core;mapper;tests" bash scripts/sanitizers.sh "$preset" || status=$?; done
-cmake --preset release -B build/plain -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON && cmake --build build/plain || status=$?
+cmake --preset release -B build/plain -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DCMAKE_UNITY_BUILD=OFF && cmake --build build/plain || status=$?
 for experiment in eval/experiments/*.toml; do
   "$tsdfpp" sweep "$experiment" --out "$out/experiments/$(basename "$experiment" .toml)" || status=$?
 done

@@ -15,9 +15,6 @@ namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-using Json = nlohmann::json;
-
-constexpr double kRate_hz = 30;
 constexpr double kNearestObject_m = 0.02;
 
 bool Exists(const fs::path& path) {
@@ -26,11 +23,12 @@ bool Exists(const fs::path& path) {
 }
 
 // The numbers of a list, or nothing where it is none of this length.
-std::optional<std::vector<double>> Numbers(const Json& json, const char* key, std::size_t count) {
+std::optional<std::vector<double>> Numbers(const nlohmann::json& json, const char* key,
+                                           std::size_t count) {
   const auto list = json.find(key);
   if (list == json.end() || !list->is_array() || list->size() != count) return std::nullopt;
   std::vector<double> numbers;
-  for (const Json& number : *list) {
+  for (const nlohmann::json& number : *list) {
     if (!number.is_number()) return std::nullopt;
     numbers.push_back(number.get<double>());
   }
@@ -38,7 +36,7 @@ std::optional<std::vector<double>> Numbers(const Json& json, const char* key, st
 }
 
 // R (9 numbers, row-wise) and t (3, millimetres) of a file's object.
-Expected<Pose> PoseOf(const Json& json, const char* rotation, const char* translation,
+Expected<Pose> PoseOf(const nlohmann::json& json, const char* rotation, const char* translation,
                       const std::string& where) {
   const auto r = Numbers(json, rotation, 9);
   const auto t = Numbers(json, translation, 3);
@@ -52,11 +50,11 @@ Expected<Pose> PoseOf(const Json& json, const char* rotation, const char* transl
 }
 
 // A file's members by image number.
-Expected<std::map<int, Json>> ReadByImage(const fs::path& path) {
+Expected<std::map<int, nlohmann::json>> ReadByImage(const fs::path& path) {
   TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  const Json json = Json::parse(text, nullptr, false);
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) return DataError("{}: not a JSON object", path.string());
-  std::map<int, Json> images;
+  std::map<int, nlohmann::json> images;
   for (const auto& [key, value] : json.items()) {
     const auto number = ParseWholeNumber(key);
     if (!number) return DataError("{}: '{}' is not the number of an image", path.string(), key);
@@ -72,7 +70,7 @@ class BopOpener {
     sequence_.format = DatasetFormat::kBop;
     const fs::path absolute = fs::absolute(scene_ / "").lexically_normal().parent_path();
     sequence_.size_source = "as the first depth image";
-    sequence_.rate_hz = kRate_hz;
+    sequence_.rate_hz = kUsualRate_hz;
     dataset_ = Exists(scene_ / "models") ? scene_ : absolute.parent_path().parent_path();
     // A scene's own name is a number only.
     sequence_.name = absolute.filename().string();
@@ -116,7 +114,7 @@ class BopOpener {
       }
       FrameFiles frame;
       frame.number = number;
-      frame.time_s = number / kRate_hz;
+      frame.time_s = number / kUsualRate_hz;
       frame.camera = {0, 0, (*k)[0], (*k)[4], (*k)[2], (*k)[5]};
       frame.depth_units_per_m = bop::kMillimetres / scale->get<double>();
       frame.depth = scene_ / bop::ImageFile("depth", number);
@@ -153,7 +151,7 @@ class BopOpener {
       if (image == images_.end()) return DataError("{} is not in {}", where, bop::kCamera);
       if (!list.is_array()) return DataError("{}: not a list of objects", where);
       int place = 0;
-      for (const Json& json : list) {
+      for (const nlohmann::json& json : list) {
         const std::string entry = fmt::format("{}, object {}", where, place);
         const auto id = json.is_object() ? json.find("obj_id") : json.end();
         if (!json.is_object() || id == json.end() || !id->is_number_integer() ||
@@ -203,10 +201,10 @@ class BopOpener {
 
   Expected<void> SetObjects() {
     const fs::path path = dataset_ / bop::kModelsInfo;
-    Json models = Json::object();
+    nlohmann::json models = nlohmann::json::object();
     if (Exists(path)) {
       TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-      models = Json::parse(text, nullptr, false);
+      models = nlohmann::json::parse(text, nullptr, false);
       if (!models.is_object()) return DataError("{}: not a JSON object", path.string());
     }
     std::map<int, int> instances;  // by obj_id
@@ -216,7 +214,8 @@ class BopOpener {
       const auto model = models.find(std::to_string(obj_id));
       if (model != models.end() && model->is_object()) {
         // Only our own files have these.
-        name = model->value("name", Json(name)).is_string() ? model->value("name", name) : name;
+        name = model->value("name", nlohmann::json(name)).is_string() ? model->value("name", name)
+                                                                      : name;
         semantic_class = model->contains("class") && model->at("class").is_string()
                              ? model->at("class").get<std::string>()
                              : semantic_class;

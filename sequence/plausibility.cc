@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 
+#include "core/units.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -126,8 +128,6 @@ std::vector<Explanation> Explanations(std::optional<double> units_per_m) {
   }
   return all;
 }
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 struct Motion {
   double angle = 0;  // radians

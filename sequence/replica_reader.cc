@@ -10,8 +10,6 @@ namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kRate_hz = 30;
-
 struct ReplicaCamera {
   Intrinsics camera;
   double units_per_m = 0;
@@ -55,7 +53,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
   sequence.format = DatasetFormat::kReplica;
   sequence.name = NameOfFolder(folder);
   sequence.size_source = params.filename().string();
-  sequence.rate_hz = kRate_hz;
+  sequence.rate_hz = kUsualRate_hz;
 
   const fs::path trajectory = folder / "traj.txt";
   TSDFPP_ASSIGN(const std::vector<TextLine> lines, ReadTextLines(trajectory));
@@ -75,7 +73,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
     }
     FrameFiles frame;
     frame.number = *number;
-    frame.time_s = *number / kRate_hz;
+    frame.time_s = *number / kUsualRate_hz;
     frame.depth = folder / "results" / name;
     const std::string stem = fmt::format("frame{:06d}", *number);
     frame.colour = folder / "results" / (stem + ".jpg");

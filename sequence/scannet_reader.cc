@@ -9,7 +9,6 @@ namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kRate_hz = 30;
 constexpr Intrinsics kScannetDefault{640, 480, 577.870605, 577.870605, 319.5, 239.5};
 
 // ScanNet marks frames that its reconstruction lost with infinite poses.
@@ -37,7 +36,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenScannet(const fs::path& folder,
   FileSequence sequence;
   sequence.format = DatasetFormat::kScannet;
   sequence.name = NameOfFolder(folder);
-  sequence.rate_hz = kRate_hz;
+  sequence.rate_hz = kUsualRate_hz;
   std::error_code code;
   Intrinsics camera = kScannetDefault;
   sequence.size_source = "ScanNet's default camera";
@@ -75,7 +74,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenScannet(const fs::path& folder,
     }
     frame.T_WC = *pose;
     frame.number = number;
-    frame.time_s = number / kRate_hz;
+    frame.time_s = number / kUsualRate_hz;
     frame.depth = folder / "depth" / (stem + ".png");
     frame.colour = ImageOf(folder / "color", stem);
     if (has_ids) {

@@ -7,7 +7,6 @@ namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kRate_hz = 30;
 constexpr Intrinsics kSevenScenesDefault{640, 480, 585, 585, 320, 240};
 constexpr std::uint16_t kNoDepth = 65535;
 
@@ -20,7 +19,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
   sequence.format = DatasetFormat::kSevenScenes;
   sequence.name = NameOfFolder(folder);
   sequence.no_depth = kNoDepth;
-  sequence.rate_hz = kRate_hz;
+  sequence.rate_hz = kUsualRate_hz;
   Intrinsics camera = kSevenScenesDefault;
   sequence.size_source = "7-Scenes' default camera";
   std::error_code code;
@@ -39,7 +38,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
     const std::string stem = name.substr(0, name.size() - std::string(".depth.png").size());
     FrameFiles frame;
     frame.number = *number;
-    frame.time_s = *number / kRate_hz;
+    frame.time_s = *number / kUsualRate_hz;
     frame.depth = folder / name;
     frame.colour = folder / (stem + ".color.png");
     const fs::path jpeg = folder / (stem + ".color.jpg");

@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "core/random.h"
+#include "core/units.h"
 #include "sim/parallel_rows.h"
 #include "sim/sensor_streams.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 std::uint32_t PixelKey(const cv::Mat& image, int v, int u) {
   return static_cast<std::uint32_t>(v * image.cols + u);

@@ -1,14 +1,11 @@
 #include "sim/pose_noise.h"
 
-#include <numbers>
-
 #include "core/random.h"
+#include "core/units.h"
 #include "sim/sensor_streams.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 Eigen::Vector3d Step(std::uint64_t seed, SensorStream stream, int frame) {
   const auto draw = GaussianDraw(seed, stream, static_cast<std::uint64_t>(frame));

@@ -12,12 +12,12 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 7;
+constexpr std::uint64_t kTextureSeed = 7;
 
 // Smooth noise in [0, 1): random numbers on a lattice of `cells_x` by `cells_y` that wraps around,
 // joined by smoothsteps. u and v in [0, 1).
 double Noise(std::uint32_t stream, double u, double v, int cells_x, int cells_y,
-             std::uint64_t seed = kSeed) {
+             std::uint64_t seed = kTextureSeed) {
   const auto at = [&](int i, int j) {
     return UniformDraw(seed, stream,
                        static_cast<std::uint64_t>((j % cells_y) * cells_x) +
@@ -58,7 +58,7 @@ std::array<double, 3> Wood(double u, double v) {
   constexpr int kBoards = 8;
   const int board = static_cast<int>(v * kBoards);
   const double across = v * kBoards - board;
-  const double shade = UniformDraw(kSeed, 1, static_cast<std::uint64_t>(board))[0];
+  const double shade = UniformDraw(kTextureSeed, 1, static_cast<std::uint64_t>(board))[0];
   const double grain = Noise(2, u, v, 6, 160);
   const double broad = Noise(3, u, v, 4, 24);
   const double seam = std::min(across, 1 - across) < 0.02 ? 0.72 : 1.0;

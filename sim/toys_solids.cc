@@ -10,7 +10,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kSegments = 48;  // of a turned shape
+constexpr int kSolidSegments = 48;  // of a turned shape
 constexpr double kMostBevel_m = 0.004;
 
 double Bevel(const Eigen::Vector3d& size) { return std::min(kMostBevel_m, 0.12 * size.minCoeff()); }
@@ -22,7 +22,7 @@ Shape Block(const Eigen::Vector3d& size) {
 
 // A turned profile of extent size.x() across, squeezed to size.y() along y.
 Shape Turned(const std::vector<Eigen::Vector2d>& profile, const Eigen::Vector3d& size) {
-  Shape shape = MakeLathe(profile, kSegments);
+  Shape shape = MakeLathe(profile, kSolidSegments);
   for (Eigen::Vector3d& vertex : shape.vertices) vertex.y() *= size.y() / size.x();
   return shape;
 }
@@ -32,7 +32,7 @@ Shape Cylinder(const Eigen::Vector3d& size) {
 }
 
 Shape Sphere(const Eigen::Vector3d& size) {
-  Shape shape = MakeLathe(BallProfile(0.5, 0.5), kSegments);
+  Shape shape = MakeLathe(BallProfile(0.5, 0.5), kSolidSegments);
   for (Eigen::Vector3d& vertex : shape.vertices) vertex = vertex.cwiseProduct(size);
   return shape;
 }

@@ -9,11 +9,11 @@ namespace {
 
 using Profile = std::vector<Eigen::Vector2d>;
 
-constexpr int kSegments = 64;  // of a turned shape
+constexpr int kVesselSegments = 64;  // of a turned shape
 constexpr double kCupHeight_m = 0.105;
 constexpr double kProud_m = 0.0003;  // of a painted band
 
-Shape CupShape() { return MakeCup(0.040, 0.052, kCupHeight_m, 0.006, kSegments); }
+Shape CupShape() { return MakeCup(0.040, 0.052, kCupHeight_m, 0.006, kVesselSegments); }
 
 // A painted band around the cup, from one height to another.
 Shape CupBand(double low, double high) {
@@ -28,7 +28,7 @@ Shape CupBand(double low, double high) {
                     {radius(high) - inside, high},
                     {0.030, 0.0045},
                     {0, 0.0045}},
-                   kSegments);
+                   kVesselSegments);
 }
 
 }  // namespace
@@ -64,7 +64,7 @@ std::vector<ModelPart> MakeBowl() {
                            std::numbers::pi / 2 * (1 - static_cast<double>(i) / kSteps)));
   }
   profile.emplace_back(0, wall + 0.003);
-  return {{"bowl", MakeLathe(profile, kSegments), {92, 150, 140}, "", ""}};
+  return {{"bowl", MakeLathe(profile, kVesselSegments), {92, 150, 140}, "", ""}};
 }
 
 std::vector<ModelPart> MakePlate() {
@@ -75,8 +75,8 @@ std::vector<ModelPart> MakePlate() {
   // Comes out of the plate on its slope alone.
   const Profile ring{{0, 0.003},       {0.066, 0.003},  {0.089, 0.0110}, {0.0985, 0.0145},
                      {0.0985, 0.0179}, {0.089, 0.0152}, {0.070, 0.0050}, {0, 0.0045}};
-  return {{"plate", MakeLathe(profile, kSegments), {236, 236, 230}, "", ""},
-          {"ring", MakeLathe(ring, kSegments), {52, 92, 156}, "", ""}};
+  return {{"plate", MakeLathe(profile, kVesselSegments), {236, 236, 230}, "", ""},
+          {"ring", MakeLathe(ring, kVesselSegments), {52, 92, 156}, "", ""}};
 }
 
 std::vector<ModelPart> MakeTray() {
@@ -89,9 +89,9 @@ std::vector<ModelPart> MakeBottle() {
                      {0.035, 0.124},  {0.029, 0.138},  {0.021, 0.152}, {0.016, 0.164},
                      {0.0145, 0.176}, {0.0145, 0.190}, {0, 0.190}};
   return {
-      {"body", MakeLathe(body, kSegments), {46, 118, 84}, "", ""},
+      {"body", MakeLathe(body, kVesselSegments), {46, 118, 84}, "", ""},
       {"label",
-       MakeLathe(CylinderProfile(0.037 + kProud_m, 0.030, 0.096, 0.0005), kSegments),
+       MakeLathe(CylinderProfile(0.037 + kProud_m, 0.030, 0.096, 0.0005), kVesselSegments),
        {240, 226, 180},
        "",
        ""},

@@ -18,13 +18,12 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::CommandOutput;
+using test::kData;
+using test::kEnvironment;
+using test::kUsage;
 using test::RunTsdfpp;
 using test::TempFolder;
 using Variables = std::map<std::string, std::string>;
-
-constexpr int kUsage = 2;
-constexpr int kEnvironment = 3;
-constexpr int kData = 4;
 
 // Four frames of a few pixels.
 const char* const kTinyScene = R"(name = "tiny"

@@ -15,10 +15,9 @@ namespace tsdfpp {
 namespace {
 
 namespace fs = std::filesystem;
+using test::kData;
+using test::kUsage;
 using test::RunTsdfpp;
-
-constexpr int kUsage = 2;
-constexpr int kData = 4;
 
 const char* const kScene = R"(name = "tiny"
 purpose = "To be spoilt."

@@ -17,11 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::CommandOutput;
+using test::kData;
+using test::kUsage;
 using test::RunTsdfpp;
 using test::TempFolder;
-
-constexpr int kUsage = 2;
-constexpr int kData = 4;
 
 const fs::path kShared = fs::path(TSDFPP_SHARED_DIR) / "data";
 const fs::path kReferences = kShared / "metric_refs";

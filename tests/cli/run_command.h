@@ -8,6 +8,11 @@
 
 namespace tsdfpp::test {
 
+// The command's exit codes (docs/command-line.md), on purpose not taken from its own header.
+inline constexpr int kUsage = 2;
+inline constexpr int kEnvironment = 3;
+inline constexpr int kData = 4;
+
 struct CommandOutput {
   int exit_code = -1;  // -1 where it did not end by itself
   std::string out;

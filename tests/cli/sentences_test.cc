@@ -11,10 +11,9 @@ namespace tsdfpp {
 namespace {
 
 namespace fs = std::filesystem;
+using test::kData;
+using test::kUsage;
 using test::RunTsdfpp;
-
-constexpr int kUsage = 2;
-constexpr int kData = 4;
 
 struct Wrong {
   std::vector<std::string> words;  // '@' is the test's folder

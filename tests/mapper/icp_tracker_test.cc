@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "core/random.h"
+#include "core/units.h"
 #include "mapper/map_representation.h"
 #include "tests/reference/analytic_scene.h"
 #include "tests/reference/icp_reference.h"
@@ -21,8 +22,7 @@ namespace {
 using reference::MakePose;
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr double kVoxel_m = 0.01;
-constexpr double kDegree = EIGEN_PI / 180;
+constexpr double kIcpVoxel_m = 0.01;
 
 // Against the truth. Matching points with vertices some millimetres apart, and flat faces with
 // smooth normals, biases the optimum: brute force is off by up to 0.1 mm and 0.075 deg on these
@@ -158,13 +158,13 @@ void ExpectMotionsRecovered(TriangleMesh mesh_O) {
   for (const Pose& motion : SmallMotions()) {
     const Pose truth = About(centroid_W, motion);
     const Points new_W = Moved(truth, old_W);
-    const TrackResult result = TrackObject(new_W, model_W, kVoxel_m, {});
+    const TrackResult result = TrackObject(new_W, model_W, kIcpVoxel_m, {});
     ASSERT_TRUE(result.converged);
     EXPECT_LT((result.T_O * centroid_W - truth * centroid_W).norm(), kTruth_m);
     EXPECT_LT(Angle(result.T_O, truth), kTruth_rad);
     EXPECT_EQ(result.correspondences, 1500);
     const Pose back =
-        reference::BruteForceIcp(new_W, reference::OrientedVertices(model_W), 3 * kVoxel_m, 12);
+        reference::BruteForceIcp(new_W, reference::OrientedVertices(model_W), 3 * kIcpVoxel_m, 12);
     const Eigen::Vector3d new_centroid_W = truth * centroid_W;
     EXPECT_LT((result.T_O.inverse() * new_centroid_W - back * new_centroid_W).norm(), kReference_m);
     EXPECT_LT(Angle(result.T_O.inverse(), back), kReference_rad);
@@ -213,7 +213,7 @@ TEST(TrackObject, RecoversTheMotionOfAnObjectInTheMap) {
   scene.T_WO[kId] = motion;
   const Frame frame = reference::Render(scene, T_WC, 3, camera);
   const Points segment_W = SegmentPoints(frame, frame.mask, kId, {});
-  const TrackResult result = TrackObject(segment_W, map->ObjectMesh(kId), kVoxel_m, {});
+  const TrackResult result = TrackObject(segment_W, map->ObjectMesh(kId), kIcpVoxel_m, {});
   ASSERT_TRUE(result.converged);
   const Eigen::Vector3d before_W = motion.inverse() * Centroid(segment_W);
   EXPECT_LT((result.T_O * before_W - motion * before_W).norm(), kMapped_m);
@@ -258,10 +258,10 @@ TEST(TrackObject, MinimisesByLevenbergMarquardtNotByLinearLeastSquares) {
 
   // After a linear first iteration the second one would have to turn by more than "settled".
   const double rest_rad = Angle(reference::LinearisedStep(moved, islands.planes), motion.inverse());
-  const double settled_rad = 0.5 * config.settled_voxels * kVoxel_m / moved.front().norm();
+  const double settled_rad = 0.5 * config.settled_voxels * kIcpVoxel_m / moved.front().norm();
   ASSERT_GT(rest_rad, 2 * settled_rad);
 
-  const TrackResult result = TrackObject(moved, islands.mesh, kVoxel_m, config);
+  const TrackResult result = TrackObject(moved, islands.mesh, kIcpVoxel_m, config);
   EXPECT_TRUE(result.converged);
   EXPECT_EQ(result.iterations, 2);
   EXPECT_LT(Angle(result.T_O, motion), kExact_rad);
@@ -273,7 +273,7 @@ TEST(TrackObject, GivesTheMotionFromTheOldPoseToTheNew) {
   const TriangleMesh model_W = BumpyEllipsoid();
   const Points old_W = VisiblePoints(model_W, 1000);
   const Pose motion = MakePose(0, kView, Eigen::Vector3d(0.01, 0, 0));
-  const TrackResult result = TrackObject(Moved(motion, old_W), model_W, kVoxel_m, {});
+  const TrackResult result = TrackObject(Moved(motion, old_W), model_W, kIcpVoxel_m, {});
   ASSERT_TRUE(result.converged);
   EXPECT_NEAR((result.T_O * old_W[0] - old_W[0]).x(), 0.01, kTruth_m);
 }
@@ -285,7 +285,7 @@ TEST(TrackObject, MeasuresTheDistanceThatRemains) {
   for (std::size_t i = 0; i < islands.points.size(); ++i) {
     islands.points[i] += (i % 2 == 0 ? kOff_m : -kOff_m) * islands.planes[i].n;
   }
-  const TrackResult result = TrackObject(islands.points, islands.mesh, kVoxel_m, {});
+  const TrackResult result = TrackObject(islands.points, islands.mesh, kIcpVoxel_m, {});
   ASSERT_TRUE(result.converged);
   const Pose back = reference::BruteForceIcp(islands.points, islands.planes, 0.03, 5);
   double sum = 0;
@@ -312,7 +312,7 @@ TEST(TrackObject, DoesNotSlideAlongAPlane) {
   for (int i = 0; i < 900; ++i) {
     points.emplace_back(0.053 + 0.003 * (i % 30), 0.047 + 0.003 * (i / 30), 1.004);
   }
-  const TrackResult result = TrackObject(points, model_W, kVoxel_m, {});
+  const TrackResult result = TrackObject(points, model_W, kIcpVoxel_m, {});
   ASSERT_TRUE(result.converged);
   EXPECT_LT((result.T_O * points[0] - points[0] - Eigen::Vector3d(0, 0, 0.004)).norm(), kExact_m);
   EXPECT_LT(Angle(result.T_O, Pose::Identity()), kExact_rad);
@@ -365,14 +365,14 @@ TEST(TrackObject, FailsToTheIdentity) {
   const Pose motion =
       About(Centroid(old_W), MakePose(kDegree, kView, 0.005 * kView.unitOrthogonal()));
   const Points new_W = Moved(motion, old_W);
-  ASSERT_TRUE(TrackObject(new_W, model_W, kVoxel_m, {}).converged);
+  ASSERT_TRUE(TrackObject(new_W, model_W, kIcpVoxel_m, {}).converged);
   for (const Trouble& trouble : troubles) {
     SCOPED_TRACE(trouble.name);
     Points points = new_W;
     TriangleMesh mesh = model_W;
     IcpConfig config;
     trouble.spoil(points, mesh, config);
-    const TrackResult result = TrackObject(points, mesh, kVoxel_m, config);
+    const TrackResult result = TrackObject(points, mesh, kIcpVoxel_m, config);
     EXPECT_FALSE(result.converged);
     EXPECT_EQ(result.T_O.matrix(), Pose::Identity().matrix());
   }

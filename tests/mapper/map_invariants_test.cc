@@ -14,8 +14,6 @@ namespace {
 
 using reference::MakePose;
 
-bool IsOneField(Method method) { return method == Method::kTsdf || method == Method::kTsdfMin; }
-
 class Invariants : public EveryMethodTest {
  protected:
   // A block of the brick with a voxel that is observed, and one that is not.

@@ -18,7 +18,6 @@ using reference::Scene;
 
 constexpr InstanceId kNew = 7;
 
-bool IsOneField(Method method) { return method == Method::kTsdf || method == Method::kTsdfMin; }
 // Whether values stay in the object's own frame.
 bool IsAnchored(Method method) {
   return method == Method::kTsdfppAnchored || method == Method::kVolumes;

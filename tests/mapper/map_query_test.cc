@@ -15,8 +15,6 @@ namespace {
 using reference::MakePose;
 using reference::Scene;
 
-constexpr double kVoxel_m = kToyVoxel_m;
-
 class Query : public EveryMethodTest {};
 TSDFPP_FOR_EVERY_METHOD(Query);
 
@@ -90,7 +88,7 @@ TEST_P(Query, DistanceAndGradientOfASphere) {
   for (int i = 0; i < 1000; ++i) {
     const double tilt = dice.Uniform(0, 0.35);
     const double turn = dice.Uniform(0, 6.28);
-    const double d = dice.Uniform(-kVoxel_m / 2, kVoxel_m / 2);
+    const double d = dice.Uniform(-kToyVoxel_m / 2, kToyVoxel_m / 2);
     const Eigen::Vector3d radial(std::sin(tilt) * std::cos(turn), std::sin(tilt) * std::sin(turn),
                                  std::cos(tilt));
     const auto visible = query.At(Eigen::Vector3d((kRadius_m + d) * radial)).visible;
@@ -149,7 +147,7 @@ TEST_P(LayeredQuery, AgreesWithTheDenseReference) {
     std::size_t expected = 0;
     for (const InstanceId id : ToyIds()) {
       const Pose T_LW = maps.dense().ObjectLattice(id).inverse();
-      const Eigen::Vector3d q = T_LW * p / kVoxel_m;
+      const Eigen::Vector3d q = T_LW * p / kToyVoxel_m;
       const Eigen::Vector3i base = q.array().floor().matrix().cast<int>();
       const Slow slow = SlowAt(maps.dense(), id, q, base);
       const auto found = std::find_if(answer.objects.begin(), answer.objects.end(),
@@ -167,7 +165,7 @@ TEST_P(LayeredQuery, AgreesWithTheDenseReference) {
         const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(a);
         gradient_L[a] = (*SlowAt(maps.dense(), id, q + step, base).distance -
                          *SlowAt(maps.dense(), id, q - step, base).distance) /
-                        (2 * kStep * kVoxel_m);
+                        (2 * kStep * kToyVoxel_m);
       }
       const Eigen::Vector3d gradient_W = T_LW.linear().transpose() * gradient_L;
       ASSERT_LT((found->gradient_W.cast<double>() - gradient_W).norm(), kGradientRounding);
@@ -179,7 +177,7 @@ TEST_P(LayeredQuery, AgreesWithTheDenseReference) {
       ASSERT_LE(answer.objects[k - 1].distance_m, answer.objects[k].distance_m);
     }
     const Eigen::Vector3i nearest =
-        (p / kVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor().matrix().cast<int>();
+        (p / kToyVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor().matrix().cast<int>();
     const auto list = maps.dense().ListAt(nearest);
     const bool has_active =
         !list.empty() && std::any_of(answer.objects.begin(), answer.objects.end(),
@@ -203,7 +201,7 @@ TEST(QueryOfOneField, AnswersWithTheLabelOfTheNearestVoxel) {
     if (!answer.visible) continue;
     ASSERT_EQ(answer.objects.size(), 1U);
     const Eigen::Vector3i nearest =
-        (p / kVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor().matrix().cast<int>();
+        (p / kToyVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor().matrix().cast<int>();
     const auto list = map->ListAt(nearest);
     ASSERT_EQ(answer.visible->id, list.empty() ? kBackground : list[0].id);
     ++answered[answer.visible->id];

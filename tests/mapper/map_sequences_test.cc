@@ -22,7 +22,7 @@ const bool kParametersSet = [] {
 
 // The toys of toy_scene.h in voxels of 4 cm, seen by 48x36 pixels: all that happens within 7 cm of
 // the middle of the table fits in 48x48x32 voxels, blocks and their turned corners included.
-constexpr double kVoxel_m = 0.04;
+constexpr double kCoarseVoxel_m = 0.04;
 constexpr double kStep_m = 0.01;
 constexpr int kMostSteps = 7;
 constexpr double kEventsOfSize = 0.12;  // at most 12 events, at RapidCheck's size of 100
@@ -93,7 +93,7 @@ struct Settings {
 
 MapConfig ConfigOf(Method method, const Settings& settings) {
   MapConfig config;
-  config.voxel_m = kVoxel_m;
+  config.voxel_m = kCoarseVoxel_m;
   config.trunc_front_voxels = 3;
   config.trunc_back_voxels = settings.thin_band ? 2 : 3;
   config.weight_cap = settings.soon_full ? 2 : 50;

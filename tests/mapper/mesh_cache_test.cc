@@ -17,7 +17,7 @@ namespace {
 using reference::MakePose;
 using reference::Scene;
 
-constexpr float kVoxel_m = 0.02F;
+constexpr float kMeshVoxel_m = 0.02F;
 constexpr float kBack_m = 0.08F;
 
 // Values at random, so that every set of inside corners turns up; where `rough`, unobserved voxels
@@ -47,11 +47,11 @@ TEST(WholeMesh, IsThatOfThePlainCode) {
   Dice dice(1);
   for (int i = 0; i < 6; ++i) {
     const TsdfGrid grid = RandomGrid(dice, 5 + 10 * i, i % 2 == 1);
-    const TriangleMesh mesh = ExtractMesh(grid, kVoxel_m);
+    const TriangleMesh mesh = ExtractMesh(grid, kMeshVoxel_m);
     EXPECT_GT(mesh.triangles.size(), 1000U);
-    EXPECT_TRUE(BytesOf(mesh) == BytesOf(reference::PlainMesh(grid, kVoxel_m))) << i;
+    EXPECT_TRUE(BytesOf(mesh) == BytesOf(reference::PlainMesh(grid, kMeshVoxel_m))) << i;
   }
-  EXPECT_TRUE(ExtractMesh(TsdfGrid(), kVoxel_m).triangles.empty());
+  EXPECT_TRUE(ExtractMesh(TsdfGrid(), kMeshVoxel_m).triangles.empty());
 }
 
 TEST(WholeMesh, IsTheSameForAnyNumberOfThreadsAndOrderOfBlocks) {
@@ -61,11 +61,11 @@ TEST(WholeMesh, IsTheSameForAnyNumberOfThreadsAndOrderOfBlocks) {
   for (auto entry = grid.entries().rbegin(); entry != grid.entries().rend(); ++entry) {
     backwards.FindOrAdd(entry->index) = *entry->block;
   }
-  const std::string bytes = BytesOf(ExtractMesh(grid, kVoxel_m));
-  EXPECT_TRUE(BytesOf(ExtractMesh(backwards, kVoxel_m)) == bytes);
+  const std::string bytes = BytesOf(ExtractMesh(grid, kMeshVoxel_m));
+  EXPECT_TRUE(BytesOf(ExtractMesh(backwards, kMeshVoxel_m)) == bytes);
   for (const std::size_t threads : {1U, 2U, 4U}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    EXPECT_TRUE(BytesOf(ExtractMesh(grid, kVoxel_m)) == bytes) << threads;
+    EXPECT_TRUE(BytesOf(ExtractMesh(grid, kMeshVoxel_m)) == bytes) << threads;
   }
 }
 
@@ -82,14 +82,14 @@ TEST(WholeMesh, OfABallAcrossBlocksHasNoOpenEdge) {
           const Index3 v = VoxelAt({x, y, z}, place);
           const double range = Eigen::Vector3d(v.x + 0.1, v.y - 0.2, v.z + 0.3).norm();
           block.distance[static_cast<std::size_t>(place)] =
-              static_cast<float>((range - kRadius_voxels) * kVoxel_m);
+              static_cast<float>((range - kRadius_voxels) * kMeshVoxel_m);
           block.weight[static_cast<std::size_t>(place)] = 1;
         }
         block.UpdateMasks(kBack_m);
       }
     }
   }
-  const TriangleMesh mesh = ExtractMesh(grid, kVoxel_m);
+  const TriangleMesh mesh = ExtractMesh(grid, kMeshVoxel_m);
   const Topology topology(mesh);
   EXPECT_EQ(topology.positions.size(), mesh.vertices.size()) << "a vertex is not shared";
   for (const auto& [edge, use] : topology.edges) {
@@ -98,7 +98,7 @@ TEST(WholeMesh, OfABallAcrossBlocksHasNoOpenEdge) {
   }
   EXPECT_EQ(topology.Euler(), 2);
   // The faceting of a ball of ten voxels loses well below 1 % of its volume.
-  const double ball = 4.0 / 3.0 * M_PI * std::pow(kRadius_voxels * kVoxel_m, 3);
+  const double ball = 4.0 / 3.0 * M_PI * std::pow(kRadius_voxels * kMeshVoxel_m, 3);
   EXPECT_NEAR(VolumeOf(mesh) / ball, 1, 0.01);
 }
 
@@ -143,10 +143,10 @@ TEST(MeshCache, FollowsAnyChangeOfAGrid) {
         grid = TsdfGrid(grid);
       }
     }
-    cache.Update(grid, kVoxel_m);
-    ASSERT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kVoxel_m))) << step;
+    cache.Update(grid, kMeshVoxel_m);
+    ASSERT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kMeshVoxel_m))) << step;
   }
-  EXPECT_GT(ExtractMesh(grid, kVoxel_m).triangles.size(), 1000U);
+  EXPECT_GT(ExtractMesh(grid, kMeshVoxel_m).triangles.size(), 1000U);
 }
 
 TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
@@ -156,8 +156,8 @@ TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
     FillAtRandom(grid.FindOrAdd({i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2}), dice, false);
   }
   GridMesh cache;
-  EXPECT_EQ(cache.Update(grid, kVoxel_m).changed, 125U);
-  const MeshWork nothing = cache.Update(grid, kVoxel_m);
+  EXPECT_EQ(cache.Update(grid, kMeshVoxel_m).changed, 125U);
+  const MeshWork nothing = cache.Update(grid, kMeshVoxel_m);
   EXPECT_EQ(nothing.blocks, 125U);
   EXPECT_EQ(nothing.changed, 0U);
   EXPECT_EQ(nothing.remade, 0U);
@@ -165,22 +165,22 @@ TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
   TsdfBlock& middle = *grid.Find({0, 0, 0});
   for (Half& distance : middle.distance) distance = distance * 0.9F;
   middle.UpdateMasks(kBack_m);
-  const MeshWork values = cache.Update(grid, kVoxel_m);
+  const MeshWork values = cache.Update(grid, kMeshVoxel_m);
   EXPECT_EQ(values.changed, 1U);
   EXPECT_EQ(values.remade, 4U) << "vertices on edges that end in the block lie in three others";
 
   middle.distance[0] = -middle.distance[0];
   middle.UpdateMasks(kBack_m);
-  const MeshWork sign = cache.Update(grid, kVoxel_m);
+  const MeshWork sign = cache.Update(grid, kMeshVoxel_m);
   EXPECT_EQ(sign.changed, 1U);
   EXPECT_LE(sign.remade, 27U);
   EXPECT_GE(sign.remade, 8U);
-  EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kVoxel_m)));
+  EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kMeshVoxel_m)));
 
   middle.Clear(0);
   middle.UpdateMasks(kBack_m);
-  cache.Update(grid, kVoxel_m);
-  EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kVoxel_m)));
+  cache.Update(grid, kMeshVoxel_m);
+  EXPECT_TRUE(BytesOf(Join({{&cache}})) == BytesOf(ExtractMesh(grid, kMeshVoxel_m)));
 }
 
 class KeptMeshes : public ::testing::TestWithParam<Method> {};

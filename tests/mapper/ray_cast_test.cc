@@ -71,7 +71,7 @@ class RayCast : public ::testing::TestWithParam<Method> {};
 INSTANTIATE_TEST_SUITE_P(Methods, RayCast, ::testing::ValuesIn(AllMethods()),
                          [](const auto& parameters) { return NameOf(parameters.param); });
 
-bool IsOneField(Method method) {
+bool KeepsOneSurface(Method method) {
   return method == Method::kTsdf || method == Method::kTsdfMin || method == Method::kTsdfppLiteral;
 }
 
@@ -98,7 +98,7 @@ TEST_P(RayCast, AgreesWithTinySteps) {
   const bool moving = GetParam() != Method::kTsdf && GetParam() != Method::kTsdfMin;
   const auto map = DrivenToys(GetParam(), config, moving);
   const reference::RayReference truth(*map, GetParam(), config, ToyBox(), ToyIds());
-  const int surfaces = IsOneField(GetParam()) ? 1 : 2;
+  const int surfaces = KeepsOneSurface(GetParam()) ? 1 : 2;
   RayCastOptions options;
   options.surfaces = surfaces;
   // Of the whole table, and with a long lens, whose tiles are smaller than blocks.
@@ -262,7 +262,7 @@ TEST_P(RayCast, WhatIsBehindIsWhatARemovalShows) {
         thirds += IdAt(cast[2], v, u) != kNoInstance ? 1 : 0;
       }
     }
-    const bool layered = !IsOneField(GetParam());
+    const bool layered = !KeepsOneSurface(GetParam());
     EXPECT_GT(seconds, layered ? 200 : -1);
     // With K = 2 a third object is in no list, so that what is active there hides it.
     EXPECT_GT(thirds, layered && GetParam() != Method::kTsdfpp ? 20 : -1);

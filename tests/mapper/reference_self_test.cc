@@ -13,12 +13,12 @@ namespace {
 using Vector3i = Eigen::Vector3i;
 using reference::DenseMap;
 
-constexpr double kVoxel_m = 1.0 / 32;
-constexpr auto kVoxel = static_cast<float>(kVoxel_m);
+constexpr double kBinaryVoxel_m = 1.0 / 32;
+constexpr auto kVoxel = static_cast<float>(kBinaryVoxel_m);
 
 MapConfig WallConfig() {
   MapConfig config;
-  config.voxel_m = kVoxel_m;
+  config.voxel_m = kBinaryVoxel_m;
   config.trunc_front_voxels = 3;
   config.trunc_back_voxels = 2;
   return config;
@@ -31,7 +31,7 @@ reference::Box WallBox() { return {{-24, -24, -8}, {23, 23, 31}}; }
 Frame Wall(double voxels, InstanceId label = 0, cv::Scalar colour = {100, 50, 25}) {
   Frame frame;
   frame.intrinsics = {33, 33, 16, 16, 16, 16};
-  frame.depth = cv::Mat(33, 33, CV_32FC1, cv::Scalar(voxels * kVoxel_m));
+  frame.depth = cv::Mat(33, 33, CV_32FC1, cv::Scalar(voxels * kBinaryVoxel_m));
   frame.colour = cv::Mat(33, 33, CV_8UC3, colour);
   frame.mask = cv::Mat(33, 33, CV_16UC1, cv::Scalar(label));
   return frame;
@@ -105,7 +105,7 @@ TEST(ReferenceSelfTest, AMoveByOneVoxelShiftsAndErodes) {
   map->SetObjectPose(4, Pose::Identity());
   Fuse(*map, Wall(16, 4));
   Pose moved = Pose::Identity();
-  moved.translation().z() = kVoxel_m;
+  moved.translation().z() = kBinaryVoxel_m;
   map->SetObjectPose(4, moved);
   // Voxel z takes voxel z - 1 where the eight voxels z - 1, z (and 0, 1 sideways) are observed.
   // Beside the axis 18 is a little farther than the band's two voxels along its ray, so 8..17 are.
@@ -116,7 +116,7 @@ TEST(ReferenceSelfTest, AMoveByOneVoxelShiftsAndErodes) {
   EXPECT_FALSE(map->ValueAt(4, {0, 0, 8}));
   EXPECT_FALSE(map->ValueAt(4, {0, 0, 18}));
   // Half a voxel back: means of neighbours, again one voxel fewer.
-  moved.translation().z() = kVoxel_m / 2;
+  moved.translation().z() = kBinaryVoxel_m / 2;
   map->SetObjectPose(4, moved);
   EXPECT_EQ(map->ValueAt(4, {0, 0, 16})->distance_m, 0.5F * kVoxel);
   EXPECT_FALSE(map->ValueAt(4, {0, 0, 17}));
@@ -140,7 +140,7 @@ TEST(ReferenceSelfTest, TheMovedObjectBecomesActive) {
   map->SetObjectPose(4, Pose::Identity());
   Fuse(*map, Wall(10.5, 4));
   Pose moved = Pose::Identity();
-  moved.translation().z() = 6 * kVoxel_m;
+  moved.translation().z() = 6 * kBinaryVoxel_m;
   map->SetObjectPose(4, moved);
   EXPECT_EQ(map->ListAt({0, 0, 16}), (std::vector<Listing>{{4, 1}, {0, 1}}));
   EXPECT_TRUE(map->ListAt({0, 0, 10}).empty());
@@ -185,12 +185,12 @@ TEST(ReferenceSelfTest, AnchoredOrdersByDistanceAndMovesOnlyTheIndex) {
   Fuse(*map, Wall(16.5, 0));
   Fuse(*map, Wall(10.5, 4));
   Pose moved = Pose::Identity();
-  moved.translation().z() = 5.25 * kVoxel_m;  // its surface is now at 15.75
+  moved.translation().z() = 5.25 * kBinaryVoxel_m;  // its surface is now at 15.75
   map->SetObjectPose(4, moved);
   EXPECT_EQ(map->ListAt({0, 0, 16}), (std::vector<Listing>{{4, 0}, {0, 0}}));
   EXPECT_TRUE(map->ListAt({0, 0, 15}).empty());  // 9.75 in its lattice, where no cube is crossed
   EXPECT_EQ(map->ValueAt(4, {0, 0, 10})->distance_m, 0.5F * kVoxel);  // its lattice has not moved
-  moved.translation().z() = 7 * kVoxel_m;                             // 17.5: behind the other
+  moved.translation().z() = 7 * kBinaryVoxel_m;                       // 17.5: behind the other
   map->SetObjectPose(4, moved);
   EXPECT_EQ(map->ListAt({0, 0, 17}), (std::vector<Listing>{{0, 0}, {4, 0}}));
 }

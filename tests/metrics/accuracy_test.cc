@@ -8,7 +8,6 @@
 namespace tsdfpp {
 namespace {
 
-constexpr double kFloat_m = 1e-6;
 constexpr std::array<double, 3> kThresholds_m = {0.005, 0.01, 0.02};
 
 SampleSet Samples(const TriangleMesh& mesh) { return SampleReconstruction(mesh, {}); }
@@ -19,17 +18,17 @@ TEST(Accuracy, OffsetPlaneIsItsOffset) {
   TriangleMesh mesh = testing::Sheet({-0.5F, -0.5F, 0.007F}, {1, 0, 0}, {0, 1, 0}, 30);
   const AccuracyScores above =
       ScoreAccuracy(Samples(mesh), {&truth, Pose::Identity()}, std::nullopt, kThresholds_m);
-  EXPECT_NEAR(*above.distance.mean_m.value, 0.007, kFloat_m);
-  EXPECT_NEAR(*above.distance.rmse_m.value, 0.007, kFloat_m);
-  EXPECT_NEAR(*above.distance.p95_m.value, 0.007, kFloat_m);
-  EXPECT_NEAR(*above.bias_m.value, 0.007, kFloat_m);
+  EXPECT_NEAR(*above.distance.mean_m.value, 0.007, testing::kFloat_m);
+  EXPECT_NEAR(*above.distance.rmse_m.value, 0.007, testing::kFloat_m);
+  EXPECT_NEAR(*above.distance.p95_m.value, 0.007, testing::kFloat_m);
+  EXPECT_NEAR(*above.bias_m.value, 0.007, testing::kFloat_m);
   EXPECT_EQ(*above.precision[0].value, 0);
   EXPECT_EQ(*above.precision[1].value, 1);
   EXPECT_NEAR(above.area_m2, 1, 1e-5);
   for (auto& vertex : mesh.vertices) vertex.z() = -0.007F;
   const AccuracyScores below =
       ScoreAccuracy(Samples(mesh), {&truth, Pose::Identity()}, std::nullopt, kThresholds_m);
-  EXPECT_NEAR(*below.bias_m.value, -0.007, kFloat_m);
+  EXPECT_NEAR(*below.bias_m.value, -0.007, testing::kFloat_m);
 }
 
 TEST(Accuracy, InflatedSphere) {
@@ -56,8 +55,8 @@ TEST(Accuracy, RegionTakesWhatIsNearestToIt) {
   const auto score = [&](std::uint16_t region) {
     return ScoreAccuracy(samples, {&truth, Pose::Identity()}, region, kThresholds_m);
   };
-  EXPECT_NEAR(*score(0).distance.mean_m.value, 0.02, kFloat_m);
-  EXPECT_NEAR(*score(1).distance.mean_m.value, 0.01, kFloat_m);
+  EXPECT_NEAR(*score(0).distance.mean_m.value, 0.02, testing::kFloat_m);
+  EXPECT_NEAR(*score(1).distance.mean_m.value, 0.01, testing::kFloat_m);
   EXPECT_NEAR(score(1).area_m2, 0.5, 1e-3);
 }
 
@@ -103,7 +102,7 @@ TEST(FindNearestTruth, EqualsTheSmallestOfAll) {
   const auto to_one = one.index_O().Nearest(points).distance_m;
   const auto to_two = two.index_O().Nearest(TransformPoints(T_W2.inverse(), points)).distance_m;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    ASSERT_NEAR(nearest.distance_m[i], std::min(to_one[i], to_two[i]), kFloat_m);
+    ASSERT_NEAR(nearest.distance_m[i], std::min(to_one[i], to_two[i]), testing::kFloat_m);
     ASSERT_EQ(nearest.object[i], to_one[i] <= to_two[i] ? 1 : 2);
   }
 }

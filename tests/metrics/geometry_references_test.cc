@@ -53,7 +53,7 @@ TEST(GeometryReferences, AccuracyToTheSurfaceEqualsTrimesh) {
   // trimesh looks among candidate triangles and misses the nearest for some points: its mean is
   // 0.3 um above the exact one (double precision, every triangle), which ours equals.
   constexpr double kTrimesh_m = 5e-7;
-  constexpr double kFloat_m = 1e-8;
+  constexpr double kMean_m = 1e-8;
   const auto& distances = expected["accuracy_pred_to_gtmesh"];
   EXPECT_NEAR(*scores.distance.mean_m.value, distances["mean"], kTrimesh_m);
   EXPECT_NEAR(*scores.distance.rmse_m.value, distances["rmse"], kTrimesh_m);
@@ -61,7 +61,7 @@ TEST(GeometryReferences, AccuracyToTheSurfaceEqualsTrimesh) {
   for (const auto& point : samples.points) {
     sum += reference::DistanceToMesh(point, truth.model().mesh_O, [](std::size_t) { return true; });
   }
-  EXPECT_NEAR(*scores.distance.mean_m.value, sum / 3846, kFloat_m);
+  EXPECT_NEAR(*scores.distance.mean_m.value, sum / 3846, kMean_m);
   for (std::size_t k = 0; k < thresholds_m.size(); ++k) {
     const auto& at =
         expected["threshold_" + std::to_string(std::lround(1e3 * thresholds_m[k])) + "mm"];

@@ -32,10 +32,9 @@ TEST(Completion, OffsetPlaneIsItsOffset) {
   const SampleMatch match =
       MatchSamples(samples, SelectAll(samples), Pose::Identity(), SurfaceIndex(larger), kTau_m);
   const DistanceSummary summary = CompletionDistances(samples, SelectAll(samples), match);
-  constexpr double kFloat_m = 1e-6;
-  EXPECT_NEAR(*summary.mean_m.value, 0.004, kFloat_m);
-  EXPECT_NEAR(*summary.rmse_m.value, 0.004, kFloat_m);
-  EXPECT_NEAR(*summary.p95_m.value, 0.004, kFloat_m);
+  EXPECT_NEAR(*summary.mean_m.value, 0.004, testing::kFloat_m);
+  EXPECT_NEAR(*summary.rmse_m.value, 0.004, testing::kFloat_m);
+  EXPECT_NEAR(*summary.p95_m.value, 0.004, testing::kFloat_m);
   EXPECT_EQ(RecallOf(samples, larger, 0.005), 1);
   EXPECT_EQ(RecallOf(samples, larger, 0.003), 0);
 }

@@ -3,15 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <numbers>
 
+#include "core/units.h"
 #include "metrics/trajectory_report.h"
 #include "tests/metrics/reference_files.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 const std::filesystem::path kEvo = testing::kReferences / "evo_tum";
 const char* const kTruthFile = "freiburg1_xyz-groundtruth.txt";
 

@@ -13,9 +13,6 @@
 namespace tsdfpp {
 namespace {
 
-// Distances to triangles are single precision.
-constexpr double kFloat_m = 1e-6;
-
 SurfaceComparison Compare(const TriangleMesh& reconstruction, const TriangleMesh& truth,
                           SurfaceComparisonConfig config = {}) {
   auto result = CompareSurfaces(reconstruction, "ours", truth, "truth", false, config);
@@ -93,19 +90,19 @@ TEST(SurfaceComparison, OffsetPlane) {
   const SurfaceComparison result =
       Compare(testing::Sheet({-1, -1, 0.007F}, {2, 0, 0}, {0, 2, 0}, 10), truth);
   for (const DirectedDistances* side : {&result.accuracy, &result.completeness}) {
-    EXPECT_NEAR(side->mean_m, 0.007, kFloat_m);
-    EXPECT_NEAR(side->median_m, 0.007, kFloat_m);
-    EXPECT_NEAR(side->rmse_m, 0.007, kFloat_m);
-    EXPECT_NEAR(side->p95_m, 0.007, kFloat_m);
-    EXPECT_NEAR(side->largest_m, 0.007, kFloat_m);
+    EXPECT_NEAR(side->mean_m, 0.007, testing::kFloat_m);
+    EXPECT_NEAR(side->median_m, 0.007, testing::kFloat_m);
+    EXPECT_NEAR(side->rmse_m, 0.007, testing::kFloat_m);
+    EXPECT_NEAR(side->p95_m, 0.007, testing::kFloat_m);
+    EXPECT_NEAR(side->largest_m, 0.007, testing::kFloat_m);
     EXPECT_EQ(side->within, (std::vector<double>{0, 1, 1}));
     EXPECT_EQ(side->samples, 160'000U);
     EXPECT_NEAR(*side->samples_per_cm2.value, 4, 1e-6);
   }
-  EXPECT_NEAR(result.chamfer_sum_m, 0.014, kFloat_m);
-  EXPECT_NEAR(result.chamfer_mean_m, 0.007, kFloat_m);
+  EXPECT_NEAR(result.chamfer_sum_m, 0.014, testing::kFloat_m);
+  EXPECT_NEAR(result.chamfer_mean_m, 0.007, testing::kFloat_m);
   EXPECT_NEAR(result.chamfer_squared_m2, 2 * 0.007 * 0.007, 1e-8);
-  EXPECT_NEAR(result.hausdorff_m, 0.007, kFloat_m);
+  EXPECT_NEAR(result.hausdorff_m, 0.007, testing::kFloat_m);
   EXPECT_EQ(result.f_score, (std::vector<double>{0, 1, 1}));
   EXPECT_EQ(*result.facing_recall[1].value, 1);
   EXPECT_EQ(*result.facing_away.value, 0);
@@ -134,8 +131,8 @@ TEST(SurfaceComparison, HalfAMesh) {
   EXPECT_NEAR(result.completeness.mean_m, 0.125, 1e-4);
   EXPECT_NEAR(result.completeness.p90_m, 0.4, 1e-3);
   // The truth's own corner is asked too, so the bound is exact.
-  EXPECT_NEAR(result.hausdorff_m, 0.5, kFloat_m);
-  EXPECT_NEAR(result.accuracy.largest_m, 0, kFloat_m);
+  EXPECT_NEAR(result.hausdorff_m, 0.5, testing::kFloat_m);
+  EXPECT_NEAR(result.accuracy.largest_m, 0, testing::kFloat_m);
   EXPECT_NEAR(result.floors.recall_error, 0.5 / std::sqrt(40'000.0), 1e-9);
   EXPECT_NEAR(result.floors.precision_error, 0.5 / std::sqrt(20'000.0), 1e-9);
 }
@@ -148,7 +145,7 @@ TEST(SurfaceComparison, ShiftedCopy) {
   const TriangleMesh box = testing::Box({0, 0, 0}, {0.3F, 0.3F, 0.3F});
   const SurfaceComparison result =
       Compare(Moved(box, Pose(Eigen::Translation3d(0.03, 0, 0))), box, config);
-  EXPECT_NEAR(result.hausdorff_m, 0.03, kFloat_m);
+  EXPECT_NEAR(result.hausdorff_m, 0.03, testing::kFloat_m);
   // Four faces keep 0.27 m (and tau) of their 0.3 m. (Inside, the moved face meets the others at
   // its rim, a tau wide.)
   const double rim = (0.3 * 0.3 - 0.298 * 0.298) / 0.09;
@@ -179,7 +176,7 @@ TEST(SurfaceComparison, APlantedGhostIsItsArea) {
   const SurfaceComparison result = Compare(ours, truth);
   EXPECT_NEAR(result.accuracy.within.back(), 1 / 1.09, 1e-3);
   EXPECT_EQ(result.completeness.within.back(), 1);
-  EXPECT_NEAR(result.accuracy.largest_m, 0.1, kFloat_m);
+  EXPECT_NEAR(result.accuracy.largest_m, 0.1, testing::kFloat_m);
 }
 
 TEST(SurfaceComparison, FlippedFacesAreSaid) {

@@ -11,9 +11,6 @@
 namespace tsdfpp {
 namespace {
 
-// Single precision in coordinates of a metre.
-constexpr double kFloat_m = 1e-6;
-
 // Triangles of all shapes, slivers among them.
 TriangleMesh Shards(std::size_t count) {
   TriangleMesh mesh;
@@ -35,10 +32,10 @@ TEST(SurfaceIndex, EqualsBruteForce) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double expected =
         reference::DistanceToMesh(points[i], index.mesh(), [](std::size_t) { return true; });
-    ASSERT_NEAR(nearest.distance_m[i], expected, kFloat_m) << "point " << i;
+    ASSERT_NEAR(nearest.distance_m[i], expected, testing::kFloat_m) << "point " << i;
     const double to_named = reference::DistanceToMesh(
         points[i], index.mesh(), [&](std::size_t t) { return t == nearest.triangle[i]; });
-    ASSERT_NEAR(to_named, expected, kFloat_m) << "the named triangle is not the nearest";
+    ASSERT_NEAR(to_named, expected, testing::kFloat_m) << "the named triangle is not the nearest";
     const Eigen::Vector3d area = AreaVector(index.mesh(), nearest.triangle[i]);
     ASSERT_NEAR(nearest.normal[i].cast<double>().dot(area.normalized()), 1, 1e-5);
   }
@@ -78,7 +75,7 @@ TEST(MeshTools, PointTriangleDistanceEqualsReference) {
         reference::DistanceToMesh(points[t], mesh, [&](std::size_t k) { return k == t; });
     EXPECT_NEAR(PointTriangleDistance(points[t], Corner(mesh, t, 0), Corner(mesh, t, 1),
                                       Corner(mesh, t, 2)),
-                expected, kFloat_m);
+                expected, testing::kFloat_m);
   }
 }
 
@@ -132,10 +129,10 @@ TEST(NormalAgreement, EqualsBruteForceOverAgreeingTriangles) {
     const double expected = reference::DistanceToMesh(points[i], index.mesh(), [&](std::size_t t) {
       return index.normals()[t].dot(normals[i]) >= 0.5F;
     });
-    if (expected <= kLimit_m - kFloat_m) {
-      ASSERT_NEAR(match.agreeing_m[i], expected, kFloat_m);
+    if (expected <= kLimit_m - testing::kFloat_m) {
+      ASSERT_NEAR(match.agreeing_m[i], expected, testing::kFloat_m);
       if (match.agreeing_m[i] > match.nearest_m[i]) ++second_looks;
-    } else if (expected > kLimit_m + kFloat_m) {
+    } else if (expected > kLimit_m + testing::kFloat_m) {
       ASSERT_TRUE(std::isinf(match.agreeing_m[i]));
     }
   }

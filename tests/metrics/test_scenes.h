@@ -11,6 +11,8 @@
 
 namespace tsdfpp::testing {
 
+inline constexpr double kFloat_m = 1e-6;  // single precision in coordinates of a metre
+
 inline void Append(TriangleMesh& to, const TriangleMesh& from) {
   const auto first = static_cast<std::uint32_t>(to.vertices.size());
   to.vertices.insert(to.vertices.end(), from.vertices.begin(), from.vertices.end());

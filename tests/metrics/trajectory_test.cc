@@ -4,15 +4,14 @@
 
 #include <array>
 #include <filesystem>
-#include <numbers>
 
+#include "core/units.h"
 #include "metrics/association.h"
 #include "tests/metrics/reference_files.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 const std::filesystem::path kEvo = testing::kReferences / "evo_tum";
 
 // evo keeps 17 digits; its quaternion arithmetic and ours differ in the last few.

@@ -22,7 +22,7 @@ using test::BoxSource;
 using test::TempFolder;
 
 // Half a unit and a float's rounding.
-void ExpectDepth(const Frame& was, const Frame& is, double units_per_m) {
+void ExpectBoxDepth(const Frame& was, const Frame& is, double units_per_m) {
   EXPECT_LE(cv::norm(was.depth, is.depth, cv::NORM_INF), 0.5 / units_per_m + 2e-7);
 }
 
@@ -33,7 +33,7 @@ void ExpectJpegOf(const cv::Mat& was, const cv::Mat& is) {
   EXPECT_LT(cv::norm(was, is, cv::NORM_L1) / static_cast<double>(3 * was.total()), kJpegBound);
 }
 
-bool Says(const SequenceNotes& notes, const std::string& words) {
+bool NotesSay(const SequenceNotes& notes, const std::string& words) {
   for (const std::string& note : notes) {
     if (note.find(words) != std::string::npos) return true;
   }
@@ -53,7 +53,7 @@ TEST(ForeignFormats, Replica) {
     for (int i = 0; i < 6; ++i) {
       const Frame was = source.Read(i).value();
       const Frame is = (*read)->Read(i).value();
-      ExpectDepth(was, is, 6553.5);
+      ExpectBoxDepth(was, is, 6553.5);
       EXPECT_LT((was.T_WC.matrix() - is.T_WC.matrix()).norm(), 1e-12);
       EXPECT_EQ(is.time_s, i / 30.0);
       EXPECT_TRUE(is.mask.empty());
@@ -73,13 +73,13 @@ TEST(ForeignFormats, Scannet) {
   EXPECT_EQ(info.frame_count, 5) << "the frame without a pose is left out";
   EXPECT_EQ(info.first_index, 0);
   EXPECT_EQ(info.objects.size(), 3U);
-  EXPECT_TRUE(Says(notes, "1 of 6 frames have infinite poses"));
-  EXPECT_TRUE(Says(notes, "frame numbers 0 to 50 have gaps"));
+  EXPECT_TRUE(NotesSay(notes, "1 of 6 frames have infinite poses"));
+  EXPECT_TRUE(NotesSay(notes, "frame numbers 0 to 50 have gaps"));
   const int numbers[] = {0, 1, 3, 4, 5};
   for (int i = 0; i < 5; ++i) {
     const Frame was = source.Read(numbers[i]).value();
     const Frame is = (*read)->Read(i).value();
-    ExpectDepth(was, is, 1000);
+    ExpectBoxDepth(was, is, 1000);
     EXPECT_EQ(is.time_s, 10 * numbers[i] / 30.0) << "by the file's number";
     // Four equal pixels each, sampled in their middle.
     EXPECT_EQ(cv::norm(was.mask, is.mask, cv::NORM_INF), 0);
@@ -114,7 +114,7 @@ TEST(ForeignFormats, TumAssociatesAndInterpolates) {
   SequenceNotes notes;
   const auto read = OpenSequence(set, options, &notes).value();
   ASSERT_EQ(read->info().frame_count, 2);
-  EXPECT_TRUE(Says(notes, "1 of 3 colour images have no depth image within 0.02 s"));
+  EXPECT_TRUE(NotesSay(notes, "1 of 3 colour images have no depth image within 0.02 s"));
   const Frame first = read->Read(0).value();
   EXPECT_LT(cv::norm(first.depth, source.Read(0)->depth, cv::NORM_INF), 0.0002);
   // In the middle between two poses: 10 degrees of 20.
@@ -217,7 +217,7 @@ TEST(ForeignFormats, BopWithoutVisibleMasksPaintsTheNearerInFront) {
   fs::remove_all(folder / "s/test/000000/mask_visib");
   SequenceNotes notes;
   const auto read = OpenSequence(folder / "s", {}, &notes).value();
-  EXPECT_TRUE(Says(notes, "no mask_visib/"));
+  EXPECT_TRUE(NotesSay(notes, "no mask_visib/"));
   // The right box is the nearer one everywhere, so this is the truth but for edge pixels that a ray
   // grazes.
   for (int i = 0; i < 6; ++i) {
@@ -287,10 +287,10 @@ TEST(ForeignFormats, KlgTakesRawDepthAndJpegColour) {
   options.fixed_camera = true;
   SequenceNotes notes;
   const auto read = OpenSequence(folder / "r.klg", options, &notes).value();
-  EXPECT_TRUE(Says(notes, "4 bytes follow the last of its 2 frames"));
+  EXPECT_TRUE(NotesSay(notes, "4 bytes follow the last of its 2 frames"));
   for (int i = 0; i < 2; ++i) {
     const Frame frame = read->Read(i).value();
-    ExpectDepth(source.Read(i).value(), frame, 1000);
+    ExpectBoxDepth(source.Read(i).value(), frame, 1000);
     EXPECT_EQ(frame.T_WC.matrix(), Eigen::Matrix4d::Identity());
     EXPECT_NEAR(frame.time_s, 0.033333 * i, 1e-9);
     ExpectJpegOf(source.Read(i)->colour, frame.colour);
@@ -305,8 +305,8 @@ TEST(ForeignFormats, MasksThatAreNotReadAreSaid) {
   SequenceNotes notes;
   const auto read = OpenSequence(folder / "t", {}, &notes).value();
   EXPECT_TRUE(read->Read(0)->mask.empty());
-  EXPECT_TRUE(Says(notes, "instance_seg: looks like masks and is not read"));
-  EXPECT_TRUE(Says(notes, "t: no masks"));
+  EXPECT_TRUE(NotesSay(notes, "instance_seg: looks like masks and is not read"));
+  EXPECT_TRUE(NotesSay(notes, "t: no masks"));
 }
 
 // The faults of units and poses where there is no real data (real_data_test.cc) to show them.

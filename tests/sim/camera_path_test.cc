@@ -16,10 +16,10 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 5;
+constexpr std::uint64_t kPathSeed = 5;
 
 CameraMotion MotionOf(const CameraConfig& config, int frames, double rate_hz = 30) {
-  auto motion = CameraMotion::Make(config, frames, rate_hz, kSeed);
+  auto motion = CameraMotion::Make(config, frames, rate_hz, kPathSeed);
   EXPECT_TRUE(motion.has_value()) << motion.error().message;
   return std::move(motion.value());
 }
@@ -110,7 +110,7 @@ TEST(CameraPath, JitterHasItsStatedSizeAndBand) {
     EXPECT_LT(outside, 0.02 * (inside + outside)) << axis;
   }
   // Another seed shakes otherwise, the same seed the same.
-  const auto other = CameraMotion::Make({base, jitter}, kFrames, kRate_hz, kSeed + 1);
+  const auto other = CameraMotion::Make({base, jitter}, kFrames, kRate_hz, kPathSeed + 1);
   EXPECT_FALSE(other->T_WC(7).isApprox(shaken.T_WC(7), 1e-6));
   EXPECT_EQ(MotionOf({base, jitter}, kFrames, kRate_hz).T_WC(7).matrix(), shaken.T_WC(7).matrix());
 }
@@ -149,7 +149,7 @@ TEST(CameraPath, ARecordingKeepsItsRelativeMotion) {
       1e-5);
   EXPECT_GT(expected.translation().norm(), 1e-3) << "the recording does not move: a poor test";
 
-  const auto late = CameraMotion::Make({path, {}}, frames + 1000, rate_hz, kSeed);
+  const auto late = CameraMotion::Make({path, {}}, frames + 1000, rate_hz, kPathSeed);
   ASSERT_FALSE(late.has_value());
   EXPECT_EQ(late.error().kind, ErrorKind::kData);
   EXPECT_NE(late.error().message.find("groundtruth.txt: lasts"), std::string::npos)
@@ -170,7 +170,7 @@ TEST(CameraPath, AnUnusableRecordingIsNamed) {
   for (const auto& [text, sentence] : faults) {
     ASSERT_TRUE(WriteFile(file, text).has_value());
     const auto motion = CameraMotion::Make(
-        {RecordedPath{file.string(), 0, {0, -1, 1.4}, {0, 0, 0}}, {}}, 2, 30, kSeed);
+        {RecordedPath{file.string(), 0, {0, -1, 1.4}, {0, 0, 0}}, {}}, 2, 30, kPathSeed);
     ASSERT_FALSE(motion.has_value()) << text;
     EXPECT_EQ(motion.error().kind, ErrorKind::kData);
     EXPECT_NE(motion.error().message.find(sentence), std::string::npos) << motion.error().message;

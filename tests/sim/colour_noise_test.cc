@@ -9,7 +9,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 29;
+constexpr std::uint64_t kColourSeed = 29;
 
 Frame GreyFrame(int level, int width = 300, int height = 200) {
   Frame frame = WallFrame(TestCamera(width, height, 250), 1);
@@ -34,16 +34,16 @@ TEST(LinearLight, KnownValuesAndRoundTrip) {
 
 TEST(ColourNoise, ExactIsTheSameImage) {
   const Frame frame = ToyFrame();
-  EXPECT_EQ(SenseColour({}, kSeed, frame).data, frame.colour.data);
+  EXPECT_EQ(SenseColour({}, kColourSeed, frame).data, frame.colour.data);
   Frame none;
-  EXPECT_TRUE(SenseColour({.noise_levels = 3}, kSeed, none).empty());
+  EXPECT_TRUE(SenseColour({.noise_levels = 3}, kColourSeed, none).empty());
 }
 
 TEST(ColourNoise, AStopDoublesTheLight) {
   for (int level = 0; level < 256; level += 15) {
     const double light = LevelToLight()[static_cast<std::size_t>(level)];
     for (const double ev : {-2.0, -1.0, 1.0}) {
-      const cv::Mat colour = SenseColour({.exposure_ev = ev}, kSeed, GreyFrame(level, 4, 4));
+      const cv::Mat colour = SenseColour({.exposure_ev = ev}, kColourSeed, GreyFrame(level, 4, 4));
       const double expected = std::round(LightToLevel(std::min(1.0, light * std::pow(2, ev))));
       EXPECT_EQ(colour.at<cv::Vec3b>(1, 2)[1], expected) << level << " " << ev;
     }
@@ -53,15 +53,16 @@ TEST(ColourNoise, AStopDoublesTheLight) {
 TEST(ColourNoise, ExposureJitterIsNormalFromFrameToFrame) {
   const ColourSensorConfig config{.exposure_ev = 0.5, .exposure_jitter_ev = 0.2};
   Moments moments;
-  for (int frame = 1; frame <= 4000; ++frame) moments.Add(FrameExposure_ev(config, kSeed, frame));
+  for (int frame = 1; frame <= 4000; ++frame)
+    moments.Add(FrameExposure_ev(config, kColourSeed, frame));
   ExpectNormal(moments, 0.5, 0.2);
 }
 
 TEST(ColourNoise, VignettingIsTheCosineLaw) {
   const Frame frame = GreyFrame(200);
   const Intrinsics& k = frame.intrinsics;
-  const cv::Mat full = SenseColour({.vignetting = 1}, kSeed, frame);
-  const cv::Mat half = SenseColour({.vignetting = 0.5}, kSeed, frame);
+  const cv::Mat full = SenseColour({.vignetting = 1}, kColourSeed, frame);
+  const cv::Mat half = SenseColour({.vignetting = 0.5}, kColourSeed, frame);
   const double light = LevelToLight()[200];
   for (int v = 0; v < k.height; v += 7) {
     for (int u = 0; u < k.width; u += 7) {
@@ -76,7 +77,7 @@ TEST(ColourNoise, VignettingIsTheCosineLaw) {
 
 TEST(ColourNoise, LevelNoise) {
   constexpr double kSigma = 4;
-  const cv::Mat colour = SenseColour({.noise_levels = kSigma}, kSeed, GreyFrame(128));
+  const cv::Mat colour = SenseColour({.noise_levels = kSigma}, kColourSeed, GreyFrame(128));
   Moments channels[3];
   Moments products;
   for (int v = 0; v < colour.rows; ++v) {
@@ -97,7 +98,7 @@ TEST(ColourNoise, ShotNoiseGrowsWithTheLight) {
   constexpr double kElectrons = 20000;
   for (const int level : {60, 128, 220}) {
     const cv::Mat colour =
-        SenseColour({.full_well_electrons = kElectrons}, kSeed, GreyFrame(level));
+        SenseColour({.full_well_electrons = kElectrons}, kColourSeed, GreyFrame(level));
     Moments moments;
     for (int v = 0; v < colour.rows; ++v) {
       for (int u = 0; u < colour.cols; ++u) moments.Add(colour.at<cv::Vec3b>(v, u)[0]);
@@ -115,7 +116,8 @@ TEST(ColourNoise, ShotNoiseGrowsWithTheLight) {
 }
 
 TEST(ColourNoise, BlackStaysBlackUnderShotNoise) {
-  const cv::Mat colour = SenseColour({.full_well_electrons = 10}, kSeed, GreyFrame(0, 20, 20));
+  const cv::Mat colour =
+      SenseColour({.full_well_electrons = 10}, kColourSeed, GreyFrame(0, 20, 20));
   EXPECT_EQ(cv::norm(colour, cv::NORM_INF), 0);
 }
 

@@ -3,8 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
+#include "core/units.h"
 #include "sim/depth_noise.h"
 #include "sim/incidence.h"
 #include "tests/sim/sensor_images.h"
@@ -12,8 +11,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 23;
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::uint64_t kFaultSeed = 23;
 
 TEST(Incidence, IsExactOnPlanes) {
   const Intrinsics k = TestCamera(80, 60, 90);
@@ -139,7 +137,7 @@ TEST(FlyingPixels, AreBetweenBothSidesAtTheirRate) {
   const Intrinsics k = TestCamera(60, 5000, 300);
   const Frame frame = FrameOf(k, [](int u, int) { return u < 30 ? 1.0 : 1.5; });
   constexpr double kRate = 0.3;
-  const cv::Mat depth = MixFlyingPixels(frame.depth, kRate, 0.05, kSeed, 3);
+  const cv::Mat depth = MixFlyingPixels(frame.depth, kRate, 0.05, kFaultSeed, 3);
   for (const auto& [column, start, other] : {std::tuple{29, 1.0, 1.5}, std::tuple{30, 1.5, 1.0}}) {
     Moments mixing;
     for (int v = 0; v < k.height; ++v) {
@@ -160,8 +158,8 @@ TEST(FlyingPixels, AreBetweenBothSidesAtTheirRate) {
       }
     }
   }
-  EXPECT_TRUE(SameBytes(MixFlyingPixels(frame.depth, 1, 0.6, kSeed, 3), frame.depth));
-  EXPECT_TRUE(SameBytes(MixFlyingPixels(frame.depth, 0, 0.05, kSeed, 3), frame.depth));
+  EXPECT_TRUE(SameBytes(MixFlyingPixels(frame.depth, 1, 0.6, kFaultSeed, 3), frame.depth));
+  EXPECT_TRUE(SameBytes(MixFlyingPixels(frame.depth, 0, 0.05, kFaultSeed, 3), frame.depth));
 }
 
 TEST(DropOut, RampProbability) {
@@ -182,7 +180,7 @@ TEST(DropOut, ByIncidence) {
     const Eigen::Vector3d normal(0, std::sin(tilt * kDegree), std::cos(tilt * kDegree));
     const Frame frame = FrameOf(
         k, [&](int u, int v) { return PlaneDepth(k, normal, 2 * std::cos(tilt * kDegree), u, v); });
-    const cv::Mat depth = SenseDepth(config, kSeed, frame).value();
+    const cv::Mat depth = SenseDepth(config, kFaultSeed, frame).value();
     const double count = static_cast<double>(depth.total());
     const double probability = std::clamp((tilt - 60) / 20, 0.0, 1.0);
     // Over the image the angle's deviations cancel but for this.
@@ -198,7 +196,7 @@ TEST(DropOut, ByRangeAndBoth) {
   config.dropout_range_start_m = 2;
   config.dropout_range_end_m = 6;
   const auto kept = [&](double z) {
-    return cv::countNonZero(SenseDepth(config, kSeed, WallFrame(k, z)).value());
+    return cv::countNonZero(SenseDepth(config, kFaultSeed, WallFrame(k, z)).value());
   };
   const double count = 300 * 300;
   EXPECT_EQ(kept(2), count);
@@ -211,7 +209,8 @@ TEST(DropOut, ByRangeAndBoth) {
   both.dropout_incidence_end_deg = 60;
   cv::Mat wall(300, 300, CV_32FC1, cv::Scalar(3));
   const cv::Mat incidence(300, 300, CV_32FC1, cv::Scalar(45 * kDegree));
-  ExpectShare(cv::countNonZero(DropOut(wall, wall, incidence, both, kSeed, 1)), count, 0.75 * 0.75);
+  ExpectShare(cv::countNonZero(DropOut(wall, wall, incidence, both, kFaultSeed, 1)), count,
+              0.75 * 0.75);
 }
 
 TEST(DepthRange, LeavesWhatIsInside) {

@@ -4,17 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <numbers>
 #include <vector>
 
+#include "core/units.h"
 #include "sim/incidence.h"
 #include "tests/sim/sensor_images.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 17;
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::uint64_t kDepthSeed = 17;
 // Depth is stored in single precision.
 constexpr double kFloat_m = 1e-6;
 
@@ -22,7 +21,7 @@ cv::Mat Sense(DepthModel model, const Frame& frame, double noise_scale = 1) {
   DepthSensorConfig config;
   config.model = model;
   config.noise_scale = noise_scale;
-  const auto depth = SenseDepth(config, kSeed, frame);
+  const auto depth = SenseDepth(config, kDepthSeed, frame);
   EXPECT_TRUE(depth.has_value()) << depth.error().message;
   return depth.value();
 }
@@ -107,7 +106,7 @@ TEST(DepthNoise, AzureNeedsColour) {
   frame.colour = cv::Mat();
   DepthSensorConfig config;
   config.model = DepthModel::kAzure;
-  const auto depth = SenseDepth(config, kSeed, frame);
+  const auto depth = SenseDepth(config, kDepthSeed, frame);
   ASSERT_FALSE(depth.has_value());
   EXPECT_EQ(depth.error().kind, ErrorKind::kUsage);
   EXPECT_EQ(
@@ -299,7 +298,7 @@ TEST(DepthNoise, InvalidDepthStaysInvalid) {
     DepthSensorConfig config;
     config.model = static_cast<DepthModel>(&name - DepthModelNames().data());
     config.max_range_m = 50;
-    const cv::Mat depth = SenseDepth(config, kSeed, frame).value();
+    const cv::Mat depth = SenseDepth(config, kDepthSeed, frame).value();
     for (int v = 0; v < depth.rows; ++v) {
       for (int u = 0; u < depth.cols; ++u) {
         const float z = depth.at<float>(v, u);

@@ -13,7 +13,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 31;
+constexpr std::uint64_t kMaskSeed = 31;
 
 const std::vector<ObjectInfo>& Objects() {
   static const std::vector<ObjectInfo> kObjects = {{0, "background", ""},
@@ -73,7 +73,7 @@ TEST(MaskFaults, RateIsTheShareOfFrames) {
       int active = 0;
       int run = 0;
       for (int frame = 1; frame <= kFrames; ++frame) {
-        const auto start = FaultStart({rate, frames}, kSeed, kStreamMaskBleed, frame, 2);
+        const auto start = FaultStart({rate, frames}, kMaskSeed, kStreamMaskBleed, frame, 2);
         if (start) {
           ++active;
           ++run;
@@ -96,8 +96,8 @@ TEST(MaskFaults, RateIsTheShareOfFrames) {
 
 TEST(MaskFaults, RateNoneAndAll) {
   for (int frame = -5; frame < 100; ++frame) {
-    EXPECT_FALSE(FaultStart({0, 5}, kSeed, kStreamMaskBleed, frame, 2).has_value());
-    EXPECT_EQ(FaultStart({1, 5}, kSeed, kStreamMaskBleed, frame, 2), frame);
+    EXPECT_FALSE(FaultStart({0, 5}, kMaskSeed, kStreamMaskBleed, frame, 2).has_value());
+    EXPECT_EQ(FaultStart({1, 5}, kMaskSeed, kStreamMaskBleed, frame, 2), frame);
   }
 }
 
@@ -107,9 +107,9 @@ TEST(MaskFaults, ObjectsAndKindsFailIndependently) {
   int objects = 0;
   int kinds = 0;
   for (int frame = 1; frame <= kFrames; ++frame) {
-    const bool one = FaultStart({kRate, 1}, kSeed, kStreamMaskBleed, frame, 1).has_value();
-    const bool two = FaultStart({kRate, 1}, kSeed, kStreamMaskBleed, frame, 2).has_value();
-    const bool other = FaultStart({kRate, 1}, kSeed, kStreamMaskMissing, frame, 1).has_value();
+    const bool one = FaultStart({kRate, 1}, kMaskSeed, kStreamMaskBleed, frame, 1).has_value();
+    const bool two = FaultStart({kRate, 1}, kMaskSeed, kStreamMaskBleed, frame, 2).has_value();
+    const bool other = FaultStart({kRate, 1}, kMaskSeed, kStreamMaskMissing, frame, 1).has_value();
     objects += one && two ? 1 : 0;
     kinds += one && other ? 1 : 0;
   }
@@ -227,7 +227,7 @@ TEST(MaskFaults, TouchingIsTheLongestContact) {
 
 TEST(MaskFaults, ExactChangesNothing) {
   const cv::Mat mask = RandomMask(1);
-  const SensedMask sensed = SenseMask({}, kSeed, 5, mask, Objects());
+  const SensedMask sensed = SenseMask({}, kMaskSeed, 5, mask, Objects());
   EXPECT_TRUE(SameBytes(sensed.mask, mask));
   ASSERT_EQ(sensed.segments.size(), IdsIn(mask).size());
   for (const MaskSegment& segment : sensed.segments) {
@@ -247,10 +247,10 @@ TEST(MaskFaults, MissingLastsItsFrames) {
   const MaskFaultConfig config = Only(&MaskFaultConfig::missing, {0.2, 4});
   int gone = 0;
   for (int frame = 1; frame <= 300; ++frame) {
-    const SensedMask sensed = SenseMask(config, kSeed, frame, mask, Objects());
+    const SensedMask sensed = SenseMask(config, kMaskSeed, frame, mask, Objects());
     for (const InstanceId id : IdsIn(mask)) {
       const bool missing =
-          FaultStart(config.missing, kSeed, kStreamMaskMissing, frame, id).has_value();
+          FaultStart(config.missing, kMaskSeed, kStreamMaskMissing, frame, id).has_value();
       EXPECT_EQ(IdsIn(sensed.mask).contains(id), !missing);
       gone += missing ? 1 : 0;
     }
@@ -270,14 +270,14 @@ TEST(MaskFaults, MergedObjectsShareTheLowestId) {
   mask(cv::Rect(40, 2, 10, 10)).setTo(2);  // alone
   MaskFaultConfig config;
   config.merged = {{1, 1}, 2};
-  const SensedMask sensed = SenseMask(config, kSeed, 5, mask, Objects());
+  const SensedMask sensed = SenseMask(config, kMaskSeed, 5, mask, Objects());
   EXPECT_EQ(IdsIn(sensed.mask), (std::set<InstanceId>{1, 2}));
   EXPECT_EQ(cv::countNonZero(sensed.mask == 1), 200);
   const std::vector<MaskSegment> expected = {{1, 1, "car"}, {2, 2, "house"}};
   EXPECT_EQ(sensed.segments, expected);
   // A chain becomes one.
   mask(cv::Rect(22, 2, 18, 10)).setTo(4);
-  const SensedMask chain = SenseMask(config, kSeed, 5, mask, Objects());
+  const SensedMask chain = SenseMask(config, kMaskSeed, 5, mask, Objects());
   EXPECT_EQ(IdsIn(chain.mask), (std::set<InstanceId>{1}));
 }
 
@@ -286,12 +286,12 @@ TEST(MaskFaults, FlickerInventsOneIdAFault) {
   const MaskFaultConfig config = Only(&MaskFaultConfig::flicker, {0.4, 3});
   std::map<std::pair<InstanceId, int>, std::set<InstanceId>> invented;
   for (int frame = 1; frame <= 200; ++frame) {
-    const SensedMask sensed = SenseMask(config, kSeed, frame, mask, Objects());
+    const SensedMask sensed = SenseMask(config, kMaskSeed, frame, mask, Objects());
     EXPECT_EQ(sensed.segments.size(), IdsIn(mask).size());
     EXPECT_TRUE(SameBytes(sensed.mask != 0, mask != 0));
     for (const MaskSegment& segment : sensed.segments) {
       const auto start =
-          FaultStart(config.flicker, kSeed, kStreamMaskFlicker, frame, segment.object);
+          FaultStart(config.flicker, kMaskSeed, kStreamMaskFlicker, frame, segment.object);
       EXPECT_EQ(segment.id != segment.object, start.has_value());
       EXPECT_TRUE(SameBytes(sensed.mask == segment.id, mask == segment.object));
       if (!start) continue;
@@ -314,7 +314,7 @@ TEST(MaskFaults, FlickerInventsOneIdAFault) {
 TEST(MaskFaults, SplitPartsBelongToTheirObject) {
   const cv::Mat mask = RandomMask(1);
   const SensedMask sensed =
-      SenseMask(Only(&MaskFaultConfig::split, {1, 1}), kSeed, 9, mask, Objects());
+      SenseMask(Only(&MaskFaultConfig::split, {1, 1}), kMaskSeed, 9, mask, Objects());
   EXPECT_EQ(sensed.segments.size(), 2 * IdsIn(mask).size());
   std::map<InstanceId, int> parts;
   for (const MaskSegment& segment : sensed.segments) {
@@ -333,12 +333,12 @@ TEST(MaskFaults, WrongClassIsAnotherOnesClass) {
   int wrong = 0;
   constexpr int kFrames = 4000;
   for (int frame = 1; frame <= kFrames; ++frame) {
-    const SensedMask sensed = SenseMask(config, kSeed, frame, mask, Objects());
+    const SensedMask sensed = SenseMask(config, kMaskSeed, frame, mask, Objects());
     EXPECT_TRUE(SameBytes(sensed.mask, mask));
     for (const MaskSegment& segment : sensed.segments) {
       if (segment.object != 3) continue;
       const bool fault =
-          FaultStart(config.wrong_class, kSeed, kStreamMaskWrongClass, frame, 3).has_value();
+          FaultStart(config.wrong_class, kMaskSeed, kStreamMaskWrongClass, frame, 3).has_value();
       EXPECT_EQ(segment.semantic_class != "mug", fault);
       ++named[segment.semantic_class];
       wrong += fault ? 1 : 0;
@@ -348,8 +348,8 @@ TEST(MaskFaults, WrongClassIsAnotherOnesClass) {
   EXPECT_EQ(named.size(), 3U);
   EXPECT_NEAR(named["car"], wrong / 2.0, kSigmas * std::sqrt(wrong * 0.25 * 2));
   // Without another class in the scene there is none.
-  const SensedMask alone = SenseMask(Only(&MaskFaultConfig::wrong_class, {1, 1}), kSeed, 1, mask,
-                                     {{0, "background", ""}, {3, "mug", "mug"}});
+  const SensedMask alone = SenseMask(Only(&MaskFaultConfig::wrong_class, {1, 1}), kMaskSeed, 1,
+                                     mask, {{0, "background", ""}, {3, "mug", "mug"}});
   for (const MaskSegment& segment : alone.segments) {
     if (segment.object == 3) {
       EXPECT_EQ(segment.semantic_class, "");
@@ -368,7 +368,7 @@ TEST(MaskFaults, AllAtOnceKeepIdsAndSegmentsTogether) {
   config.wrong_class = {0.4, 3};
   for (int frame = 1; frame <= 300; ++frame) {
     const cv::Mat mask = RandomMask(static_cast<std::uint64_t>(frame));
-    const SensedMask sensed = SenseMask(config, kSeed, frame, mask, Objects());
+    const SensedMask sensed = SenseMask(config, kMaskSeed, frame, mask, Objects());
     std::set<InstanceId> named;
     for (const MaskSegment& segment : sensed.segments) {
       named.insert(segment.id);

@@ -5,12 +5,12 @@
 
 #include <numbers>
 
+#include "core/units.h"
 #include "tests/sim/sensor_images.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kRoundOff = 1e-12;
 
 Pose SomePose() {

@@ -16,7 +16,7 @@ namespace tsdfpp {
 namespace {
 
 // Every this many frames a check that is slow looks at one.
-constexpr int kEvery = 6;
+constexpr int kEveryNth = 6;
 
 using Poses = std::map<InstanceId, Pose>;
 
@@ -85,7 +85,7 @@ TEST_P(EveryScene, ObjectsKeepOutOfOneAnother) {
   const std::vector<Solid> solids = SolidsOf(config);
   double in_ground = 0;
   double in_another = 0;
-  for (int frame = 1; frame <= config.frames; frame += kEvery) {
+  for (int frame = 1; frame <= config.frames; frame += kEveryNth) {
     const Poses T_WO = motion.T_WO(frame);
     const double ground = DeepestInGround(solids, T_WO, config.room);
     const double another = DeepestOverlap(solids, T_WO);
@@ -101,7 +101,7 @@ TEST_P(EveryScene, ObjectsKeepOutOfOneAnother) {
 // A viewer of the first frame sees every object, and later each is seen most of the time.
 TEST_P(EveryScene, ObjectsAreInView) {
   const SceneConfig config = LoadScene(GetParam());
-  const auto pixels = VisiblePixels(config, 2 * kEvery);
+  const auto pixels = VisiblePixels(config, 2 * kEveryNth);
   for (const SceneObject& object : config.objects) {
     EXPECT_GT(pixels.front().at(object.id), 0) << object.name;
     const auto seen = std::count_if(pixels.begin(), pixels.end(),

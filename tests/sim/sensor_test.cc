@@ -11,7 +11,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::uint64_t kSeed = 41;
+constexpr std::uint64_t kSensorSeed = 41;
 
 SequenceInfo ToyInfo() {
   SequenceInfo info;
@@ -39,7 +39,7 @@ struct Sensed {
   SensedTruth truth;
 };
 
-Sensed Apply(const SensorConfig& config, int index, std::uint64_t seed = kSeed) {
+Sensed Apply(const SensorConfig& config, int index, std::uint64_t seed = kSensorSeed) {
   Sensed sensed{ToyFrame(index), {}};
   auto truth = ApplySensor(config, seed, ToyInfo(), sensed.frame);
   EXPECT_TRUE(truth.has_value()) << truth.error().message;
@@ -119,7 +119,7 @@ TEST(Sensor, AnyNumberOfThreadsGivesTheSameBytes) {
 TEST(Sensor, SeedAndFrameMatter) {
   const SensorConfig config = Everything(DepthModel::kNguyen2012);
   const Sensed sensed = Apply(config, 5);
-  const Sensed other_seed = Apply(config, 5, kSeed + 1);
+  const Sensed other_seed = Apply(config, 5, kSensorSeed + 1);
   const Sensed other_frame = Apply(config, 6);
   for (const Sensed* other : {&other_seed, &other_frame}) {
     EXPECT_FALSE(SameBytes(sensed.frame.depth, other->frame.depth));
@@ -147,7 +147,7 @@ TEST(Sensor, GivenPosesAreAFixedPointOfTheirText) {
 
 TEST(Sensor, RefusesWhatItCannotDo) {
   const auto fault = [](const SensorConfig& config, Frame frame, const SequenceInfo& info) {
-    const auto truth = ApplySensor(config, kSeed, info, frame);
+    const auto truth = ApplySensor(config, kSensorSeed, info, frame);
     EXPECT_FALSE(truth.has_value());
     EXPECT_EQ(truth.error().kind, ErrorKind::kUsage);
     return truth.error().message;
@@ -176,7 +176,7 @@ TEST(Sensor, RefusesWhatItCannotDo) {
 TEST(Sensor, AMissingMaskIsNoFaultWithoutMaskFaults) {
   Frame frame = ToyFrame(3);
   frame.mask = cv::Mat();
-  const auto truth = ApplySensor(SensorPresetNamed("d435").value(), kSeed, ToyInfo(), frame);
+  const auto truth = ApplySensor(SensorPresetNamed("d435").value(), kSensorSeed, ToyInfo(), frame);
   ASSERT_TRUE(truth.has_value());
   EXPECT_TRUE(frame.mask.empty());
   EXPECT_TRUE(truth->segments.empty());
