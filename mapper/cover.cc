@@ -14,26 +14,48 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 64;
-constexpr std::size_t kAhead = 4;  // more than a few do not stay in the cache
+constexpr std::size_t kBlocksPerTask = 64;    // that were fused
+constexpr std::size_t kBlocksPerChunk = 512;  // of which few are stale
+constexpr std::size_t kAhead = 4;             // more than a few do not stay in the cache
 
-// What is to be found anew of a block, a bit each.
-constexpr std::uint8_t kCubes = 1;
-constexpr std::uint8_t kCover = 2;
+// A mark for each block of a volume, by its number.
+class Marks {
+ public:
+  explicit Marks(std::size_t blocks) : marks_(blocks) {}
 
-// The blocks of one volume, by their numbers.
+  // From any thread.
+  void Set(std::size_t number) {
+    const std::atomic_ref<std::uint8_t> mark(marks_[number]);
+    if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
+  }
+  void SetAll() { std::fill(marks_.begin(), marks_.end(), 1); }
+
+  // Writes the marked numbers from `first` up to `end`, in order; returns how many there are.
+  std::size_t Collect(std::size_t first, std::size_t end, std::uint32_t* numbers) const {
+    std::size_t count = 0;
+    constexpr std::size_t kStep = sizeof(std::uint64_t);  // most are not marked
+    for (std::size_t from = first; from < end; from += kStep) {
+      const std::size_t to = std::min(from + kStep, end);
+      std::uint64_t any = 0;
+      std::memcpy(&any, &marks_[from], to - from);
+      if (any == 0) continue;
+      for (std::size_t i = from; i < to; ++i) {
+        if (marks_[i] != 0) numbers[count++] = static_cast<std::uint32_t>(i);
+      }
+    }
+    return count;
+  }
+
+ private:
+  std::vector<std::uint8_t> marks_;
+};
+
+// What is to be found anew of a volume's blocks.
 struct Stale {
   InstanceId id = kNoInstance;
   const TsdfGrid* grid = nullptr;
-  std::vector<std::uint8_t> what;
-
-  // From any thread.
-  void Mark(std::size_t number, std::uint8_t bit) {
-    const std::atomic_ref<std::uint8_t> at(what[number]);
-    if ((at.load(std::memory_order_relaxed) & bit) == 0) {
-      at.fetch_or(bit, std::memory_order_relaxed);
-    }
-  }
+  Marks cubes;
+  Marks covers;
 };
 
 struct Place {
@@ -45,23 +67,22 @@ struct Place {
   TsdfBlock& block() const { return *grid().entries()[number].block; }
 };
 
-// By volume and number.
-std::vector<Place> PlacesOf(std::vector<Stale>& volumes, std::uint8_t bit) {
-  std::vector<Place> places;
+// Some blocks of one volume.
+struct Chunk {
+  Stale* volume;
+  std::size_t first;
+  std::size_t end;
+};
+
+std::vector<Chunk> ChunksOf(std::vector<Stale>& volumes) {
+  std::vector<Chunk> chunks;
   for (Stale& volume : volumes) {
-    const std::vector<std::uint8_t>& what = volume.what;
-    constexpr std::size_t kStep = sizeof(std::uint64_t);  // most are not stale
-    for (std::size_t first = 0; first < what.size(); first += kStep) {
-      const std::size_t end = std::min(first + kStep, what.size());
-      std::uint64_t any = 0;
-      std::memcpy(&any, &what[first], end - first);
-      if (any == 0) continue;
-      for (std::size_t i = first; i < end; ++i) {
-        if ((what[i] & bit) != 0) places.push_back({&volume, i});
-      }
+    const std::size_t size = volume.grid->size();
+    for (std::size_t first = 0; first < size; first += kBlocksPerChunk) {
+      chunks.push_back({&volume, first, std::min(first + kBlocksPerChunk, size)});
     }
   }
-  return places;
+  return chunks;
 }
 
 using Numbers = std::array<std::int32_t, 8>;
@@ -97,21 +118,28 @@ UpperBlocks FindUpper(const TsdfGrid& grid, const Index3& block) {
           MasksOf(grid, numbers, &TsdfBlock::negative)};
 }
 
-// Work on each of the places, in parallel, with what is found of it: to find that is to wait for
-// memory, and so it is done some places ahead.
+// Work on each of the marked blocks, in parallel by chunk, with what is found of it: to find that
+// is to wait for memory, and so it is done some blocks ahead.
 template <typename Find, typename Work>
-void ForEachFound(const std::vector<Place>& places, const Find& find, const Work& work) {
+void ForEachFound(const std::vector<Chunk>& chunks, Marks Stale::*marks, const Find& find,
+                  const Work& work) {
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, places.size(), kBlocksPerTask),
+      tbb::blocked_range<std::size_t>(0, chunks.size(), 1),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        std::array<decltype(find(places.front())), kAhead> found;
-        const auto find_at = [&](std::size_t i) {
-          if (i < range.end()) found[i % kAhead] = find(places[i]);
-        };
-        for (std::size_t i = range.begin(); i < range.begin() + kAhead; ++i) find_at(i);
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          work(i, found[i % kAhead]);
-          find_at(i + kAhead);
+        for (std::size_t c = range.begin(); c != range.end(); ++c) {
+          const Chunk& chunk = chunks[c];
+          std::array<std::uint32_t, kBlocksPerChunk> numbers;
+          const std::size_t count =
+              (chunk.volume->*marks).Collect(chunk.first, chunk.end, numbers.data());
+          std::array<decltype(find(Place{})), kAhead> found;
+          const auto find_at = [&](std::size_t i) {
+            if (i < count) found[i % kAhead] = find(Place{chunk.volume, numbers[i]});
+          };
+          for (std::size_t i = 0; i < kAhead; ++i) find_at(i);
+          for (std::size_t i = 0; i < count; ++i) {
+            work(c, Place{chunk.volume, numbers[i]}, found[i % kAhead]);
+            find_at(i + kAhead);
+          }
         }
       },
       tbb::simple_partitioner());
@@ -128,23 +156,23 @@ void MarkCovers(Stale& volume, const Numbers& upper, const BlockMask& cubes) {
   for (unsigned step = 0; step < upper.size(); ++step) {
     const std::int32_t number = upper[step];
     if ((step & ~beyond) != 0 || number == BlockDirectory::kNone) continue;
-    volume.Mark(static_cast<std::size_t>(number), kCover);
+    volume.covers.Set(static_cast<std::size_t>(number));
   }
 }
 
 // Finds the marked blocks' crossed cubes, and marks the covers that change with them.
-void RenewCubes(std::vector<Stale>& volumes) {
-  const std::vector<Place> places = PlacesOf(volumes, kCubes);
+void RenewCubes(const std::vector<Chunk>& chunks) {
   ForEachFound(
-      places, [](const Place& place) { return FindUpper(place.grid(), place.index()); },
-      [&](std::size_t i, const UpperBlocks& upper) {
-        BlockMask& crossed = places[i].block().crossed;
+      chunks, &Stale::cubes,
+      [](const Place& place) { return FindUpper(place.grid(), place.index()); },
+      [](std::size_t, const Place& place, const UpperBlocks& upper) {
+        BlockMask& crossed = place.block().crossed;
         const BlockMask now = FindCubeMasks(upper.observed, upper.negative).crossed;
         if (crossed == now) return;
         BlockMask changed;
         for (std::size_t z = 0; z < changed.size(); ++z) changed[z] = crossed[z] ^ now[z];
         crossed = now;
-        MarkCovers(*places[i].volume, upper.numbers, changed);
+        MarkCovers(*place.volume, upper.numbers, changed);
       });
 }
 
@@ -160,40 +188,41 @@ LowerMasks FindLowerCubes(const Place& place) {
 }
 
 // Finds the marked blocks' covers.
-std::vector<CoverChange> RenewCovers(std::vector<Stale>& volumes) {
-  const std::vector<Place> places = PlacesOf(volumes, kCover);
-  std::vector<CoverChange> changes(places.size());
-  ForEachFound(places, FindLowerCubes, [&](std::size_t i, const LowerMasks& crossed) {
-    TsdfBlock& block = places[i].block();
-    const BlockMask now = CoverOf(block.band, crossed);
-    if (block.cover == now) return;
-    CoverChange& change = changes[i];
-    change.id = places[i].volume->id;
-    change.index = places[i].index();
-    for (std::size_t z = 0; z < now.size(); ++z) {
-      change.lost[z] = block.cover[z] & ~now[z];
-      change.gained[z] = now[z] & ~block.cover[z];
-    }
-    block.cover = now;
-  });
-  std::erase_if(changes, [](const CoverChange& change) { return change.id == kNoInstance; });
+std::vector<CoverChange> RenewCovers(const std::vector<Chunk>& chunks) {
+  std::vector<std::vector<CoverChange>> of_chunk(chunks.size());
+  ForEachFound(chunks, &Stale::covers, FindLowerCubes,
+               [&](std::size_t c, const Place& place, const LowerMasks& crossed) {
+                 TsdfBlock& block = place.block();
+                 const BlockMask now = CoverOf(block.band, crossed);
+                 if (block.cover == now) return;
+                 CoverChange& change = of_chunk[c].emplace_back();
+                 change.id = place.volume->id;
+                 change.index = place.index();
+                 for (std::size_t z = 0; z < now.size(); ++z) {
+                   change.lost[z] = block.cover[z] & ~now[z];
+                   change.gained[z] = now[z] & ~block.cover[z];
+                 }
+                 block.cover = now;
+               });
+  std::vector<CoverChange> changes;
+  for (const auto& some : of_chunk) changes.insert(changes.end(), some.begin(), some.end());
   return changes;
 }
 
 Stale NothingStale(InstanceId id, const TsdfGrid& grid) {
-  return {id, &grid, std::vector<std::uint8_t>(grid.size())};
+  return {id, &grid, Marks(grid.size()), Marks(grid.size())};
 }
 
 // Marks what a fused block may have changed.
 void MarkStale(const FusedBlock& from, Stale& volume) {
-  if (from.band_changed) volume.Mark(from.number, kCover);
+  if (from.band_changed) volume.covers.Set(from.number);
   if (from.stale_cubes == 0) return;
-  volume.Mark(from.number, kCubes);
+  volume.cubes.Set(from.number);
   if (from.stale_cubes == 1) return;  // its own
   const Numbers lower = FindLower(*volume.grid, from.index);
   for (unsigned bits = from.stale_cubes; bits != 0; bits &= bits - 1) {
     const std::int32_t number = lower[static_cast<std::size_t>(std::countr_zero(bits))];
-    if (number != BlockDirectory::kNone) volume.Mark(static_cast<std::size_t>(number), kCubes);
+    if (number != BlockDirectory::kNone) volume.cubes.Set(static_cast<std::size_t>(number));
   }
 }
 
@@ -215,11 +244,12 @@ BlockMask FindCover(const TsdfGrid& grid, const Index3& block) {
 }
 
 void RenewCovers(const TsdfGrid& grid) {
-  Stale stale = NothingStale(kNoInstance, grid);
-  std::fill(stale.what.begin(), stale.what.end(), kCubes | kCover);
-  std::vector<Stale> volumes{std::move(stale)};
-  RenewCubes(volumes);
-  RenewCovers(volumes);
+  std::vector<Stale> volumes{NothingStale(kNoInstance, grid)};
+  volumes.front().cubes.SetAll();
+  volumes.front().covers.SetAll();
+  const std::vector<Chunk> chunks = ChunksOf(volumes);
+  RenewCubes(chunks);
+  RenewCovers(chunks);
 }
 
 std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused,
@@ -241,8 +271,9 @@ std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused,
         }
       },
       tbb::simple_partitioner());
-  RenewCubes(stale);
-  return RenewCovers(stale);
+  const std::vector<Chunk> chunks = ChunksOf(stale);
+  RenewCubes(chunks);
+  return RenewCovers(chunks);
 }
 
 }  // namespace tsdfpp
