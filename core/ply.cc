@@ -17,7 +17,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "PLY files are written little-endian");
 
 template <typename T>
-void Append(std::string& bytes, T value) {
+void AppendBinary(std::string& bytes, T value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
@@ -38,16 +38,17 @@ std::string PlyBytes(const TriangleMesh& mesh, const std::vector<std::string>& r
   if (!regions.empty()) bytes += "property ushort region\n";
   bytes += "end_header\n";
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) Append(bytes, mesh.vertices[i][axis]);
+    for (int axis = 0; axis < 3; ++axis) AppendBinary(bytes, mesh.vertices[i][axis]);
     if (colours) {
-      for (const std::uint8_t channel : mesh.colours[i]) Append(bytes, channel);
+      for (const std::uint8_t channel : mesh.colours[i]) AppendBinary(bytes, channel);
     }
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    Append(bytes, std::uint8_t{3});
-    for (const std::uint32_t v : mesh.triangles[i]) Append(bytes, static_cast<std::int32_t>(v));
-    if (ids) Append(bytes, mesh.face_ids[i]);
-    if (!regions.empty()) Append(bytes, face_region[i]);
+    AppendBinary(bytes, std::uint8_t{3});
+    for (const std::uint32_t v : mesh.triangles[i])
+      AppendBinary(bytes, static_cast<std::int32_t>(v));
+    if (ids) AppendBinary(bytes, mesh.face_ids[i]);
+    if (!regions.empty()) AppendBinary(bytes, face_region[i]);
   }
   return bytes;
 }

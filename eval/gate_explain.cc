@@ -16,14 +16,6 @@ namespace {
 constexpr int kPictureHeight = 270;
 constexpr double kTablePixel_m = 0.0025;
 
-std::size_t MetricIndex(const std::string& name) {
-  const auto& metrics = SweepMetrics();
-  return static_cast<std::size_t>(
-      std::find_if(metrics.begin(), metrics.end(),
-                   [&](const SweepMetric& metric) { return metric.name == name; }) -
-      metrics.begin());
-}
-
 // How far out of the bounds; negative within them.
 double Excess(double value, const Bounds& bounds) {
   double excess = -1e300;

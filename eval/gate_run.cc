@@ -10,13 +10,6 @@
 namespace tsdfpp {
 namespace {
 
-std::size_t MetricIndex(const std::string& name) {
-  for (std::size_t i = 0; i < SweepMetrics().size(); ++i) {
-    if (SweepMetrics()[i].name == name) return i;
-  }
-  std::abort();  // the configuration was checked
-}
-
 std::string KeyOf(const std::string& experiment, const CellSettings& settings) {
   return experiment + " " + SettingsJson(settings).dump();
 }

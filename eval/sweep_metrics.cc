@@ -1,5 +1,7 @@
 #include "eval/sweep_metrics.h"
 
+#include <cstdlib>
+
 #include "eval/evaluation_columns.h"
 #include "metrics/statistics.h"
 
@@ -88,6 +90,13 @@ const SweepMetric* FindMetric(std::string_view name) {
     if (metric.name == name) return &metric;
   }
   return nullptr;
+}
+
+std::size_t MetricIndex(std::string_view name) {
+  for (std::size_t i = 0; i < SweepMetrics().size(); ++i) {
+    if (SweepMetrics()[i].name == name) return i;
+  }
+  std::abort();
 }
 
 std::size_t EvaluationMetricCount() { return EvaluationColumns().size() + 2; }

@@ -31,6 +31,8 @@ struct SweepMetric {
 const std::vector<SweepMetric>& SweepMetrics();
 // nullptr where there is none of this name.
 const SweepMetric* FindMetric(std::string_view name);
+// The place of the metric of this name, which must be there.
+std::size_t MetricIndex(std::string_view name);
 // How many of them are an evaluation's, defined at every evaluated frame.
 std::size_t EvaluationMetricCount();
 

@@ -43,16 +43,17 @@ struct AnchoredMap::Participants {
   std::vector<Object> objects;  // by increasing id
 };
 
-// What the objects list in one block; kept from block to block for its memory.
-struct AnchoredMap::Listed {
-  struct Cover {
+// What ComputeBlock finds of one block; kept from block to block for its memory alone.
+struct AnchoredMap::Scratch {
+  // An object's voxels in the block. The pointers are into its volume or into `pulled`.
+  struct Listed {
     InstanceId id;
-    const BlockMask* voxels;
+    const BlockMask* cover;
     const float* distance;
     TsdfBlock* block;  // which the distances are still to be taken from
   };
-  std::vector<Cover> covers;
-  std::deque<PulledCover> pulled;  // the first ones of this block, the others of ones before
+  std::vector<Listed> listed;
+  std::deque<PulledCover> pulled;  // of moved objects; a deque, so that they stay where they are
 };
 
 AnchoredMap::AnchoredMap(const MapConfig& config, int layers)
@@ -165,7 +166,7 @@ void AnchoredMap::RefreshIndex() const {
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, dirty_.size(), kBlocksPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        Listed listed;
+        Scratch scratch;
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           existing[i] = index_.Find(dirty_[i]);
           IndexBlock& ids = existing[i] ? *existing[i] : computed[i];
@@ -173,7 +174,7 @@ void AnchoredMap::RefreshIndex() const {
           const bool was_empty = ids.empty();
           const bool compares = NotesIndexChanges();
           if (compares && !was_empty) std::copy_n(ids.begin(), kBlockVoxels, before.begin());
-          ComputeBlock(dirty_[i], participants, listed, ids);
+          ComputeBlock(dirty_[i], participants, scratch, ids);
           if (!compares || was_empty != ids.empty()) continue;
           relisted[i] = was_empty || std::equal(before.begin(), before.end(), ids.begin()) ? 0 : 1;
         }
@@ -195,8 +196,8 @@ void AnchoredMap::RefreshIndex() const {
 }
 
 void AnchoredMap::ComputeBlock(const Index3& index, const Participants& participants,
-                               Listed& scratch, IndexBlock& ids) const {
-  std::vector<Listed::Cover>& listed = scratch.covers;
+                               Scratch& scratch, IndexBlock& ids) const {
+  std::vector<Scratch::Listed>& listed = scratch.listed;
   listed.clear();
   std::size_t pulled = 0;
   for (const Participants::Object& object : participants.objects) {
@@ -222,23 +223,23 @@ void AnchoredMap::ComputeBlock(const Index3& index, const Participants& particip
   }
   // No voxel lists more objects than the block has.
   const int layers = std::min(layers_, static_cast<int>(listed.size()));
-  for (const Listed::Cover& of : listed) {
+  for (const Scratch::Listed& of : listed) {
     if (of.block != nullptr) of.block->is_listed_with_others = listed.size() > 1;
   }
   const auto size = static_cast<std::size_t>(kBlockVoxels * layers);
   if (ids.size() != size) ids = IndexBlock(size);
   if (listed.size() == 1) {
-    ListAlone(*listed[0].voxels, listed[0].id, ids.data());
+    ListAlone(*listed[0].cover, listed[0].id, ids.data());
     return;
   }
   std::fill(ids.begin(), ids.end(), kNoInstance);
   std::array<float, kMaxLayers * kBlockVoxels> distance;
   std::fill_n(distance.begin(), size, std::numeric_limits<float>::infinity());
   std::array<float, kBlockVoxels> of_block;
-  for (const Listed::Cover& of : listed) {
+  for (const Scratch::Listed& of : listed) {
     if (of.block != nullptr) ToFloats(of.block->distance.data(), kBlockVoxels, of_block.data());
     const float* its = of.block != nullptr ? of_block.data() : of.distance;
-    InsertByDistance(*of.voxels, its, of.id, {layers, distance.data(), ids.data()});
+    InsertByDistance(*of.cover, its, of.id, {layers, distance.data(), ids.data()});
   }
 }
 

@@ -35,13 +35,13 @@ class AnchoredMap final : public LayeredMap {
   // unused; as many layers as the block has objects, up to K.
   using IndexBlock = std::vector<InstanceId>;
   struct Participants;
-  struct Listed;
+  struct Scratch;
 
   // Recomputes the index where `dirty_` says that its inputs changed. Logically const: the index is
   // a function of volumes and poses.
   void RefreshIndex() const;
   void AddReach(InstanceId id) const;
-  void ComputeBlock(const Index3& index, const Participants& participants, Listed& scratch,
+  void ComputeBlock(const Index3& index, const Participants& participants, Scratch& scratch,
                     IndexBlock& ids) const;
 
   int layers_;

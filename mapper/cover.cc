@@ -14,9 +14,11 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 64;    // that were fused
-constexpr std::size_t kBlocksPerChunk = 512;  // of which few are stale
-constexpr std::size_t kAhead = 4;             // more than a few do not stay in the cache
+constexpr std::size_t kBlocksPerTask = 64;  // that were fused
+// After a frame few are stale; in a whole grid all are.
+constexpr std::size_t kMostBlocksPerChunk = 512;
+constexpr std::size_t kStaleBlocksPerChunk = 64;
+constexpr std::size_t kAhead = 4;  // more than a few do not stay in the cache
 
 // A mark for each block of a volume, by its number.
 class Marks {
@@ -74,12 +76,12 @@ struct Chunk {
   std::size_t end;
 };
 
-std::vector<Chunk> ChunksOf(std::vector<Stale>& volumes) {
+std::vector<Chunk> ChunksOf(std::vector<Stale>& volumes, std::size_t blocks_per_chunk) {
   std::vector<Chunk> chunks;
   for (Stale& volume : volumes) {
     const std::size_t size = volume.grid->size();
-    for (std::size_t first = 0; first < size; first += kBlocksPerChunk) {
-      chunks.push_back({&volume, first, std::min(first + kBlocksPerChunk, size)});
+    for (std::size_t first = 0; first < size; first += blocks_per_chunk) {
+      chunks.push_back({&volume, first, std::min(first + blocks_per_chunk, size)});
     }
   }
   return chunks;
@@ -118,8 +120,8 @@ UpperBlocks FindUpper(const TsdfGrid& grid, const Index3& block) {
           MasksOf(grid, numbers, &TsdfBlock::negative)};
 }
 
-// Work on each of the marked blocks, in parallel by chunk, with what is found of it: to find that
-// is to wait for memory, and so it is done some blocks ahead.
+// Calls work(number of the chunk, place, found) for each of the marked blocks, chunks in parallel.
+// To find is to wait for memory, and so it is done some blocks ahead.
 template <typename Find, typename Work>
 void ForEachFound(const std::vector<Chunk>& chunks, Marks Stale::*marks, const Find& find,
                   const Work& work) {
@@ -128,7 +130,7 @@ void ForEachFound(const std::vector<Chunk>& chunks, Marks Stale::*marks, const F
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t c = range.begin(); c != range.end(); ++c) {
           const Chunk& chunk = chunks[c];
-          std::array<std::uint32_t, kBlocksPerChunk> numbers;
+          std::array<std::uint32_t, kMostBlocksPerChunk> numbers;
           const std::size_t count =
               (chunk.volume->*marks).Collect(chunk.first, chunk.end, numbers.data());
           std::array<decltype(find(Place{})), kAhead> found;
@@ -187,26 +189,24 @@ LowerMasks FindLowerCubes(const Place& place) {
   return MasksOf(grid, FindLower(grid, place.index()), &TsdfBlock::crossed);
 }
 
-// Finds the marked blocks' covers.
-std::vector<CoverChange> RenewCovers(const std::vector<Chunk>& chunks) {
-  std::vector<std::vector<CoverChange>> of_chunk(chunks.size());
+// Finds the marked blocks' covers; `changes`, if any, gets those that changed, by chunk.
+void RenewCovers(const std::vector<Chunk>& chunks, std::vector<std::vector<CoverChange>>* changes) {
   ForEachFound(chunks, &Stale::covers, FindLowerCubes,
                [&](std::size_t c, const Place& place, const LowerMasks& crossed) {
                  TsdfBlock& block = place.block();
                  const BlockMask now = CoverOf(block.band, crossed);
                  if (block.cover == now) return;
-                 CoverChange& change = of_chunk[c].emplace_back();
-                 change.id = place.volume->id;
-                 change.index = place.index();
-                 for (std::size_t z = 0; z < now.size(); ++z) {
-                   change.lost[z] = block.cover[z] & ~now[z];
-                   change.gained[z] = now[z] & ~block.cover[z];
+                 if (changes != nullptr) {
+                   CoverChange& change = (*changes)[c].emplace_back();
+                   change.id = place.volume->id;
+                   change.index = place.index();
+                   for (std::size_t z = 0; z < now.size(); ++z) {
+                     change.lost[z] = block.cover[z] & ~now[z];
+                     change.gained[z] = now[z] & ~block.cover[z];
+                   }
                  }
                  block.cover = now;
                });
-  std::vector<CoverChange> changes;
-  for (const auto& some : of_chunk) changes.insert(changes.end(), some.begin(), some.end());
-  return changes;
 }
 
 Stale NothingStale(InstanceId id, const TsdfGrid& grid) {
@@ -247,9 +247,9 @@ void RenewCovers(const TsdfGrid& grid) {
   std::vector<Stale> volumes{NothingStale(kNoInstance, grid)};
   volumes.front().cubes.SetAll();
   volumes.front().covers.SetAll();
-  const std::vector<Chunk> chunks = ChunksOf(volumes);
+  const std::vector<Chunk> chunks = ChunksOf(volumes, kStaleBlocksPerChunk);
   RenewCubes(chunks);
-  RenewCovers(chunks);
+  RenewCovers(chunks, nullptr);
 }
 
 std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused,
@@ -271,9 +271,16 @@ std::vector<CoverChange> UpdateCovers(const std::vector<FusedBlock>& fused,
         }
       },
       tbb::simple_partitioner());
-  const std::vector<Chunk> chunks = ChunksOf(stale);
+  const std::vector<Chunk> chunks = ChunksOf(stale, kMostBlocksPerChunk);
   RenewCubes(chunks);
-  return RenewCovers(chunks);
+  std::vector<std::vector<CoverChange>> by_chunk(chunks.size());
+  RenewCovers(chunks, &by_chunk);
+  std::size_t count = 0;
+  for (const auto& some : by_chunk) count += some.size();
+  std::vector<CoverChange> changes;
+  changes.reserve(count);
+  for (const auto& some : by_chunk) changes.insert(changes.end(), some.begin(), some.end());
+  return changes;
 }
 
 }  // namespace tsdfpp

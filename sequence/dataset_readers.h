@@ -12,9 +12,6 @@
 
 namespace tsdfpp {
 
-// Frames a second of a dataset that does not say when they were taken.
-inline constexpr double kUsualRate_hz = 30;
-
 // TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt; associations.txt (either order) replaces the
 // search for the depth image nearest in time (kAssociationLimit_s); poses are interpolated at the
 // depth image's time (timed_poses.h); frames without one are left out. mask/<stem of the colour

@@ -132,7 +132,6 @@ double RateOf(const std::vector<double>& times_s) {
   for (std::size_t i = 1; i < times_s.size(); ++i) {
     if (times_s[i] > times_s[i - 1]) steps.push_back(times_s[i] - times_s[i - 1]);
   }
-  constexpr double kUsualRate_hz = 30;
   if (steps.empty()) return kUsualRate_hz;
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());

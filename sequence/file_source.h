@@ -62,7 +62,10 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
                                                         const SequenceOptions& options,
                                                         SequenceNotes& notes);
 
-// 1 over the median step; 30 where there is none.
+// Frames a second where a dataset does not say when they were taken.
+inline constexpr double kUsualRate_hz = 30;
+
+// 1 over the median step; kUsualRate_hz where there is none.
 double RateOf(const std::vector<double>& times_s);
 
 // Mirrors the world and the camera in y: T_WC of a camera whose image has y upwards becomes that of

@@ -10,9 +10,9 @@
 namespace tsdfpp {
 namespace {
 
-constexpr double kVoxel_m = 0.01;
+constexpr double kSanityVoxel_m = 0.01;
 constexpr InstanceId kBrick = 1;
-const Intrinsics kCamera{160, 120, 140.0, 140.0, 79.5, 59.5};
+const Intrinsics kSanityCamera{160, 120, 140.0, 140.0, 79.5, 59.5};
 
 // A brick on a slab; both boxes, so that twelve triangles each are exactly the true surface.
 reference::Scene BrickOnSlab() {
@@ -61,7 +61,7 @@ TriangleMesh Shifted(TriangleMesh mesh, const Eigen::Vector3d& by_W) {
 std::deque<Frame> Views(const reference::Scene& scene, int count = 3) {
   std::deque<Frame> frames;
   for (int i = 0; i < count; ++i) {
-    frames.push_back(reference::Render(scene, Camera(-1.4 + 0.01 * i), i + 1, kCamera));
+    frames.push_back(reference::Render(scene, Camera(-1.4 + 0.01 * i), i + 1, kSanityCamera));
   }
   return frames;
 }
@@ -69,7 +69,7 @@ std::deque<Frame> Views(const reference::Scene& scene, int count = 3) {
 int Count(const cv::Mat& pixels) { return cv::countNonZero(pixels); }
 
 int MappedOf(const std::deque<Frame>& recent, InstanceId id) {
-  return Count(MappedPixels(recent, kVoxel_m) & (recent.back().mask == id));
+  return Count(MappedPixels(recent, kSanityVoxel_m) & (recent.back().mask == id));
 }
 
 TEST(SceneSanity, TrueMeshIsWhollySane) {
@@ -77,7 +77,7 @@ TEST(SceneSanity, TrueMeshIsWhollySane) {
   const std::deque<Frame> recent = Views(scene);
   ASSERT_GT(MappedOf(recent, kBackground), 500);
   ASSERT_GT(MappedOf(recent, kBrick), 50);
-  const SanityScores scores = ScoreSanity(TrueMesh(scene), recent, kVoxel_m);
+  const SanityScores scores = ScoreSanity(TrueMesh(scene), recent, kSanityVoxel_m);
   EXPECT_EQ(scores.all.value, 1.0);
   EXPECT_EQ(scores.by_object.at(kBackground).value, 1.0);
   EXPECT_EQ(scores.by_object.at(kBrick).value, 1.0);
@@ -90,7 +90,8 @@ TEST(SceneSanity, DepthMayBeOffByOneVoxelButNotByTwo) {
     const Eigen::Vector3d along_view = recent.back().T_WC.linear().col(2);
     // A plane shifted by s along the view is off by s n_z / (n . ray): at most some 1.6 s, and at
     // least 0.6 s, on the faces in this view.
-    return ScoreSanity(Shifted(TrueMesh(scene), voxels * kVoxel_m * along_view), recent, kVoxel_m);
+    return ScoreSanity(Shifted(TrueMesh(scene), voxels * kSanityVoxel_m * along_view), recent,
+                       kSanityVoxel_m);
   };
   for (const double little : {-0.5, 0.5}) {
     EXPECT_EQ(score(little).all.value, 1.0) << little;
@@ -108,7 +109,7 @@ TEST(SceneSanity, WrongLabelsAreNotSane) {
   const std::deque<Frame> recent = Views(scene);
   TriangleMesh mesh = TrueMesh(scene);
   for (InstanceId& id : mesh.face_ids) id = id == kBrick ? kBackground : kBrick;
-  const SanityScores scores = ScoreSanity(mesh, recent, kVoxel_m);
+  const SanityScores scores = ScoreSanity(mesh, recent, kSanityVoxel_m);
   EXPECT_EQ(scores.all.value, 0.0);
   EXPECT_EQ(scores.by_object.at(kBrick).value, 0.0);
 }
@@ -117,7 +118,7 @@ TEST(SceneSanity, MissingObjectCostsItsOwnPixelsOnly) {
   reference::Scene scene = BrickOnSlab();
   const std::deque<Frame> recent = Views(scene);
   scene.Erase(kBrick);
-  const SanityScores scores = ScoreSanity(TrueMesh(scene), recent, kVoxel_m);
+  const SanityScores scores = ScoreSanity(TrueMesh(scene), recent, kSanityVoxel_m);
   EXPECT_EQ(scores.by_object.at(kBrick).value, 0.0);
   EXPECT_EQ(scores.by_object.at(kBackground).value, 1.0);
   const double background = MappedOf(recent, kBackground);
@@ -126,7 +127,7 @@ TEST(SceneSanity, MissingObjectCostsItsOwnPixelsOnly) {
 }
 
 TEST(SceneSanity, EmptyMeshHasNothingRight) {
-  const SanityScores scores = ScoreSanity({}, Views(BrickOnSlab()), kVoxel_m);
+  const SanityScores scores = ScoreSanity({}, Views(BrickOnSlab()), kSanityVoxel_m);
   EXPECT_EQ(scores.all.value, 0.0);
 }
 
@@ -136,7 +137,7 @@ TEST(SceneSanity, ObjectWithoutMappedPixelsIsUndefined) {
   for (std::size_t i = 0; i + 1 < recent.size(); ++i) {
     recent[i].mask.setTo(cv::Scalar(kBackground));
   }
-  const SanityScores scores = ScoreSanity(TrueMesh(BrickOnSlab()), recent, kVoxel_m);
+  const SanityScores scores = ScoreSanity(TrueMesh(BrickOnSlab()), recent, kSanityVoxel_m);
   EXPECT_FALSE(scores.by_object.at(kBrick).value.has_value());
   EXPECT_FALSE(scores.by_object.at(kBrick).why_not.empty());
   EXPECT_TRUE(scores.by_object.at(kBackground).value.has_value());
@@ -145,10 +146,11 @@ TEST(SceneSanity, ObjectWithoutMappedPixelsIsUndefined) {
 // A wall at `depth_m` seen straight on, from the column `first` on with another depth and id.
 Frame Wall(float depth_m, int first, float other_depth_m, InstanceId other_id) {
   Frame frame;
-  frame.intrinsics = kCamera;
-  frame.depth = cv::Mat(kCamera.height, kCamera.width, CV_32FC1, cv::Scalar(depth_m));
-  frame.mask = cv::Mat(kCamera.height, kCamera.width, CV_16UC1, cv::Scalar(kBackground));
-  const cv::Rect right(first, 0, kCamera.width - first, kCamera.height);
+  frame.intrinsics = kSanityCamera;
+  frame.depth = cv::Mat(kSanityCamera.height, kSanityCamera.width, CV_32FC1, cv::Scalar(depth_m));
+  frame.mask =
+      cv::Mat(kSanityCamera.height, kSanityCamera.width, CV_16UC1, cv::Scalar(kBackground));
+  const cv::Rect right(first, 0, kSanityCamera.width - first, kSanityCamera.height);
   frame.depth(right).setTo(other_depth_m);
   frame.mask(right).setTo(other_id);
   return frame;
@@ -156,14 +158,14 @@ Frame Wall(float depth_m, int first, float other_depth_m, InstanceId other_id) {
 
 // First and last column that is left out in a middle row; every other row must be the same.
 std::pair<int, int> ColumnsLeftOut(const Frame& frame) {
-  const cv::Mat mapped = MappedPixels({frame}, kVoxel_m);
-  int first = kCamera.width;
+  const cv::Mat mapped = MappedPixels({frame}, kSanityVoxel_m);
+  int first = kSanityCamera.width;
   int last = -1;
-  for (int u = 0; u < kCamera.width; ++u) {
-    const bool out = mapped.at<std::uint8_t>(kCamera.height / 2, u) == 0;
+  for (int u = 0; u < kSanityCamera.width; ++u) {
+    const bool out = mapped.at<std::uint8_t>(kSanityCamera.height / 2, u) == 0;
     if (out) first = std::min(first, u);
     if (out) last = u;
-    EXPECT_EQ(mapped.at<std::uint8_t>(5, u), mapped.at<std::uint8_t>(kCamera.height / 2, u));
+    EXPECT_EQ(mapped.at<std::uint8_t>(5, u), mapped.at<std::uint8_t>(kSanityCamera.height / 2, u));
   }
   return {first, last};
 }
@@ -195,23 +197,24 @@ TEST(SceneSanity, DepthEdgesAreLeftOutByTheNearerSidesRadius) {
 }
 
 TEST(SceneSanity, NoEdgeNothingLeftOut) {
-  EXPECT_EQ(Count(MappedPixels({Wall(0.5F, kEdge, 0.5F, kBackground)}, kVoxel_m)),
-            kCamera.width * kCamera.height);
+  EXPECT_EQ(Count(MappedPixels({Wall(0.5F, kEdge, 0.5F, kBackground)}, kSanityVoxel_m)),
+            kSanityCamera.width * kSanityCamera.height);
   // A plane so steep that neighbours differ by more than two voxels is no edge: 1/z is linear in
   // the image.
   Frame steep = Wall(1, kEdge, 1, kBackground);
-  for (int u = 0; u < kCamera.width; ++u) {
+  for (int u = 0; u < kSanityCamera.width; ++u) {
     steep.depth.col(u).setTo(cv::Scalar(1.0 / (0.5 - 0.0014 * u)));
   }
-  const int last = kCamera.width - 1;
+  const int last = kSanityCamera.width - 1;
   ASSERT_GT(steep.depth.at<float>(0, last) - steep.depth.at<float>(0, last - 1), 0.015F);
-  EXPECT_EQ(Count(MappedPixels({steep}, kVoxel_m)), kCamera.width * kCamera.height);
+  EXPECT_EQ(Count(MappedPixels({steep}, kSanityVoxel_m)),
+            kSanityCamera.width * kSanityCamera.height);
 }
 
 TEST(SceneSanity, InvalidDepthIsNotMapped) {
   Frame frame = Wall(0.5F, kEdge + 1, 0.0F, kBackground);
-  const cv::Mat mapped = MappedPixels({frame}, kVoxel_m);
-  EXPECT_EQ(Count(mapped.colRange(kEdge + 1, kCamera.width)), 0);
+  const cv::Mat mapped = MappedPixels({frame}, kSanityVoxel_m);
+  EXPECT_EQ(Count(mapped.colRange(kEdge + 1, kSanityCamera.width)), 0);
   EXPECT_GT(Count(mapped.colRange(0, kEdge)), 0);
 }
 
@@ -224,20 +227,20 @@ TEST(SceneSanity, PixelsNotSeenBeforeAreNotCounted) {
   before.T_WC.translation().x() = 0.3;
   cv::Mat expected(now.depth.size(), CV_8UC1, cv::Scalar(255));
   expected.colRange(0, kShift) = cv::Scalar(0);
-  EXPECT_EQ(Count(MappedPixels({before, now}, kVoxel_m) != expected), 0);
+  EXPECT_EQ(Count(MappedPixels({before, now}, kSanityVoxel_m) != expected), 0);
   // An occluder in an earlier frame hides; which of the earlier frames it was does not matter.
   Frame hidden = now;
   hidden.depth = now.depth.clone();  // a Frame's copy shares its images
   hidden.depth(cv::Rect(20, 30, 40, 50)).setTo(0.5F);
   expected.setTo(cv::Scalar(255));
   expected(cv::Rect(20, 30, 40, 50)) = cv::Scalar(0);
-  EXPECT_EQ(Count(MappedPixels({hidden, now, now}, kVoxel_m) != expected), 0);
-  EXPECT_EQ(Count(MappedPixels({now, hidden, now}, kVoxel_m) != expected), 0);
+  EXPECT_EQ(Count(MappedPixels({hidden, now, now}, kSanityVoxel_m) != expected), 0);
+  EXPECT_EQ(Count(MappedPixels({now, hidden, now}, kSanityVoxel_m) != expected), 0);
   // And so does another id.
   Frame other = now;
   other.mask = now.mask.clone();
   other.mask(cv::Rect(20, 30, 40, 50)).setTo(kBrick);
-  EXPECT_EQ(Count(MappedPixels({other, now}, kVoxel_m) != expected), 0);
+  EXPECT_EQ(Count(MappedPixels({other, now}, kSanityVoxel_m) != expected), 0);
 }
 
 // Pixels of a moving object are looked up where the object was.
@@ -248,14 +251,14 @@ TEST(SceneSanity, MovingObjectsPixelsFollowItsPose) {
     // Ten pixels and eight degrees a frame.
     scene.T_WO[kBrick] = reference::MakePose(0.4 + 0.14 * i, Eigen::Vector3d::UnitZ(),
                                              {-0.1 + 0.06 * i, 0.01 * i, 0.06});
-    recent.push_back(reference::Render(scene, Camera(), i + 1, kCamera));
+    recent.push_back(reference::Render(scene, Camera(), i + 1, kSanityCamera));
   }
   const int still = MappedOf({recent.back()}, kBrick);
   ASSERT_GT(still, 50);
   const int followed = MappedOf(recent, kBrick);
   // Its sides come into view as it turns; the top was always seen.
   EXPECT_GT(followed, 0.8 * still);
-  EXPECT_EQ(ScoreSanity(TrueMesh(scene), recent, kVoxel_m).all.value, 1.0);
+  EXPECT_EQ(ScoreSanity(TrueMesh(scene), recent, kSanityVoxel_m).all.value, 1.0);
 
   // Without poses only what happens to lie in the old brick's surface counts.
   std::deque<Frame> blind = recent;

@@ -9,8 +9,8 @@
 namespace tsdfpp {
 namespace {
 
-constexpr InstanceId kTable = 1;
-constexpr double kTau_m = 0.01;
+constexpr InstanceId kGhostTable = 1;
+constexpr double kGhostTau_m = 0.01;
 
 TEST(Solid, BoxHoldsWhatIsInIt) {
   const TriangleMesh box = testing::Box({0, 0, 0}, {1, 1, 1}, 8);
@@ -57,7 +57,7 @@ TEST(Solid, BelowAFloorSheetIsInside) {
 }
 
 Frame WallAt(double depth_m) {
-  return testing::CastFrame([=](double, double) { return testing::Hit{depth_m, kTable}; });
+  return testing::CastFrame([=](double, double) { return testing::Hit{depth_m, kGhostTable}; });
 }
 
 TEST(FreeSpace, TheLatestFrameThatSawThePointDecides) {
@@ -65,7 +65,7 @@ TEST(FreeSpace, TheLatestFrameThatSawThePointDecides) {
   const auto free = [&](const std::vector<double>& depths) {
     FreeSpace space;
     for (const double depth : depths) space.Observe(WallAt(depth));
-    return space.ObservedFree(points, kTau_m)[0] != 0;
+    return space.ObservedFree(points, kGhostTau_m)[0] != 0;
   };
   EXPECT_FALSE(free({}));
   EXPECT_TRUE(free({2}));
@@ -82,7 +82,7 @@ TEST(FreeSpace, OutsideTheImageAndBehindTheCameraIsNotObserved) {
   FreeSpace space;
   space.Observe(WallAt(2));
   const std::vector<Eigen::Vector3f> points = {{0.5F, 0, 1}, {0.55F, 0, 1}, {0, 0, -1}};
-  EXPECT_EQ(space.ObservedFree(points, kTau_m), (Selection{1, 0, 0}));
+  EXPECT_EQ(space.ObservedFree(points, kGhostTau_m), (Selection{1, 0, 0}));
 }
 
 TEST(FreeSpace, DepthEdgesTellNothing) {
@@ -90,18 +90,18 @@ TEST(FreeSpace, DepthEdgesTellNothing) {
   // An edge at half a block.
   space.Observe(testing::CastFrame(
       [](double x, double) {
-        return testing::Hit{x * 300 < 0 ? 0.5 : 2.0, kTable};
+        return testing::Hit{x * 300 < 0 ? 0.5 : 2.0, kGhostTable};
       },
       {320, 240, 300, 300, 162, 120}));
   const std::vector<Eigen::Vector3f> points = {{0, 0, 1}, {0.02F, 0, 1}};
-  EXPECT_EQ(space.ObservedFree(points, kTau_m), (Selection{0, 1}));
+  EXPECT_EQ(space.ObservedFree(points, kGhostTau_m), (Selection{0, 1}));
 }
 
 // A table (slab from z = 2 to 2.1) seen from the origin.
 class GhostScene : public ::testing::Test {
  protected:
   GhostScene()
-      : table_(testing::Model(kTable, testing::Box({-1, -1, 2}, {1, 1, 2.1F}))),
+      : table_(testing::Model(kGhostTable, testing::Box({-1, -1, 2}, {1, 1, 2.1F}))),
         car_(testing::Model(2, testing::Box({-0.1F, -0.1F, -0.1F}, {0.1F, 0.1F, 0.1F}))) {
     space_.Observe(WallAt(2));
   }
@@ -117,7 +117,7 @@ class GhostScene : public ::testing::Test {
     T_W_car.translation().z() = 1.5;
     std::vector<PlacedTruth> truths = {{&table_, Pose::Identity()}};
     if (with_car) truths.push_back({&car_, T_W_car});
-    return ScoreGhosts(SampleReconstruction(mesh, {4, 200'000, 1}), truths, kTau_m, observed);
+    return ScoreGhosts(SampleReconstruction(mesh, {4, 200'000, 1}), truths, kGhostTau_m, observed);
   }
 
   TruthSurface table_;
@@ -148,13 +148,13 @@ TEST_F(GhostScene, OnlyInObservedFreeSpaceUnlessRevealed) {
 // ghost.
 TEST_F(GhostScene, InsideACarUntilItIsRemoved) {
   const double outside_m2 = 0.3 * 0.3 - 0.22 * 0.22;  // farther than tau from the car's sides
-  const double rounded_m2 = (4 - 3.14159265) * kTau_m * kTau_m;
+  const double rounded_m2 = (4 - 3.14159265) * kGhostTau_m * kGhostTau_m;
   EXPECT_NEAR(Score({Plate(1.5F)}, true, &space_).area_m2, outside_m2 + rounded_m2, 2e-4);
   EXPECT_NEAR(Score({Plate(1.5F)}, false, nullptr).area_m2, kPlate_m2, kSampled_m2);
 }
 
 TEST_F(GhostScene, EmptyMesh) {
-  const GhostScores scores = ScoreGhosts(SampleSet{}, {}, kTau_m, nullptr);
+  const GhostScores scores = ScoreGhosts(SampleSet{}, {}, kGhostTau_m, nullptr);
   EXPECT_EQ(scores.area_m2, 0);
   EXPECT_FALSE(scores.share_of_mesh.value);
 }

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using Files = std::map<std::string, fs::path>;
 
-const char* const kScene = R"(name = "meshes"
+const char* const kMeshScene = R"(name = "meshes"
 purpose = "Meshes of one name, with companions in other folders."
 frames = 2
 rate_hz = 10
@@ -47,7 +47,7 @@ class SceneInputFiles : public testing::Test {
     Write("b/cube.obj", "mtllib ../looks/cube.mtl\nmtllib missing.mtl\nusemtl red\n" + kCube);
     Write("looks/cube.mtl", "newmtl red\nKd 1 0 0\nmap_Kd pictures/red.png\n");
     Write("looks/pictures/red.png", "no picture, but a file");
-    Write("scene.toml", kScene + Object(1, "a/cube.obj") + Object(2, "b/cube.obj") +
+    Write("scene.toml", kMeshScene + Object(1, "a/cube.obj") + Object(2, "b/cube.obj") +
                             Object(3, "./a/cube.obj") +
                             Object(4, "a/cube.obj", "picture = \"looks/pictures/red.png\"\n"));
   }
@@ -119,17 +119,17 @@ TEST_F(SceneInputFiles, AMissingFileIsNamedWithTheScenesLine) {
   };
   const std::string here = (folder_ / "scene.toml").string();
   const auto at = [&](const char* file) { return (folder_ / file).string(); };
-  EXPECT_EQ(fault(kScene + Object(1, "c/cube.obj")),
+  EXPECT_EQ(fault(kMeshScene + Object(1, "c/cube.obj")),
             here + ":19: 'object[0].model' names " + at("c/cube.obj") + ", which does not exist");
   fs::create_directories(folder_ / "d.ply");
   EXPECT_EQ(
-      fault(kScene + Object(1, "d.ply")),
+      fault(kMeshScene + Object(1, "d.ply")),
       here + ":19: 'object[0].model' names " + at("d.ply") + ", which is a folder, not a file");
-  EXPECT_EQ(fault(kScene + Object(1, "a/cube.obj", "picture = \"no.png\"\n")),
+  EXPECT_EQ(fault(kMeshScene + Object(1, "a/cube.obj", "picture = \"no.png\"\n")),
             here + ":23: 'object[0].picture' names " + at("no.png") + ", which does not exist");
   fs::remove_all(folder_ / "paths");
-  EXPECT_EQ(fault(kScene), here + ":12: 'camera.file' names " + at("paths/cube.obj.txt") +
-                               ", which does not exist");
+  EXPECT_EQ(fault(kMeshScene), here + ":12: 'camera.file' names " + at("paths/cube.obj.txt") +
+                                   ", which does not exist");
 }
 
 }  // namespace
