@@ -15,8 +15,6 @@ namespace {
 // Small, so that ten thousand frames of eight maps take minutes.
 constexpr double kImageScale = 0.25;  // 240x135
 constexpr double kVoxel_m = 0.02;
-constexpr std::array<Method, 4> kMethods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored,
-                                         Method::kVolumes};
 
 // 51 frames there and 49 back: a hundred a round, so that every tenth of a long run shows the same.
 struct Film100 {
@@ -89,7 +87,7 @@ Expected<void> MeasureLongRuns(const ScalingOptions& options) {
       return UsageError("{} has {} frames from which every {}th is taken, expected {}", film.scene,
                         footage.frames.size(), film.step, kFilmed);
     }
-    for (const Method method : kMethods) {
+    for (const Method method : kScalingMethods) {
       const std::string name(MethodName(method));
       const std::vector<Tenth> tenths = RunLong(method, config, footage, options.frames);
       for (std::size_t i = 0; i < tenths.size(); ++i) {

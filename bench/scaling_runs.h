@@ -1,6 +1,7 @@
 // What the measurements behind docs/scaling.md share.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,10 @@ namespace tsdfpp {
 
 inline constexpr const char* kMovingScene = "scenes/toycar3.toml";
 inline constexpr const char* kStaticScene = "scenes/static.toml";
+
+// The maps whose growth is measured.
+inline constexpr std::array<Method, 4> kScalingMethods{Method::kTsdf, Method::kTsdfpp,
+                                                       Method::kTsdfppAnchored, Method::kVolumes};
 
 // The default settings with the paper's truncation.
 Expected<MapConfig> ScalingConfig();

@@ -14,8 +14,6 @@ constexpr int kSurfaceFrames = 20;  // before the cars start
 constexpr int kSurfaceWarmUp = 10;  // whose blocks are new
 constexpr int kWindows = 8;         // eighths of the image's width
 constexpr std::array<double, 2> kVoxels_m{0.01, 0.005};
-constexpr std::array<Method, 4> kSurfaceMethods{Method::kTsdf, Method::kTsdfpp,
-                                                Method::kTsdfppAnchored, Method::kVolumes};
 
 // The frame with depth in the middle `eighths` of its columns alone.
 Frame Windowed(const Frame& frame, int eighths) {
@@ -65,7 +63,7 @@ Expected<void> MeasureSurface(const ScalingOptions& options) {
   for (const double voxel_m : kVoxels_m) {
     config.voxel_m = voxel_m;
     TSDFPP_RETURN_IF_ERROR(config.Validate());
-    for (const Method method : kSurfaceMethods) {
+    for (const Method method : kScalingMethods) {
       for (std::size_t w = 0; w < windowed.size(); ++w) {
         std::vector<Times> wall(static_cast<std::size_t>(options.runs));
         std::vector<Times> cpu(wall.size());

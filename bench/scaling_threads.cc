@@ -16,8 +16,6 @@ constexpr int kThreadsWarmUp = 10;   // frames
 constexpr int kCastEvery = 8;        // frames
 constexpr int kMeshEvery = 32;
 constexpr std::array<int, 2> kThreads{1, 2};
-constexpr std::array<Method, 4> kThreadsMethods{Method::kTsdf, Method::kTsdfpp,
-                                                Method::kTsdfppAnchored, Method::kVolumes};
 
 struct Step {
   const char* name;
@@ -81,7 +79,7 @@ Expected<void> MeasureThreads(const ScalingOptions& options) {
   TSDFPP_ASSIGN(const MapConfig config, ScalingConfig());
   FigureTable table({"map", "step", "1 thread ms", "2 threads ms", "times faster"});
   FigureTable spread({"map", "median ms", "p99 ms", "worst ms", "worst over median"});
-  for (const Method method : kThreadsMethods) {
+  for (const Method method : kScalingMethods) {
     const std::string name(MethodName(method));
     std::array<Steps, kThreads.size()> by_threads;
     // In turn, so that what else the machine does meets both.

@@ -93,10 +93,9 @@ const SweepMetric* FindMetric(std::string_view name) {
 }
 
 std::size_t MetricIndex(std::string_view name) {
-  for (std::size_t i = 0; i < SweepMetrics().size(); ++i) {
-    if (SweepMetrics()[i].name == name) return i;
-  }
-  std::abort();
+  const SweepMetric* metric = FindMetric(name);
+  if (metric == nullptr) std::abort();  // configurations are checked
+  return static_cast<std::size_t>(metric - SweepMetrics().data());
 }
 
 std::size_t EvaluationMetricCount() { return EvaluationColumns().size() + 2; }
