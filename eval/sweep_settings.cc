@@ -104,6 +104,18 @@ Expected<void> SetResampling(Settings& settings, const AxisValue& value) {
   return known ? Expected<void>{} : Because(value, known.error());
 }
 
+Expected<void> SetMovedVoxels(Settings& settings, const AxisValue& value) {
+  TSDFPP_ASSIGN(settings.moved_voxels, Text(value, "all or near_surface"));
+  const auto known = MovedVoxelsFromName(settings.moved_voxels);
+  return known ? Expected<void>{} : Because(value, known.error());
+}
+
+Expected<void> SetRemovedVoxels(Settings& settings, const AxisValue& value) {
+  TSDFPP_ASSIGN(settings.removed_voxels, Text(value, "free or unobserved"));
+  const auto known = RemovedVoxelsFromName(settings.removed_voxels);
+  return known ? Expected<void>{} : Because(value, known.error());
+}
+
 Expected<void> SetSabotage(Settings& settings, const AxisValue& value) {
   TSDFPP_ASSIGN(const std::string name, Text(value, "none or the name of a sabotage"));
   const auto known = SabotageFromName(name);
@@ -152,6 +164,12 @@ std::vector<Axis> MakeAxes() {
        [](const Settings& s) -> AxisValue { return static_cast<double>(s.layers); }},
       {"poses", SetPoses, [](const Settings& s) -> AxisValue { return s.poses; }},
       {"resampling", SetResampling, [](const Settings& s) -> AxisValue { return s.resampling; }},
+      {"moved_voxels", SetMovedVoxels,
+       [](const Settings& s) -> AxisValue { return s.moved_voxels; }},
+      {"removed_voxels", SetRemovedVoxels,
+       [](const Settings& s) -> AxisValue { return s.removed_voxels; }},
+      {"vote_band", [](Settings& s, V v) { return SetNumber<&Settings::vote_band>(s, v, 1, 100); },
+       [](const Settings& s) -> AxisValue { return s.vote_band; }},
       {"sabotage", SetSabotage,
        [](const Settings& s) -> AxisValue { return std::string(SabotageName(s.sabotage)); }},
   };
@@ -194,6 +212,9 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   config.map.voxel_m = voxel_m;
   config.map.layers = layers;
   TSDFPP_ASSIGN(config.map.resampling, ResamplingFromName(resampling));
+  TSDFPP_ASSIGN(config.map.moved_voxels, MovedVoxelsFromName(moved_voxels));
+  TSDFPP_ASSIGN(config.map.removed_voxels, RemovedVoxelsFromName(removed_voxels));
+  config.map.vote_band_voxels = vote_band;
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(poses));
   SabotageMap(sabotage, config);
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
@@ -237,13 +258,19 @@ std::string MapKey(const CellSettings& settings) {
     return fmt::format("{} voxel_m {} truncation_voxels {}{}", kOpen3dMethod, config.map.voxel_m,
                        config.map.trunc_front_voxels, sabotage);
   }
-  const bool moves_values =
-      config.method != Method::kTsdfppAnchored && config.method != Method::kVolumes;
+  const bool moves_values = config.method != Method::kTsdfppAnchored &&
+                            config.method != Method::kVolumes &&
+                            config.method != Method::kTsdfStatic;
   return fmt::format(
-      "{} voxel_m {} front {} back {} layers {} poses {}{}{}", MethodName(config.method),
+      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}", MethodName(config.method),
       config.map.voxel_m, config.map.trunc_front_voxels, config.map.trunc_back_voxels,
       LayersOf(config.method, config.map), PoseSourceName(config.poses),
       moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "",
+      IsOneField(config.method)
+          ? fmt::format(" moved_voxels {} removed_voxels {} vote_band {}",
+                        MovedVoxelsName(config.map.moved_voxels),
+                        RemovedVoxelsName(config.map.removed_voxels), config.map.vote_band_voxels)
+          : "",
       sabotage);
 }
 

@@ -39,6 +39,10 @@ struct CellSettings {
   int layers = 0;  // K; 0: the method's own
   std::string poses = "gt";
   std::string resampling = "all";
+  // Of one field:
+  std::string moved_voxels = "all";
+  std::string removed_voxels = "free";
+  double vote_band = 100;  // voxels
 
   // What is broken on purpose, of either or of the scoring (eval/sabotage.h).
   Sabotage sabotage = Sabotage::kNone;

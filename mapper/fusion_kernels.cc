@@ -164,6 +164,8 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   const auto full_share = hn::Div(one, hn::Add(cap, one));
   const auto minus_half = hn::Set(df, -0.5F * place.voxel);
   const bool contradiction = kLabels == Labels::kSome && rule.contradiction;
+  [[maybe_unused]] const auto guard = hn::Set(df, votes == nullptr ? 0.0F : votes->guard);
+  [[maybe_unused]] const auto vote_band = hn::Set(df, votes == nullptr ? 0.0F : votes->band);
 
   using Bytes = std::array<std::uint8_t, sizeof(BlockMask)>;
   HWY_ALIGN auto negative = std::bit_cast<Bytes>(block.negative);
@@ -213,6 +215,10 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
         touched = hn::Or(taken, against);
       } else {
         taken = hn::And(taken, labelled);
+        const auto owner = hn::PromoteTo(di, hn::LoadU(Shorts(), votes->id + i));
+        const auto of_others = hn::AndNot(hn::Eq(owner, nobody), hn::Ne(owner, seen));
+        const auto held = hn::And(hn::RebindMask(df, of_others), hn::Le(old_d, guard));
+        taken = hn::AndNot(hn::And(held, hn::Lt(s, zero)), taken);
         touched = taken;
       }
     }
@@ -225,7 +231,8 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     } else {
       PutBits(df, near, i, in_band.data());
       if constexpr (kLabels == Labels::kEvery) {
-        if (Vote(hn::RebindMask(di, near), seen, i, *votes)) votes->any_label_changed = true;
+        const auto voting = hn::And(near, hn::Le(hn::Abs(s), vote_band));
+        if (Vote(hn::RebindMask(di, voting), seen, i, *votes)) votes->any_label_changed = true;
       }
       const auto off_surface = hn::Abs(s);
       auto colours = hn::And(near, hn::Le(off_surface, most_colour_band));

@@ -70,6 +70,9 @@ struct LabelVotes {
   std::uint16_t* id = nullptr;
   std::uint16_t* confidence = nullptr;
   std::int32_t cap = 0;
+  float band = std::numeric_limits<float>::infinity();  // metres: farther observations do not vote
+  // A voxel of another label whose distance is at most this takes nothing from behind a surface.
+  float guard = -std::numeric_limits<float>::infinity();  // metres
   bool any_label_changed = false;
 };
 

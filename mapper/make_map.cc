@@ -13,9 +13,13 @@ std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& confi
   if (!config.Validate()) std::abort();
   switch (method) {
     case Method::kTsdf:
-      return std::make_unique<SingleFieldMap>(config, MoveRule::kOverwrite);
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kOverwrite);
     case Method::kTsdfMin:
-      return std::make_unique<SingleFieldMap>(config, MoveRule::kKeepNearer);
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kKeepNearer);
+    case Method::kTsdfGuarded:
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kGuarded);
+    case Method::kTsdfStatic:
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kStatic);
     case Method::kTsdfpp:
       return std::make_unique<TsdfppMap>(config, LayersOf(method, config));
     case Method::kTsdfppLiteral:

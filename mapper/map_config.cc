@@ -12,8 +12,10 @@ struct Named {
   Method method;
   std::string_view name;
 };
-constexpr std::array<Named, 6> kMethods{{{Method::kTsdf, "tsdf"},
+constexpr std::array<Named, 8> kMethods{{{Method::kTsdf, "tsdf"},
                                          {Method::kTsdfMin, "tsdf/min"},
+                                         {Method::kTsdfGuarded, "tsdf/guarded"},
+                                         {Method::kTsdfStatic, "tsdf/static"},
                                          {Method::kTsdfpp, "tsdf++"},
                                          {Method::kTsdfppLiteral, "tsdf++/literal"},
                                          {Method::kTsdfppAnchored, "tsdf++/anchored"},
@@ -25,6 +27,11 @@ Expected<void> InRange(std::string_view field, double value, double lowest, doub
 }
 
 }  // namespace
+
+bool IsOneField(Method method) {
+  return method == Method::kTsdf || method == Method::kTsdfMin || method == Method::kTsdfGuarded ||
+         method == Method::kTsdfStatic;
+}
 
 std::string_view MethodName(Method method) {
   for (const Named& named : kMethods) {
@@ -70,10 +77,45 @@ Expected<Resampling> ResamplingFromName(std::string_view name) {
   return UsageError("resampling '{}' is unknown, expected all, observed or nearest", name);
 }
 
+std::string_view RemovedVoxelsName(RemovedVoxels removed) {
+  switch (removed) {
+    case RemovedVoxels::kFree:
+      return "free";
+    case RemovedVoxels::kUnobserved:
+      return "unobserved";
+  }
+  std::abort();
+}
+
+Expected<RemovedVoxels> RemovedVoxelsFromName(std::string_view name) {
+  for (const RemovedVoxels removed : {RemovedVoxels::kFree, RemovedVoxels::kUnobserved}) {
+    if (name == RemovedVoxelsName(removed)) return removed;
+  }
+  return UsageError("removed_voxels '{}' is unknown, expected free or unobserved", name);
+}
+
+std::string_view MovedVoxelsName(MovedVoxels moved) {
+  switch (moved) {
+    case MovedVoxels::kAll:
+      return "all";
+    case MovedVoxels::kNearSurface:
+      return "near_surface";
+  }
+  std::abort();
+}
+
+Expected<MovedVoxels> MovedVoxelsFromName(std::string_view name) {
+  for (const MovedVoxels moved : {MovedVoxels::kAll, MovedVoxels::kNearSurface}) {
+    if (name == MovedVoxelsName(moved)) return moved;
+  }
+  return UsageError("moved_voxels '{}' is unknown, expected all or near_surface", name);
+}
+
 Expected<void> MapConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("voxel_m", voxel_m, 0.0005, 1.0));
   TSDFPP_RETURN_IF_ERROR(InRange("trunc_front_voxels", trunc_front_voxels, 1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("trunc_back_voxels", trunc_back_voxels, 1, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("vote_band_voxels", vote_band_voxels, 1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("layers", layers, 0, kMaxLayers));
   TSDFPP_RETURN_IF_ERROR(InRange("weight_cap", weight_cap, 1, 255));
   TSDFPP_RETURN_IF_ERROR(InRange("confidence_cap", confidence_cap, 1, kMostConfidence));
@@ -93,6 +135,8 @@ Expected<void> MapConfig::SetProfile(std::string_view profile) {
 Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::string& where) {
   MapConfig config;
   std::string resampling(ResamplingName(config.resampling));
+  std::string moved_voxels(MovedVoxelsName(config.moved_voxels));
+  std::string removed_voxels(RemovedVoxelsName(config.removed_voxels));
   TomlReader reader(table, where);
   reader.Get("voxel_m", config.voxel_m)
       .Get("trunc_front_voxels", config.trunc_front_voxels)
@@ -103,11 +147,20 @@ Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::str
       .Get("moved_confidence", config.moved_confidence)
       .Get("contradiction", config.contradiction)
       .Get("relist_on_removal", config.relist_on_removal)
-      .Get("resampling", resampling);
+      .Get("resampling", resampling)
+      .Get("moved_voxels", moved_voxels)
+      .Get("removed_voxels", removed_voxels)
+      .Get("vote_band_voxels", config.vote_band_voxels);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   const Expected<Resampling> named = ResamplingFromName(resampling);
   if (!named) return UsageError("{}: {}", where, named.error().message);
   config.resampling = *named;
+  const Expected<MovedVoxels> moved = MovedVoxelsFromName(moved_voxels);
+  if (!moved) return UsageError("{}: {}", where, moved.error().message);
+  config.moved_voxels = *moved;
+  const Expected<RemovedVoxels> removed = RemovedVoxelsFromName(removed_voxels);
+  if (!removed) return UsageError("{}: {}", where, removed.error().message);
+  config.removed_voxels = *removed;
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
   }
@@ -124,13 +177,18 @@ toml::table MapConfig::ToToml() const {
                      {"moved_confidence", moved_confidence},
                      {"contradiction", contradiction},
                      {"relist_on_removal", relist_on_removal},
-                     {"resampling", ResamplingName(resampling)}};
+                     {"resampling", ResamplingName(resampling)},
+                     {"moved_voxels", MovedVoxelsName(moved_voxels)},
+                     {"removed_voxels", RemovedVoxelsName(removed_voxels)},
+                     {"vote_band_voxels", vote_band_voxels}};
 }
 
 int LayersOf(Method method, const MapConfig& config) {
   switch (method) {
     case Method::kTsdf:
     case Method::kTsdfMin:
+    case Method::kTsdfGuarded:
+    case Method::kTsdfStatic:
       return 1;
     case Method::kTsdfppLiteral:
       return 2;

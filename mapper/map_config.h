@@ -11,9 +11,22 @@
 
 namespace tsdfpp {
 
-enum class Method { kTsdf, kTsdfMin, kTsdfpp, kTsdfppLiteral, kTsdfppAnchored, kVolumes };
+enum class Method {
+  kTsdf,
+  kTsdfMin,
+  kTsdfGuarded,
+  kTsdfStatic,
+  kTsdfpp,
+  kTsdfppLiteral,
+  kTsdfppAnchored,
+  kVolumes
+};
 
-// "tsdf", "tsdf/min", "tsdf++", "tsdf++/literal", "tsdf++/anchored", "volumes".
+// Whether all objects share one field, in which a voxel has one distance and one label.
+bool IsOneField(Method method);
+
+// "tsdf", "tsdf/min", "tsdf/guarded", "tsdf/static", "tsdf++", "tsdf++/literal", "tsdf++/anchored",
+// "volumes".
 std::string_view MethodName(Method method);
 std::vector<Method> AllMethods();
 // Errors: kUsage, naming the methods there are. "anchored" and "literal" are understood as well.
@@ -31,6 +44,28 @@ enum class Resampling {
   kNearest,   // the nearest one, whose values are taken as they are
 };
 
+// Which voxels of one field a move takes along, and a removal clears (docs/map.md, "`tsdf`").
+enum class MovedVoxels {
+  kAll,          // all that are labelled so
+  kNearSurface,  // of these, those at most a voxel in front of the surface, or behind it
+};
+
+// What the voxels of an object that is removed from one field become.
+enum class RemovedVoxels {
+  kFree,        // free space, seen once
+  kUnobserved,  // unknown
+};
+
+// "free", "unobserved".
+std::string_view RemovedVoxelsName(RemovedVoxels removed);
+// Errors: kUsage.
+Expected<RemovedVoxels> RemovedVoxelsFromName(std::string_view name);
+
+// "all", "near_surface".
+std::string_view MovedVoxelsName(MovedVoxels moved);
+// Errors: kUsage.
+Expected<MovedVoxels> MovedVoxelsFromName(std::string_view name);
+
 // "all", "observed", "nearest".
 std::string_view ResamplingName(Resampling resampling);
 // Errors: kUsage.
@@ -47,12 +82,17 @@ struct MapConfig {
   bool contradiction = true;  // tsdf++ and anchored: pixels of others clear what o wrongly claims
   bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped
   Resampling resampling = Resampling::kAll;  // of the methods that move values
+  // Of the methods with one field:
+  MovedVoxels moved_voxels = MovedVoxels::kAll;
+  RemovedVoxels removed_voxels = RemovedVoxels::kFree;
+  double vote_band_voxels = 100;  // |s| / h up to which an observation in band votes
 
   float voxel() const { return static_cast<float>(voxel_m); }
   // As distances are kept.
   float front() const { return RoundToHalf(static_cast<float>(trunc_front_voxels * voxel_m)); }
   float back() const { return RoundToHalf(static_cast<float>(trunc_back_voxels * voxel_m)); }
 
+  float vote_band() const { return static_cast<float>(vote_band_voxels * voxel_m); }
   float colour_band() const { return static_cast<float>(kColourBand_voxels * voxel_m); }
   float first_colour_band() const { return static_cast<float>(kFirstColourBand_voxels * voxel_m); }
 

@@ -221,8 +221,9 @@ Fault FindListFault(const MapRepresentation& map) {
   const MapConfig& config = map.config();
   const int layers = LayersOf(map.method(), config);
   const int confidence_cap = std::max(config.confidence_cap, config.moved_confidence);
-  // Labels of one field stay on the free space of objects that left.
-  const bool one_field = map.method() == Method::kTsdf || map.method() == Method::kTsdfMin;
+  // Then labels of one field stay on the free space of objects that left.
+  const bool labels_stay =
+      IsOneField(map.method()) && config.moved_voxels == MovedVoxels::kNearSurface;
   for (const Eigen::Vector3i& v : map.ListedVoxels()) {
     const std::vector<Listing> list = map.ListAt(v);
     const std::string at = Text(IndexOf(v));
@@ -240,7 +241,7 @@ Fault FindListFault(const MapRepresentation& map) {
         return fmt::format("voxel {} has confidence {}, expected 0 to {}", at, list[i].confidence,
                            confidence_cap);
       }
-      if (!one_field && !std::binary_search(objects.begin(), objects.end(), list[i].id)) {
+      if (!labels_stay && !std::binary_search(objects.begin(), objects.end(), list[i].id)) {
         return fmt::format("voxel {} lists object {}, which is not in the map", at, list[i].id);
       }
     }

@@ -50,8 +50,7 @@ TsdfGrid InWorldLattice(const TsdfGrid& volume, const Pose& T_WL, const MapConfi
 TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {
   const TsdfGrid* grid = map.GridOf(id);
   if (grid == nullptr) return {};
-  const bool one_field = map.method() == Method::kTsdf || map.method() == Method::kTsdfMin;
-  if (!one_field) return *grid;
+  if (!IsOneField(map.method())) return *grid;
   TsdfGrid volume;
   for (const auto* entry : grid->Sorted()) {
     auto block = std::make_unique<TsdfBlock>(*entry->block);

@@ -34,9 +34,7 @@ Eigen::Vector3d TrilinearGradient(const std::array<float, 8>& corner,
 }  // namespace
 
 MapQuery::MapQuery(const MapRepresentation& map)
-    : map_(&map),
-      voxel_m_(map.config().voxel_m),
-      one_field_(map.method() == Method::kTsdf || map.method() == Method::kTsdfMin) {
+    : map_(&map), voxel_m_(map.config().voxel_m), one_field_(IsOneField(map.method())) {
   // An index that is made when it is asked for is made here, before many ask at once.
   map.ListAt(Eigen::Vector3i::Zero());
   const std::vector<InstanceId> ids =

@@ -25,8 +25,22 @@ std::size_t At(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-SingleFieldMap::SingleFieldMap(const MapConfig& config, MoveRule rule)
+SingleFieldMap::SingleFieldMap(const MapConfig& config, FieldRule rule)
     : config_(config), rule_(rule) {}
+
+Method SingleFieldMap::method() const {
+  switch (rule_) {
+    case FieldRule::kOverwrite:
+      return Method::kTsdf;
+    case FieldRule::kKeepNearer:
+      return Method::kTsdfMin;
+    case FieldRule::kGuarded:
+      return Method::kTsdfGuarded;
+    case FieldRule::kStatic:
+      return Method::kTsdfStatic;
+  }
+  std::abort();
+}
 
 std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
   return std::make_unique<SingleFieldMap>(*this);
@@ -79,6 +93,8 @@ void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockPlace& place, 
   rule.first_colour_band = rule.colour_band;
   rule.weight_cap = static_cast<float>(config_.weight_cap);
   LabelVotes votes{labels.id.data(), labels.confidence.data(), config_.confidence_cap};
+  votes.band = config_.vote_band();
+  if (rule_ == FieldRule::kGuarded) votes.guard = config_.voxel();
   const FusionResult result = FuseVoxels(frame.kernel, place, rule, block, next, &votes);
   if (result.changed) block.revision = NewRevision();
   if (!votes.any_label_changed) return;
@@ -96,7 +112,7 @@ void SingleFieldMap::FreeEmpty(const std::vector<Index3>& blocks) {
   labels_.Erase(empty);
 }
 
-std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
+std::vector<Index3> SingleFieldMap::Vacate(InstanceId id, RemovedVoxels become) {
   std::vector<Index3> blocks;
   for (const auto& entry : labels_.entries()) {
     LabelBlock& labels = *entry.block;
@@ -106,6 +122,10 @@ std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
     for (std::size_t i = 0; i < kBlockVoxels; ++i) {
       if (!IsObjectsVoxel(block, labels, i, id)) continue;
       block.Clear(static_cast<int>(i));
+      if (become == RemovedVoxels::kFree) {
+        block.distance[i] = config_.front();
+        block.weight[i] = 1;
+      }
       labels.id[i] = kNoInstance;
       labels.confidence[i] = 0;
       changed = true;
@@ -118,7 +138,7 @@ std::vector<Index3> SingleFieldMap::Vacate(InstanceId id) {
 }
 
 void SingleFieldMap::Remove(InstanceId id) {
-  FreeEmpty(Vacate(id));
+  FreeEmpty(Vacate(id, config_.removed_voxels));
   T_WO_.erase(id);
   CheckInDebugBuilds(*this);
 }
@@ -127,6 +147,7 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   const auto [known, first] = T_WO_.emplace(id, T_WO);
   if (first || SameNumbers(known->second, T_WO)) return;
   const Pose T_rel = T_WO * std::exchange(known->second, T_WO).inverse();
+  if (rule_ == FieldRule::kStatic) return;
 
   // The sources: all that is observed and labelled so, free space included; and their labels.
   TsdfGrid source;
@@ -144,7 +165,7 @@ void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
     source.Add(entry->index, std::move(block));
     source_labels.FindOrAdd(entry->index) = *entry->block;
   }
-  const std::vector<Index3> left = Vacate(id);
+  const std::vector<Index3> left = Vacate(id, RemovedVoxels::kUnobserved);
 
   const VoxelReader reader(source);
   const Pose T_inverse = T_rel.inverse();
@@ -187,12 +208,12 @@ void SingleFieldMap::Arrive(InstanceId id, const Index3& index, const TsdfBlock&
   TsdfBlock* block = nullptr;
   LabelBlock* labels = nullptr;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    if (arrival.weight[i] <= 0 || arrival.distance[i] > config_.voxel()) continue;
+    if (arrival.weight[i] <= 0 || !Moves(arrival.distance[i])) continue;
     if (block == nullptr) {
       block = &field_.FindOrAdd(index);
       labels = &labels_.FindOrAdd(index);
     }
-    if (rule_ == MoveRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
+    if (rule_ == FieldRule::kKeepNearer && block->weight[i] > 0 && labels->id[i] != id &&
         std::abs(block->distance[i]) <= std::abs(arrival.distance[i])) {
       continue;
     }

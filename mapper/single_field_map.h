@@ -1,5 +1,5 @@
-// Methods `tsdf` and `tsdf/min`: the paper's baseline, one field with a label a voxel (docs/map.md,
-// "`tsdf`: one field").
+// Methods `tsdf`, `tsdf/min`, `tsdf/guarded` and `tsdf/static`: one field with a label a voxel, the
+// paper's baseline and its variants (docs/map.md, "`tsdf`: one field").
 #pragma once
 
 #include <functional>
@@ -12,16 +12,19 @@
 
 namespace tsdfpp {
 
-// What a move does where the destination holds a surface already.
-enum class MoveRule { kOverwrite, kKeepNearer };
+// How the variants differ.
+enum class FieldRule {
+  kOverwrite,   // moved values replace what is at their destination
+  kKeepNearer,  // they do where their magnitude is the smaller one
+  kGuarded,     // as kOverwrite; and labels guard their surfaces from what is fused behind others
+  kStatic,      // poses move nothing
+};
 
 class SingleFieldMap final : public MapRepresentation {
  public:
-  SingleFieldMap(const MapConfig& config, MoveRule rule);
+  SingleFieldMap(const MapConfig& config, FieldRule rule);
 
-  Method method() const override {
-    return rule_ == MoveRule::kOverwrite ? Method::kTsdf : Method::kTsdfMin;
-  }
+  Method method() const override;
   const MapConfig& config() const override { return config_; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
@@ -57,9 +60,13 @@ class SingleFieldMap final : public MapRepresentation {
   };
 
   static std::uint64_t EverBit(InstanceId id) { return 1ULL << (id & 63U); }
+  // Whether a voxel that has this distance goes with the object that it is labelled with.
+  bool Moves(float distance) const {
+    return config_.moved_voxels == MovedVoxels::kAll || distance <= config_.voxel();
+  }
   bool IsObjectsVoxel(const TsdfBlock& block, const LabelBlock& labels, std::size_t i,
                       InstanceId id) const {
-    return labels.id[i] == id && block.weight[i] > 0 && block.distance[i] <= config_.voxel();
+    return labels.id[i] == id && block.weight[i] > 0 && Moves(block.distance[i]);
   }
   // `label` is the one that all the block's pixels have, kNoInstance where there may be several.
   // `next` as FuseVoxels() takes it.
@@ -67,8 +74,8 @@ class SingleFieldMap final : public MapRepresentation {
                  const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
   // Gives the label of the voxel nearest to a point (metres), the background's where it has none.
   VoxelLabels LabelOfVoxels() const;
-  // Makes the object's voxels unobserved and unlabelled; returns their blocks.
-  std::vector<Index3> Vacate(InstanceId id);
+  // Makes the object's voxels unlabelled, and unobserved or free; returns their blocks.
+  std::vector<Index3> Vacate(InstanceId id, RemovedVoxels become);
   // Writes the values of a block that moved here, as `rule_` allows; confidence(i) is what voxel i
   // brings along.
   void Arrive(InstanceId id, const Index3& index, const TsdfBlock& arrival,
@@ -81,7 +88,7 @@ class SingleFieldMap final : public MapRepresentation {
   void ForEachVoxel(const Function& function) const;
 
   MapConfig config_;
-  MoveRule rule_;
+  FieldRule rule_;
   TsdfGrid field_;
   BlockGrid<LabelBlock> labels_;  // the same blocks
   std::map<InstanceId, Pose> T_WO_;

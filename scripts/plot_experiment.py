@@ -32,6 +32,8 @@ import matplotlib.ticker  # noqa: E402
 STYLES = {
     "tsdf": ("#000000", "s", "-"),
     "tsdf/min": ("#999999", "D", "--"),
+    "tsdf/guarded": ("#882255", "p", "-"),
+    "tsdf/static": ("#777777", "x", ":"),
     "tsdf++": ("#0072B2", "o", "-"),
     "tsdf++/literal": ("#E69F00", "v", "-."),
     "tsdf++/anchored": ("#D55E00", "^", "-"),

@@ -29,6 +29,8 @@ from matplotlib.patches import Patch, Rectangle  # noqa: E402
 STYLES = {
     "tsdf": ("#000000", "s", "-"),
     "tsdf/min": ("#999999", "D", "--"),
+    "tsdf/guarded": ("#882255", "p", "-"),
+    "tsdf/static": ("#777777", "x", ":"),
     "tsdf++": ("#0072B2", "o", "-"),
     "tsdf++ observed": ("#56B4E9", "P", "--"),
     "tsdf++/literal": ("#E69F00", "v", "-."),

@@ -26,11 +26,6 @@ inline std::string MethodTestName(Method method) {
   INSTANTIATE_TEST_SUITE_P(Methods, suite, ::testing::ValuesIn(AllMethods()), \
                            [](const auto& tested) { return MethodTestName(tested.param); })
 
-// One distance a voxel for all objects.
-inline bool IsOneField(Method method) {
-  return method == Method::kTsdf || method == Method::kTsdfMin;
-}
-
 inline void SetPosesThenFuse(MapRepresentation& map, const Frame& frame) {
   for (const auto& [id, T_WO] : frame.T_WO) map.SetObjectPose(id, T_WO);
   map.Fuse(frame, frame.mask);

@@ -24,7 +24,7 @@ std::size_t BlocksOf(const std::vector<Eigen::Vector3i>& voxels) {
 
 // What the values and the lists alone say must be stored.
 std::size_t BlocksNeeded(const MapRepresentation& map, Method method) {
-  if (method == Method::kTsdf || method == Method::kTsdfMin) {
+  if (IsOneField(method)) {
     std::vector<Eigen::Vector3i> observed;
     for (const auto& entry : map.GridOf(kBackground)->entries()) {
       if (entry.block->AnyObserved())
@@ -56,7 +56,8 @@ TEST_P(Freeing, OnlyBlocksThatHoldSomethingAreKept) {
   map->ListedVoxels();  // the index of anchored is made when it is asked for
   EXPECT_EQ(map->Memory().blocks, BlocksNeeded(*map, GetParam()));
   for (const InstanceId id : map->Objects()) map->Remove(id);
-  if (GetParam() == Method::kTsdf || GetParam() == Method::kTsdfMin) return;  // free space stays
+  // Free space that no observation in band ever labelled stays.
+  if (IsOneField(GetParam())) return;
   EXPECT_EQ(map->Memory().blocks, 0U);
 }
 

@@ -102,6 +102,9 @@ TEST(MapConfigTest, TomlRoundTrip) {
   config.contradiction = false;
   config.relist_on_removal = true;
   config.resampling = Resampling::kObserved;
+  config.moved_voxels = MovedVoxels::kNearSurface;
+  config.removed_voxels = RemovedVoxels::kUnobserved;
+  config.vote_band_voxels = 2.5;
   ASSERT_TRUE(config.Validate().has_value());
   const auto again = MapConfig::FromToml(config.ToToml(), "memory");
   ASSERT_TRUE(again.has_value()) << again.error().message;
@@ -138,6 +141,10 @@ TEST(MapConfigTest, TomlFaultsNameFileAndKey) {
       {"layers", toml::table{{"layers", 9}}},
       {"resampling", toml::table{{"resampling", "some"}}},
       {"resampling", toml::table{{"resampling", true}}},
+      {"moved_voxels", toml::table{{"moved_voxels", "some"}}},
+      {"moved_voxels", toml::table{{"moved_voxels", 1}}},
+      {"removed_voxels", toml::table{{"removed_voxels", "gone"}}},
+      {"vote_band_voxels", toml::table{{"vote_band_voxels", 0.5}}},
   };
   for (const Case& bad : cases) {
     const auto config = MapConfig::FromToml(bad.table, "my-map.toml");
@@ -148,8 +155,9 @@ TEST(MapConfigTest, TomlFaultsNameFileAndKey) {
 }
 
 TEST(MethodTest, NamesAreThereAndBack) {
-  const std::vector<std::string> names = {"tsdf",           "tsdf/min",        "tsdf++",
-                                          "tsdf++/literal", "tsdf++/anchored", "volumes"};
+  const std::vector<std::string> names = {
+      "tsdf",   "tsdf/min",       "tsdf/guarded",    "tsdf/static",
+      "tsdf++", "tsdf++/literal", "tsdf++/anchored", "volumes"};
   ASSERT_EQ(AllMethods().size(), names.size());
   for (const std::string& name : names) {
     const auto method = MethodFromName(name);
@@ -165,7 +173,7 @@ TEST(MethodTest, UnknownNameListsTheMethods) {
     const auto method = MethodFromName(name);
     ASSERT_FALSE(method.has_value()) << name;
     EXPECT_EQ(method.error().kind, ErrorKind::kUsage);
-    EXPECT_TRUE(Says(method.error().message, {name, "tsdf/min", "tsdf++/anchored"}));
+    EXPECT_TRUE(Says(method.error().message, {name, "tsdf/min", "tsdf/static", "tsdf++/anchored"}));
   }
 }
 
@@ -173,6 +181,8 @@ TEST(MethodTest, LayersDependOnTheMethod) {
   MapConfig config;
   EXPECT_EQ(LayersOf(Method::kTsdf, config), 1);
   EXPECT_EQ(LayersOf(Method::kTsdfMin, config), 1);
+  EXPECT_EQ(LayersOf(Method::kTsdfGuarded, config), 1);
+  EXPECT_EQ(LayersOf(Method::kTsdfStatic, config), 1);
   EXPECT_EQ(LayersOf(Method::kTsdfpp, config), 2);
   EXPECT_EQ(LayersOf(Method::kTsdfppLiteral, config), 2);
   EXPECT_EQ(LayersOf(Method::kTsdfppAnchored, config), 4);

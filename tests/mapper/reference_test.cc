@@ -131,6 +131,27 @@ TEST_P(ReferenceTest, RemovalAndReturn) {
   maps.CompareWholeBox();
 }
 
+// One field that moves, and removes, what is near the surface alone, so that free space keeps its
+// label; that makes what it removes unobserved; and in which only what is near a surface votes.
+TEST_P(ReferenceTest, SettingsOfOneField) {
+  if (!IsOneField(method())) return;
+  MapConfig near_surface = config();
+  near_surface.moved_voxels = MovedVoxels::kNearSurface;
+  near_surface.removed_voxels = RemovedVoxels::kUnobserved;
+  near_surface.vote_band_voxels = 2;
+  Scene scene = TableWithToys();
+  SideBySide maps = Begin(near_surface);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  for (int i = 1; i <= 3; ++i) {
+    scene.T_WO[kBrick] = MakePose(0.3 + 0.25 * i, Eigen::Vector3d::UnitZ(),
+                                  {-0.14 + 0.04 * i, 0.03 - 0.01 * i, kTableTop_m + 0.045});
+    maps.SetPosesAndFuse(RenderToys(scene, 0.2 + 0.3 * i, i));
+  }
+  maps.Remove(kBrick);
+  EXPECT_FALSE(maps.map().ObservedVoxels(kBrick).empty());
+  maps.CompareWholeBox();
+}
+
 // Removal forgets the poses: the next one is the first, and moves nothing.
 TEST_P(ReferenceTest, ReturnBeforeItsFirstPose) {
   Scene scene = TableWithToys();

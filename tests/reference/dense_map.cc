@@ -27,9 +27,10 @@ Pose PoseBook::Lattice(InstanceId id) const {
 std::unique_ptr<DenseMap> MakeDenseMap(Method method, const MapConfig& config, const Box& box) {
   switch (method) {
     case Method::kTsdf:
-      return MakeDenseTsdf(config, box, false);
     case Method::kTsdfMin:
-      return MakeDenseTsdf(config, box, true);
+    case Method::kTsdfGuarded:
+    case Method::kTsdfStatic:
+      return MakeDenseTsdf(method, config, box);
     case Method::kTsdfpp:
       return MakeDenseTsdfpp(config, box);
     case Method::kTsdfppLiteral:

@@ -5,8 +5,9 @@
 // - A pixel labelled kNoInstance counts as invalid depth: it neither fuses, votes nor contradicts.
 // - h is MapConfig::voxel_m in double wherever a position is double, and voxel() in "Observation".
 // - F, B are front(), back() in float where stored values are compared; in allocation, in double.
-// - `tsdf`: what a move vacates and a removal clears are "the object's voxels" (D <= h); free space
-//   labelled o stays. ValueAt and ObservedVoxels go by the label alone, whatever D.
+// - `tsdf`: what a move vacates and a removal clears are "the object's voxels"; with
+//   `moved_voxels = "near_surface"` free space labelled o stays. ValueAt and ObservedVoxels go by
+//   the label alone, whatever D.
 // - An interpolated colour with no coloured corner is black with n = 0.
 // - A closed cube is decided by the double q; coefficients by the float fraction.
 // - Removal forgets the object's poses too: a later one is its pose at birth again.
@@ -69,7 +70,8 @@ class DenseMap {
 // those of whole blocks; what leaves it aborts.
 std::unique_ptr<DenseMap> MakeDenseMap(Method method, const MapConfig& config, const Box& box);
 
-std::unique_ptr<DenseMap> MakeDenseTsdf(const MapConfig& config, const Box& box, bool keep_minimum);
+// The one field's variants by name.
+std::unique_ptr<DenseMap> MakeDenseTsdf(Method method, const MapConfig& config, const Box& box);
 std::unique_ptr<DenseMap> MakeDenseTsdfpp(const MapConfig& config, const Box& box);
 std::unique_ptr<DenseMap> MakeDenseLiteral(const MapConfig& config, const Box& box);
 std::unique_ptr<DenseMap> MakeDenseAnchored(const MapConfig& config, const Box& box, int layers);

@@ -1,4 +1,4 @@
-// docs/map.md, "`tsdf`: one field", and its variant `tsdf/min`.
+// docs/map.md, "`tsdf`: one field", and its variants `tsdf/min`, `tsdf/guarded` and `tsdf/static`.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -15,11 +15,12 @@ struct Ownership {
 
 class DenseTsdf : public DenseMap {
  public:
-  DenseTsdf(const MapConfig& config, const Box& box, bool keep_minimum)
-      : config_(config), keep_minimum_(keep_minimum), field_(box), owners_(box) {}
+  DenseTsdf(Method method, const MapConfig& config, const Box& box)
+      : method_(method), config_(config), field_(box), owners_(box) {}
 
   void SetObjectPose(InstanceId id, const Pose& T_WO) override {
-    if (const auto T_rel = poses_.Update(id, T_WO)) Move(id, *T_rel);
+    const auto T_rel = poses_.Update(id, T_WO);
+    if (T_rel && method_ != Method::kTsdfStatic) Move(id, *T_rel);
     field_.FreeEmptyBlocks();
   }
 
@@ -30,15 +31,22 @@ class DenseTsdf : public DenseMap {
     const View view(frame, labels, T_WL, config_);
     field_.blocks.ForEachVoxelOfBlocks([&](const Eigen::Vector3i& v) {
       const std::optional<Seen> seen = view.Look(v);
-      if (!seen) return;
+      if (!seen || (method_ == Method::kTsdfGuarded && IsGuarded(v, *seen))) return;
       FuseSeen(*seen, config_, field_.grid.At(v), true);
-      if (InBand(seen->s, config_)) Vote(seen->label, owners_.At(v));
+      const bool votes = std::abs(seen->s) <= config_.vote_band();
+      if (votes && InBand(seen->s, config_)) Vote(seen->label, owners_.At(v));
     });
     field_.FreeEmptyBlocks();
   }
 
   void Remove(InstanceId id) override {
-    for (const Eigen::Vector3i& v : ObjectVoxels(id)) Vacate(v);
+    for (const Eigen::Vector3i& v : ObjectVoxels(id)) {
+      Vacate(v);
+      if (config_.removed_voxels == RemovedVoxels::kFree) {
+        field_.grid.At(v).distance = config_.front();
+        field_.grid.At(v).weight = 1;
+      }
+    }
     poses_.Forget(id);
     field_.FreeEmptyBlocks();
   }
@@ -82,6 +90,12 @@ class DenseTsdf : public DenseMap {
   }
 
  private:
+  bool IsGuarded(const Eigen::Vector3i& v, const Seen& seen) const {
+    const InstanceId owner = owners_(v).label;
+    const bool is_another = owner != kNoInstance && owner != seen.label;
+    return is_another && field_.grid(v).distance <= config_.voxel() && seen.s < 0;
+  }
+
   void Vote(InstanceId m, Ownership& owner) const {
     if (owner.label == kNoInstance) {
       owner = {m, 1};
@@ -101,10 +115,14 @@ class DenseTsdf : public DenseMap {
     return owners_(v).label == id && field_.grid(v).observed();
   }
 
+  bool GoesAlong(const DenseVoxel& voxel) const {
+    return config_.moved_voxels == MovedVoxels::kAll || voxel.distance <= config_.voxel();
+  }
+
   std::vector<Eigen::Vector3i> ObjectVoxels(InstanceId id) const {
     std::vector<Eigen::Vector3i> voxels;
     for (const Eigen::Vector3i& v : ObservedVoxels(id)) {
-      if (field_.grid(v).distance <= config_.voxel()) voxels.push_back(v);
+      if (GoesAlong(field_.grid(v))) voxels.push_back(v);
     }
     return voxels;
   }
@@ -126,7 +144,7 @@ class DenseTsdf : public DenseMap {
         if (IsSource(id, corner)) corners[i] = field_.grid(corner);
       }
       const auto value = InterpolateVoxel(place, corners, config_.resampling);
-      if (!value || value->distance > config_.voxel()) return;
+      if (!value || !GoesAlong(*value)) return;
       const Eigen::Vector3i nearest = CubeCorner(place.base, NearestCorner(place));
       writes.push_back({v, *value, owners_(nearest).confidence});
     });
@@ -135,7 +153,7 @@ class DenseTsdf : public DenseMap {
     for (const Eigen::Vector3i& v : ObjectVoxels(id)) Vacate(v);
     for (const Write& write : writes) {
       const DenseVoxel& there = field_.grid(write.voxel);
-      if (keep_minimum_ && there.observed() && owners_(write.voxel).label != id &&
+      if (method_ == Method::kTsdfMin && there.observed() && owners_(write.voxel).label != id &&
           !(std::abs(there.distance) > std::abs(write.value.distance))) {
         continue;
       }
@@ -146,8 +164,8 @@ class DenseTsdf : public DenseMap {
     }
   }
 
+  Method method_;
   MapConfig config_;
-  bool keep_minimum_;
   DenseVolume field_;
   DenseGrid<Ownership> owners_;
   PoseBook poses_;
@@ -155,9 +173,8 @@ class DenseTsdf : public DenseMap {
 
 }  // namespace
 
-std::unique_ptr<DenseMap> MakeDenseTsdf(const MapConfig& config, const Box& box,
-                                        bool keep_minimum) {
-  return std::make_unique<DenseTsdf>(config, box, keep_minimum);
+std::unique_ptr<DenseMap> MakeDenseTsdf(Method method, const MapConfig& config, const Box& box) {
+  return std::make_unique<DenseTsdf>(method, config, box);
 }
 
 }  // namespace tsdfpp::reference

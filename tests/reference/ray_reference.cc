@@ -44,8 +44,7 @@ RayReference::RayReference(const MapRepresentation& map, Method method, const Ma
                            const Box& box, const std::vector<InstanceId>& ids)
     : map_(map),
       config_(config),
-      one_field_(method == Method::kTsdf || method == Method::kTsdfMin ||
-                 method == Method::kTsdfppLiteral),
+      one_field_(IsOneField(method) || method == Method::kTsdfppLiteral),
       has_index_(method == Method::kTsdfpp || method == Method::kTsdfppAnchored) {
   for (const InstanceId id : ids) {
     const InstanceId key = one_field_ ? kBackground : id;

@@ -78,6 +78,8 @@ export function shortLabel(run, all) {
 const kMethodColours = {
   tsdf: ['#c04a00', '#ff8a4c'],
   'tsdf/min': ['#8a6100', '#e6b422'],
+  'tsdf/guarded': ['#8f1d1d', '#ff6b6b'],
+  'tsdf/static': ['#6b4a2f', '#c9a27e'],
   'tsdf++': ['#0064a8', '#62b5ee'],
   'tsdf++/literal': ['#9a3f78', '#e29ac6'],
   'tsdf++/anchored': ['#00795a', '#2fcfa0'],
