@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/sequence_options.h"
 #include "eval/compare_report.h"
+#include "eval/compare_tables.h"
 #include "eval/open_source.h"
 #include "eval/stand_in_truth.h"
 
@@ -19,7 +20,8 @@ namespace {
 struct CompareArguments {
   SequenceArguments source;
   std::string out;
-  std::string methods = "tsdf,tsdf++,tsdf++/anchored";
+  std::string methods =
+      "tsdf/static,tsdf,tsdf/guarded,tsdf++/literal,tsdf++,tsdf++/anchored,volumes";
   std::string profiles = "paper,close";
   std::string poses = "gt";
   std::vector<std::string> adapters;
@@ -130,9 +132,10 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   const auto show = [&](int done, int total) { bar.Show(done, total); };
   TSDFPP_ASSIGN(const CompareResult result,
                 RunCompare(*source, config, options.out, command, show));
-  return CommandResult{SummaryJson(result, command),
-                       SummaryTable(result) + fmt::format("report: {}/report.html ({:.0f} s)\n",
-                                                          options.out, result.total_s)};
+  return CommandResult{
+      SummaryJson(result, command),
+      FrontTable(result) + "\n" + SummaryTable(result) +
+          fmt::format("report: {}/report.html ({:.0f} s)\n", options.out, result.total_s)};
 }
 
 }  // namespace

@@ -4,67 +4,12 @@
 
 #include "core/files.h"
 #include "eval/base64.h"
+#include "eval/compare_tables.h"
 #include "eval/evaluation_columns.h"
 #include "metrics/trajectory.h"
 
 namespace tsdfpp {
 namespace {
-
-const Evaluation& Examined(const CompareResult& result,
-                           const std::vector<Evaluation>& evaluations) {
-  for (const Evaluation& evaluation : evaluations) {
-    if (evaluation.frame == result.reveal_frame) return evaluation;
-  }
-  return evaluations.back();
-}
-const Evaluation& Examined(const CompareResult& result, const CompareRun& run) {
-  return Examined(result, run.evaluations);
-}
-
-// "open3d (any label)" where it tells no objects apart.
-std::string TitleOf(const AdapterRun& run) {
-  return run.config.name + (run.evaluations.back().labelled ? "" : " (any label)");
-}
-
-std::string Text(const Measured& measured, int decimals) {
-  return measured.value ? fmt::format("{:.{}f}", *measured.value, decimals) : "-";
-}
-
-double MedianMs(const nlohmann::json& spread) {
-  return spread.is_null() ? 0 : spread["median_ms"].get<double>();
-}
-
-// Rows of the table, titles first.
-std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
-  std::vector<std::vector<std::string>> rows(1);
-  rows[0] = {"map"};
-  for (const EvaluationColumn& column : EvaluationColumns()) rows[0].push_back(column.title);
-  rows[0].insert(rows[0].end(), {"move ms", "fuse ms", "MB"});
-  for (const auto& run : result.runs) {
-    const Evaluation& evaluation = Examined(result, *run);
-    std::vector<std::string> row{run->Title()};
-    for (const EvaluationColumn& column : EvaluationColumns()) {
-      row.push_back(Text(column.value(result.movers, evaluation), column.decimals));
-    }
-    const nlohmann::json times = run->times.ToJson();
-    row.push_back(fmt::format("{:.1f}", MedianMs(times["update_poses"])));
-    row.push_back(fmt::format("{:.1f}", MedianMs(times["fuse"])));
-    row.push_back(
-        fmt::format("{:.0f}", static_cast<double>(run->pipeline.map().Memory().bytes) / 1e6));
-    rows.push_back(std::move(row));
-  }
-  for (const auto& run : result.adapters) {
-    if (run->failure) continue;
-    const Evaluation& evaluation = Examined(result, run->evaluations);
-    std::vector<std::string> row{TitleOf(*run)};
-    for (const EvaluationColumn& column : EvaluationColumns()) {
-      row.push_back(Text(column.value(result.movers, evaluation), column.decimals));
-    }
-    row.insert(row.end(), {"-", "-", "-"});  // its times and memory are another program's
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
 
 // The run of the baseline on the same frames and settings.
 const CompareRun* BaselineOf(const CompareResult& result, const CompareRun& run) {
@@ -189,22 +134,6 @@ std::string Csv(const CompareResult& result) {
   return csv;
 }
 
-// A line an adapter: what it cost, or why it failed.
-std::vector<std::string> AdapterLines(const CompareResult& result) {
-  std::vector<std::string> lines;
-  for (const auto& run : result.adapters) {
-    const std::string cost =
-        fmt::format("{:.1f} s, {:.1f} s of CPU, at most {:.0f} MB", run->outcome.wall_s,
-                    run->outcome.cpu_s, static_cast<double>(run->outcome.peak_bytes) / 1e6);
-    lines.push_back(run->failure ? fmt::format("failed: {} ({})", run->failure->message, cost)
-                                 : fmt::format("{}: {}", run->config.name, cost));
-    for (const std::string& remark : run->remarks) {
-      lines.push_back(fmt::format("{}: {}", run->config.name, remark));
-    }
-  }
-  return lines;
-}
-
 std::string Escaped(const std::string& text) {
   std::string escaped;
   for (const char c : text) {
@@ -238,27 +167,6 @@ std::string Headline(const CompareResult& result) {
 }
 
 }  // namespace
-
-std::string SummaryTable(const CompareResult& result) {
-  const auto rows = TableRows(result);
-  std::vector<std::size_t> width(rows[0].size(), 0);
-  for (const auto& row : rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
-  }
-  std::string text = fmt::format(
-      "{} at frame {}, the table after removing {} moving objects; threshold one voxel\n",
-      result.info.name, result.reveal_frame.value_or(result.last_frame), result.movers.size());
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    for (std::size_t c = 0; c < rows[r].size(); ++c) {
-      text += c == 0 ? fmt::format("{:<{}}", rows[r][c], width[c])
-                     : fmt::format("  {:>{}}", rows[r][c], width[c]);
-    }
-    text += "\n";
-  }
-  for (const std::string& line : AdapterLines(result)) text += line + "\n";
-  if (!result.config.truth_note.empty()) text += result.config.truth_note + "\n";
-  return text;
-}
 
 nlohmann::json SummaryJson(const CompareResult& result, const std::string& command) {
   nlohmann::json runs = nlohmann::json::array();
@@ -297,7 +205,8 @@ Expected<void> WriteSummary(const CompareResult& result, const std::string& comm
                             const std::filesystem::path& out) {
   TSDFPP_RETURN_IF_ERROR(
       WriteFile(out / "summary.json", SummaryJson(result, command).dump(1) + "\n"));
-  return WriteFile(out / "frames.csv", Csv(result));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "frames.csv", Csv(result)));
+  return WriteFile(out / "table.txt", FrontTable(result) + "\n" + SummaryTable(result));
 }
 
 Expected<void> WriteReport(const CompareResult& result, const std::vector<PictureFile>& pictures,

@@ -1,5 +1,4 @@
-// What a comparison says: the terminal's table, summary.json, frames.csv, report.html
-// (docs/formats.md).
+// What a comparison leaves: summary.json, frames.csv, table.txt, report.html (docs/command-line.md).
 #pragma once
 
 #include <filesystem>
@@ -12,13 +11,10 @@
 
 namespace tsdfpp {
 
-// The figures of the examined frame (the reveal, else the last), a row a map; columns are explained
-// in docs/metrics.md.
-std::string SummaryTable(const CompareResult& result);
-
 nlohmann::json SummaryJson(const CompareResult& result, const std::string& command);
 
-// summary.json and frames.csv (a row an evaluated frame and map). Errors: kEnvironment.
+// summary.json, frames.csv (a row an evaluated frame and map) and table.txt (FrontTable and
+// SummaryTable). Errors: kEnvironment.
 Expected<void> WriteSummary(const CompareResult& result, const std::string& command,
                             const std::filesystem::path& out);
 

@@ -12,6 +12,7 @@
 #include "core/ply.h"
 #include "eval/compare.h"
 #include "eval/compare_report.h"
+#include "eval/compare_tables.h"
 #include "eval/surface_file.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
