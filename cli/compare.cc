@@ -117,8 +117,11 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));
     TSDFPP_RETURN_IF_ERROR(probe.Validate());
   }
-  TSDFPP_ASSIGN(auto opened, OpenArguments(options.source));
-  TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened), options, config));
+  TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
+  TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened.source), options, config));
+  if (!opened.remark.empty()) {
+    config.truth_note += (config.truth_note.empty() ? "" : " ") + opened.remark;
+  }
   std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
       "--until {}{}",

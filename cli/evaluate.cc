@@ -39,7 +39,8 @@ Expected<CommandResult> RunEvaluateCommand(const EvaluateArguments& options, boo
     }
     config.frames.push_back(frame);
   }
-  TSDFPP_ASSIGN(auto source, OpenArguments(options.source));
+  TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
+  FrameSource* const source = opened.source.get();
   TSDFPP_ASSIGN(const std::vector<InstanceId> removed,
                 FindObjects(source->info(), SplitList(options.removed)));
   config.removed = {removed.begin(), removed.end()};

@@ -95,6 +95,10 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   const PipelineConfig& config = start.config;
   Pipeline& pipeline = *start.pipeline;
   TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
+  if (!removed.empty() && !start.mask_remark.empty() && options.load.empty()) {
+    return UsageError("--remove {} has nothing to remove: {}", options.remove, start.mask_remark);
+  }
+  if (!start.mask_remark.empty()) spdlog::warn("{}", start.mask_remark);
   const int frames = start.last - start.first + 1;
   if (options.views > 0 && frames == 0) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
@@ -109,16 +113,16 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     for (int index = start.first; index <= start.last; ++index) {
       TSDFPP_ASSIGN(const Frame frame, start.source->Read(index));
       if (frame.mask.empty()) {
-        return DataError("{}: frame {} has no mask, which --segmentation gt needs",
-                         options.source.path, index);
+        return DataError("{}: frame {} has no mask and frame {} has one, expected masks for all",
+                         options.source.path, index, info.first_index);
       }
       times.Add(pipeline.Process(frame));
       T_WC = frame.T_WC;
       bar.Show(index - start.first + 1, frames);
     }
   }
-  if (frames > 0 && config.poses == PoseSource::kGiven && info.objects.size() > 1 &&
-      pipeline.trajectories().empty()) {
+  if (frames > 0 && start.mask_remark.empty() && config.poses == PoseSource::kGiven &&
+      info.objects.size() > 1 && pipeline.trajectories().empty()) {
     spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
                  options.source.path);
   }
@@ -144,6 +148,10 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
       {"times", times.ToJson()},
       {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
   };
+  if (!start.mask_remark.empty()) {
+    stats["segmentation"] = "none";
+    stats["remarks"] = {start.mask_remark};
+  }
   if (!options.load.empty()) stats["loaded"] = options.load;
   if (!options.save.empty()) {
     const MappedRun run = RunOf(start, start.last);

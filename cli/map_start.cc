@@ -6,7 +6,9 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
                             int until) {
   MapStart start;
   start.config = config;
-  TSDFPP_ASSIGN(start.source, OpenArguments(source));
+  TSDFPP_ASSIGN(MaskedSource masked, OpenWithMasks(source));
+  start.source = std::move(masked.source);
+  start.mask_remark = std::move(masked.remark);
   start.info = start.source->info();
   start.first = start.info.first_index;
   const int end = start.info.first_index + start.info.frame_count - 1;
@@ -41,7 +43,9 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.first = run.last_frame + 1;
   start.last = run.last_frame;
   if (!source.path.empty()) {
-    TSDFPP_ASSIGN(start.source, OpenArguments(source));
+    TSDFPP_ASSIGN(MaskedSource masked, OpenWithMasks(source));
+    start.source = std::move(masked.source);
+    start.mask_remark = std::move(masked.remark);
     start.info = start.source->info();
     if (!loaded.run || start.info.name != run.sequence || start.info.objects != run.objects) {
       return UsageError("--load {} is a map of '{}', expected one of {}, '{}'", file, run.sequence,

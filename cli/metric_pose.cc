@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 #include <numbers>
@@ -106,8 +107,9 @@ Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
   TSDFPP_ASSIGN(const TriangleMesh model, ReadSurfaceFile(options.model, options.scale));
   if (model.vertices.empty()) return DataError("{}: holds no vertices", options.model);
   const std::vector<Eigen::Vector3f> points = Thinned(model.vertices, options.most_points);
-  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth));
-  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate));
+  std::vector<std::string> remarks;
+  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth, &remarks));
+  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate, &remarks));
 
   std::vector<Series> series = {{"ADD", "mm", 1e3, {}},         {"ADD-S", "mm", 1e3, {}},
                                 {"MSSD", "mm", 1e3, {}},        {"MSPD", "px", 1, {}},
@@ -157,7 +159,8 @@ Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
                          {"auc_limit_m", options.greatest_m},
                          {"auc_add", ToJson(auc_add)},
                          {"auc_add_s", ToJson(auc_add_s)},
-                         {"frames", frames}};
+                         {"frames", frames},
+                         {"remarks", remarks}};
   std::string text =
       fmt::format("{} of {} true poses have an estimate; {} of the model's {} points\n", found,
                   truth.size(), points.size(), model.vertices.size());
@@ -176,6 +179,7 @@ Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
   }
   text += fmt::format("AUC to {} m: ADD {}, ADD-S {}\n", options.greatest_m, ShareText(auc_add),
                       ShareText(auc_add_s));
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   return CommandResult{json, text};
 }
 

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 
@@ -79,8 +80,9 @@ Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) 
     TSDFPP_ASSIGN(const RelativeDelta delta, DeltaFromText(word, options.all_pairs));
     measure.deltas.push_back(delta);
   }
-  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth));
-  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate));
+  std::vector<std::string> remarks;
+  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth, &remarks));
+  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate, &remarks));
   const TrajectoryReport report = ReportTrajectory(truth, estimate, measure);
   if (report.pairs == 0) {
     return DataError(
@@ -105,7 +107,8 @@ Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) 
        {{"translation_m", ToJson(report.translation_m)},
         {"rotation_deg", ToJson(report.rotation_deg)},
         {"full", ToJson(report.full)}}},
-      {"rpe", nlohmann::json::array()}};
+      {"rpe", nlohmann::json::array()},
+      {"remarks", remarks}};
   std::string text = fmt::format(
       "{} pairs of poses; without a partner: {} of the estimate, {} of the reference\n"
       "way of the reference {:.3f} m, of the estimate {:.3f} m; alignment {}\n",
@@ -128,6 +131,7 @@ Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) 
     text += Row(fmt::format("RPE {} translation, m", words[k]), relative.translation_m);
     text += Row(fmt::format("RPE {} rotation, deg", words[k]), relative.rotation_deg);
   }
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   return CommandResult{json, text};
 }
 

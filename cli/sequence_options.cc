@@ -67,4 +67,26 @@ Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& ar
   return source;
 }
 
+Expected<MaskedSource> OpenWithMasks(const SequenceArguments& arguments) {
+  TSDFPP_ASSIGN(auto source, OpenArguments(arguments));
+  // A scene has masks, and a frame of it takes long to render.
+  if (std::filesystem::path(arguments.path).extension() == ".toml") {
+    return MaskedSource{std::move(source), ""};
+  }
+  return WithBackgroundMasks(std::move(source));
+}
+
+Expected<MaskedSource> OpenForScores(const SequenceArguments& arguments) {
+  TSDFPP_ASSIGN(MaskedSource masked, OpenWithMasks(arguments));
+  const std::size_t objects = masked.source->info().objects.size();
+  if (!masked.remark.empty() && objects > 1) {
+    return DataError(
+        "{}: has no masks, expected one for each frame: scores of its {} objects need them; "
+        "`tsdfpp map` maps it as background",
+        arguments.path, objects - 1);
+  }
+  if (!masked.remark.empty()) spdlog::warn("{}", masked.remark);
+  return masked;
+}
+
 }  // namespace tsdfpp

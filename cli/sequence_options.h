@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/frame_source.h"
+#include "sequence/background_masks.h"
 
 namespace tsdfpp {
 
@@ -29,5 +30,13 @@ std::string TextOf(const SequenceArguments& arguments);
 // Opens what the arguments name, and logs what the reader assumed. Errors: those of OpenSource; of
 // the calibration's file; kUsage where options for sequences meet a scene.
 Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& arguments);
+
+// The same for those who need masks: a sequence without any is background throughout, and the
+// remark says so (sequence/background_masks.h).
+Expected<MaskedSource> OpenWithMasks(const SequenceArguments& arguments);
+
+// The same for those whose scores ask which object a pixel shows; the remark is logged. Errors:
+// also kData where a sequence without masks has objects beside the background.
+Expected<MaskedSource> OpenForScores(const SequenceArguments& arguments);
 
 }  // namespace tsdfpp

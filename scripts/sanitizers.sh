@@ -51,7 +51,7 @@ run=()
 if [ "$preset" = tsan ] && setarch "$(uname -m)" -R true 2>/dev/null; then run=(setarch "$(uname -m)" -R); fi
 
 if [ -z "${SHORT:-}" ]; then
-  "${run[@]}" ctest --test-dir "$folder" --output-on-failure -j "$(nproc)" ${1:+-R "$1"}
+  "${run[@]}" bash scripts/run_tests.sh "$folder" -j "$(nproc)" ${1:+-R "$1"}
   exit
 fi
 "${run[@]}" ctest --test-dir "$folder" --output-on-failure -R '^Sanitizers'

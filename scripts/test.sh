@@ -4,4 +4,4 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 bash scripts/setup.sh
 bash scripts/build.sh
-ctest --test-dir build/release --output-on-failure -j "$(nproc)"
+bash scripts/run_tests.sh build/release -j "$(nproc)"

@@ -148,7 +148,7 @@ class KlgSource : public DatasetSource {
     }
     TimedPoses poses;
     if (known) {
-      TSDFPP_ASSIGN(poses, ReadTimedPoses(file));
+      TSDFPP_ASSIGN(poses, ReadTimedPoses(file, &notes));
     }
     for (std::size_t i = 0; i < index.entries.size(); ++i) {
       Pose T_WC = Pose::Identity();

@@ -9,10 +9,32 @@
 #include "sequence/text_lines.h"
 
 namespace tsdfpp {
+namespace {
 
-Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path) {
+// How many lines there are of a kind, and the first of them.
+struct OddLines {
+  int count = 0;
+  int first = 0;
+  std::string what;
+
+  void Add(int line, std::string what_it_is) {
+    if (count++ > 0) return;
+    first = line;
+    what = std::move(what_it_is);
+  }
+};
+
+}  // namespace
+
+Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path,
+                                    std::vector<std::string>* remarks) {
   TSDFPP_ASSIGN(const std::vector<TextLine> lines, ReadTextLines(path));
   TimedPoses poses;
+  OddLines repeated;
+  OddLines backwards;
+  int differing = 0;
+  const std::string* before = nullptr;
+  double before_s = 0;
   for (const TextLine& line : lines) {
     const auto time_s = ParseNumber(line.words.front());
     if (!time_s || !std::isfinite(*time_s)) {
@@ -22,13 +44,30 @@ Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path) {
     const auto pose =
         PoseFromText(fmt::format("{}", fmt::join(line.words.begin() + 1, line.words.end(), " ")));
     if (!pose) return DataError("{}:{}: {}", path.string(), line.number, pose.error().message);
-    const auto [at, is_new] = poses.emplace(*time_s, *pose);
-    if (!is_new && at->second.matrix() != pose->matrix()) {
-      return DataError("{}:{}: time {} has a second, different pose", path.string(), line.number,
-                       line.words.front());
+    if (const auto [at, is_new] = poses.emplace(*time_s, *pose); !is_new) {
+      if (at->second.matrix() != pose->matrix()) ++differing;
+      at->second = *pose;
+      repeated.Add(line.number, fmt::format("time {}", line.words.front()));
     }
+    if (before && *time_s < before_s) {
+      backwards.Add(line.number, fmt::format("{} after {}", line.words.front(), *before));
+    }
+    before = &line.words.front();
+    before_s = *time_s;
   }
   if (poses.empty()) return DataError("{}: holds no poses", path.string());
+  if (remarks && repeated.count > 0) {
+    remarks->push_back(
+        fmt::format("{}: lines that repeat the time of an earlier one: {}, {} of them with another "
+                    "pose, the first is line {} ({}); of a time the last line counts",
+                    path.string(), repeated.count, differing, repeated.first, repeated.what));
+  }
+  if (remarks && backwards.count > 0) {
+    remarks->push_back(
+        fmt::format("{}: lines that go back in time: {}, the first is line {} ({}); poses are "
+                    "taken in the order of their times",
+                    path.string(), backwards.count, backwards.first, backwards.what));
+  }
   return poses;
 }
 

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "core/types.h"
@@ -18,9 +20,13 @@ inline constexpr double kAssociationLimit_s = 0.02;
 
 using TimedPoses = std::map<double, Pose>;
 
-// Errors: kData, with file and line: no time, no pose (PoseFromText), two poses at one time, no
-// line at all.
-Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path);
+// A time may stand on several lines, as in TUM's own fr2/desk, and lines may go back in time: of a
+// time the last line counts, and the order is that of the times. So TUM's tools have it
+// (associate.py, evaluate_ate.py and evaluate_rpe.py keep a dictionary by time). `remarks`, where
+// given, gets a sentence on either, with file, count and first line. Errors: kData, with file and
+// line: no time, no pose (PoseFromText), no line at all.
+Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path,
+                                    std::vector<std::string>* remarks = nullptr);
 
 // The pose at this very time, else interpolated between its neighbours (translation linearly,
 // rotation by slerp) where they are kLongestPoseGap_s apart at most, else the nearest one within

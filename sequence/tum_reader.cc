@@ -157,7 +157,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenTum(const fs::path& folder,
   const fs::path truth = folder / "groundtruth.txt";
   TimedPoses poses;
   if (fs::exists(truth, code) || !options.fixed_camera) {
-    TSDFPP_ASSIGN(poses, ReadTimedPoses(truth));
+    TSDFPP_ASSIGN(poses, ReadTimedPoses(truth, &notes));
   }
   FileSequence sequence;
   sequence.format = DatasetFormat::kTum;

@@ -7,6 +7,7 @@
 
 #include "core/files.h"
 #include "tests/core/temp_folder.h"
+#include "tests/needs.h"
 
 namespace tsdfpp {
 namespace {
@@ -99,9 +100,7 @@ TEST(Ply, AsciiWithPolygonsForeignPropertiesAndElements) {
 
 // Written by another program; count and bounds were read with Python's struct.
 TEST(Ply, ReadsThirdPartyPoints) {
-  const std::filesystem::path geometry =
-      std::filesystem::path(TSDFPP_SHARED_DIR) / "data/metric_refs/geometry";
-  if (!std::filesystem::exists(geometry)) GTEST_SKIP() << "no " << geometry;
+  const std::filesystem::path geometry = test::CopiedData("geometry");
   const struct {
     const char* file;
     std::size_t count;

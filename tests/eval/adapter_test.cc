@@ -16,6 +16,7 @@
 #include "eval/surface_file.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
+#include "tests/needs.h"
 #include "tests/sequence/box_source.h"
 
 namespace tsdfpp {
@@ -327,7 +328,7 @@ TEST(BundledAdapters, MapTheStaticWorld) {
     EXPECT_LT(examined.at("objects")[0].at("accuracy").at("mean_m").get<double>(), kAccuracy_m)
         << name;
   }
-  if (!python) GTEST_SKIP() << "python3-open3d is not installed: its adapter was not run";
+  TSDFPP_NEEDS(python, "python3-open3d");
   EXPECT_NEAR(completion["open3d-python"], completion["open3d-scalable"], kSameCompletion);
 }
 

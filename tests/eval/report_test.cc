@@ -18,6 +18,7 @@
 #include "eval/report_video.h"
 #include "metrics/mesh_tools.h"
 #include "tests/core/temp_folder.h"
+#include "tests/needs.h"
 #include "viewer/report_template.h"
 
 namespace tsdfpp {
@@ -349,7 +350,7 @@ TEST(RecordedComparison, HoldsEachMapWithinItsTrianglesAndTheHoleOfTheScore) {
 }
 
 TEST_F(Report, MakesAPageWithItsFiguresAndNoPlaceLeft) {
-  if (ReportTemplate().empty()) GTEST_SKIP() << "this build has no report page";
+  TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
   const auto page = MakeReportPage({Run(), Copy("second")}, "tsdfpp report run");
   ASSERT_TRUE(page.has_value()) << page.error().message;
   EXPECT_LT(page->html.size(), kLargestPage_bytes);
@@ -360,7 +361,7 @@ TEST_F(Report, MakesAPageWithItsFiguresAndNoPlaceLeft) {
 
 // Key frames go, one at a time, and with them their bytes, until the page is small enough.
 TEST_F(Report, APageThatIsTooLargeLeavesOutKeyFramesAndSaysSo) {
-  if (ReportTemplate().empty()) GTEST_SKIP() << "this build has no report page";
+  TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
   const auto whole = MakeReportPage({Run()}, "c");
   ASSERT_TRUE(whole.has_value());
   const auto page = MakeReportPage({Run()}, "c", whole->html.size() - 1000);
@@ -394,7 +395,7 @@ TEST_F(Report, DroppingAKeyFrameKeepsTheBytesOfTheOthers) {
 
 // A name can say what it likes: between its <script> tags the data has no '<' at all.
 TEST_F(Report, NothingInARunCanEndTheDataOfThePage) {
-  if (ReportTemplate().empty()) GTEST_SKIP() << "this build has no report page";
+  TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
   const std::filesystem::path copy = Copy("<script>bad()<!--");
   json summary = json::parse(Text(copy / "summary.json"));
   summary["sequence"] = "</script><script>alert(1)</script><!--<script>";
@@ -467,7 +468,7 @@ TEST_F(Report, SpoiltFilesGetASentence) {
     const std::filesystem::path run = Copy(each.name);
     each.spoil(run);
     const auto page = MakeReportPage({run}, "c");
-    if (ReportTemplate().empty()) GTEST_SKIP() << "this build has no report page";
+    TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
     ASSERT_FALSE(page.has_value()) << each.name;
     EXPECT_EQ(page.error().kind, ErrorKind::kData) << each.name;
     EXPECT_NE(page.error().message.find(each.says), std::string::npos) << page.error().message;

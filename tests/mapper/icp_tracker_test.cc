@@ -13,6 +13,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "mapper/map_representation.h"
+#include "tests/needs.h"
 #include "tests/reference/analytic_scene.h"
 #include "tests/reference/icp_reference.h"
 
@@ -176,9 +177,8 @@ TEST(TrackObject, RecoversSmallMotionsOfABumpyEllipsoidAsBruteForceDoes) {
 }
 
 TEST(TrackObject, RecoversSmallMotionsOfScannedObjects) {
-  const std::filesystem::path folder =
-      std::filesystem::path(TSDFPP_SHARED_DIR) / "data/meshes/ycb_ccby4";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no YCB meshes";
+  TSDFPP_NEEDS_SHARED("meshes/ycb_ccby4");
+  const std::filesystem::path folder = test::SharedData("meshes/ycb_ccby4");
   for (const char* name : {"YcbMustardBottle.obj", "YcbPowerDrill.obj", "YcbBanana.obj"}) {
     SCOPED_TRACE(name);
     ExpectMotionsRecovered(LoadObj(folder / name));

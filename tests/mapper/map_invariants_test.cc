@@ -46,6 +46,16 @@ class Invariants : public EveryMethodTest {
 };
 TSDFPP_FOR_EVERY_METHOD(Invariants);
 
+std::vector<Method> MethodsWithLists() {
+  std::vector<Method> methods = AllMethods();
+  std::erase(methods, Method::kVolumes);
+  return methods;
+}
+
+class ListInvariants : public EveryMethodTest {};
+INSTANTIATE_TEST_SUITE_P(Methods, ListInvariants, ::testing::ValuesIn(MethodsWithLists()),
+                         [](const auto& tested) { return MethodTestName(tested.param); });
+
 TEST_P(Invariants, ValuesOutOfRangeAreNoticed) {
   ExpectFault("has distance", [](Place& p) { p.block->distance[p.observed] = 1; });
   ExpectFault("has distance", [](Place& p) {
@@ -91,8 +101,7 @@ TEST_P(Invariants, AnEmptyBlockIsNoticed) {
 }
 
 // Values that are in order by themselves, but that the lists do not know.
-TEST_P(Invariants, AListThatDoesNotFitTheValuesIsNoticed) {
-  if (GetParam() == Method::kVolumes) GTEST_SKIP() << "it stores no lists";
+TEST_P(ListInvariants, AListThatDoesNotFitTheValuesIsNoticed) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
   const InstanceId id = IsOneField(GetParam()) ? kBackground : kBrick;
   for (const auto& entry : map->GridOf(id)->entries()) {

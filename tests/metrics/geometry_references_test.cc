@@ -1,4 +1,4 @@
-// Against numbers that other programs made (shared/data/metric_refs/geometry/README): trimesh.
+// Against numbers that other programs made (tests/data/README.md): trimesh.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,29 +15,27 @@
 namespace tsdfpp {
 namespace {
 
-using testing::kData;
 using testing::ReadObj;
-const std::filesystem::path kGeometry = testing::kReferences / "geometry";
+const std::filesystem::path kGeometry = test::CopiedData("geometry");
 
 TEST(GeometryReferences, AreasEqualTrimesh) {
-  std::ifstream file(kGeometry / "mesh_properties.json");
-  if (!file) GTEST_SKIP() << "no " << kGeometry;
-  const auto expected = nlohmann::json::parse(file);
+  TSDFPP_NEEDS_SHARED("meshes/ycb_ccby4");
+  const auto expected = testing::ReadJson(kGeometry / "mesh_properties.json");
   int compared = 0;
   for (const auto& [name, properties] : expected["meshes"].items()) {
     if (!name.ends_with(".obj")) continue;
     const double area = properties["area"];
     // Single-precision vertices.
-    EXPECT_NEAR(SurfaceArea(ReadObj(kData / "meshes" / name)), area, 1e-5 * area) << name;
+    EXPECT_NEAR(SurfaceArea(ReadObj(test::SharedData("meshes") / name)), area, 1e-5 * area) << name;
     ++compared;
   }
   EXPECT_GE(compared, 5);
 }
 
 TEST(GeometryReferences, AccuracyToTheSurfaceEqualsTrimesh) {
-  std::ifstream file(kGeometry / "pointcloud_expected.json");
-  if (!file) GTEST_SKIP() << "no " << kGeometry;
-  const auto expected = nlohmann::json::parse(file)["cases"]["mustard"];
+  TSDFPP_NEEDS_SHARED("meshes/ycb_ccby4");
+  const auto expected =
+      testing::ReadJson(kGeometry / "pointcloud_expected.json")["cases"]["mustard"];
   const auto cloud = ReadPly(kGeometry / "mustard_pred_points.ply");
   ASSERT_TRUE(cloud) << cloud.error().message;
   SampleSet samples;
@@ -46,7 +44,7 @@ TEST(GeometryReferences, AccuracyToTheSurfaceEqualsTrimesh) {
   ASSERT_EQ(samples.size(), expected["n_pred"].get<std::size_t>());
 
   const TruthSurface truth(
-      testing::Model(1, ReadObj(kData / "meshes/ycb_ccby4/YcbMustardBottle.obj")));
+      testing::Model(1, ReadObj(test::SharedData("meshes/ycb_ccby4/YcbMustardBottle.obj"))));
   const std::array<double, 5> thresholds_m = {0.001, 0.002, 0.003, 0.005, 0.01};
   const AccuracyScores scores =
       ScoreAccuracy(samples, {&truth, Pose::Identity()}, std::nullopt, thresholds_m);

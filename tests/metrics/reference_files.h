@@ -1,5 +1,7 @@
-// Reads what other programs made, in shared/data, for comparison with their numbers.
+// Reads what other programs made (tests/data/README.md), for comparison with their numbers.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <array>
 #include <filesystem>
@@ -10,16 +12,21 @@
 
 #include "core/types.h"
 #include "metrics/association.h"
+#include "tests/needs.h"
 
 namespace tsdfpp::testing {
 
-inline const std::filesystem::path kData = std::filesystem::path(TSDFPP_SHARED_DIR) / "data";
-inline const std::filesystem::path kReferences = kData / "metric_refs";
-
-// Null where there is no such file.
 inline nlohmann::json ReadJson(const std::filesystem::path& path) {
   std::ifstream file(path);
+  EXPECT_TRUE(file) << path;
   return file ? nlohmann::json::parse(file) : nlohmann::json();
+}
+
+// The estimated trajectories that evo and TUM's tools measured. Some are not in the repository: a
+// test measures what is there, and ends with NEEDS.
+inline std::filesystem::path EvoFile(const std::string& name) {
+  const std::filesystem::path copied = test::CopiedData("evo_tum/" + name);
+  return std::filesystem::exists(copied) ? copied : test::SharedData("metric_refs/evo_tum/" + name);
 }
 
 inline StampedTrajectory ReadTum(const std::filesystem::path& path) {

@@ -11,7 +11,6 @@
 namespace tsdfpp {
 namespace {
 
-const std::filesystem::path kEvo = testing::kReferences / "evo_tum";
 const char* const kTruthFile = "freiburg1_xyz-groundtruth.txt";
 
 constexpr double kEvoDigits = 1e-8;
@@ -31,9 +30,8 @@ void ExpectSummary(const MeasuredSummary& summary, const nlohmann::json& expecte
 }
 
 TEST(RelativeErrors, EqualEvo) {
-  const auto expected = testing::ReadJson(kEvo / "expected_evo.json");
-  if (expected.is_null()) GTEST_SKIP() << "no " << kEvo;
-  const StampedTrajectory truth = testing::ReadTum(kEvo / kTruthFile);
+  const auto expected = testing::ReadJson(testing::EvoFile("expected_evo.json"));
+  const StampedTrajectory truth = testing::ReadTum(testing::EvoFile(kTruthFile));
   using Unit = RelativeDelta::Unit;
   const std::array<std::pair<RelativeDelta, std::string>, 4> deltas = {
       {{{1, Unit::kFrames, false}, "delta1frames"},
@@ -44,7 +42,9 @@ TEST(RelativeErrors, EqualEvo) {
     TrajectoryOptions options;
     options.deltas.clear();
     for (const auto& [delta, key] : deltas) options.deltas.push_back(delta);
-    const TrajectoryReport report = ReportTrajectory(truth, testing::ReadTum(kEvo / name), options);
+    if (!std::filesystem::exists(testing::EvoFile(name))) continue;
+    const TrajectoryReport report =
+        ReportTrajectory(truth, testing::ReadTum(testing::EvoFile(name)), options);
     for (std::size_t k = 0; k < deltas.size(); ++k) {
       const std::string& key = deltas[k].second;
       SCOPED_TRACE(name + " " + key);
@@ -53,11 +53,11 @@ TEST(RelativeErrors, EqualEvo) {
       ExpectSummary(report.relative[k].rotation_deg, numbers["rpe_rot_deg_" + key], kEvoDegrees);
     }
   }
+  TSDFPP_NEEDS_SHARED("metric_refs/evo_tum");
 }
 
 TEST(RelativeErrors, EqualTumTools) {
-  if (!std::filesystem::exists(kEvo)) GTEST_SKIP() << "no " << kEvo;
-  const StampedTrajectory truth = testing::ReadTum(kEvo / kTruthFile);
+  const StampedTrajectory truth = testing::ReadTum(testing::EvoFile(kTruthFile));
   // rmse mean median std min max of the translation, then of the rotation in degrees, as
   // evaluate_rpe.py --fixed_delta --max_pairs 0 prints them.
   struct Case {
@@ -85,8 +85,9 @@ TEST(RelativeErrors, EqualTumTools) {
   constexpr double kPrinted = 5.01e-7;
   for (const Case& expected : cases) {
     SCOPED_TRACE(expected.name);
-    RelativeErrors errors =
-        TumRelativePoseErrors(truth, testing::ReadTum(kEvo / expected.name), 1, expected.unit);
+    if (!std::filesystem::exists(testing::EvoFile(expected.name))) continue;
+    RelativeErrors errors = TumRelativePoseErrors(
+        truth, testing::ReadTum(testing::EvoFile(expected.name)), 1, expected.unit);
     ASSERT_EQ(errors.translation_m.size(), expected.stretches);
     for (double& angle : errors.rotation_rad) angle *= kDegPerRad;
     const std::array summaries = {SummariseErrors(errors.translation_m),
@@ -101,6 +102,7 @@ TEST(RelativeErrors, EqualTumTools) {
       EXPECT_NEAR(summaries[k]->largest, printed[5], kPrinted);
     }
   }
+  TSDFPP_NEEDS_SHARED("metric_refs/evo_tum");
 }
 
 TEST(Stretches, ByFrames) {

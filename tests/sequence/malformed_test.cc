@@ -21,8 +21,8 @@ TEST(Malformed, Tum) {
           {Text("groundtruth.txt", "0 0 0 zero 0 0 0 1\n"),
            "@/groundtruth.txt:1: '0 0 zero 0 0 0 1' is not a pose: expected seven numbers tx ty tz "
            "qx qy qz qw"},
-          {Text("groundtruth.txt", "0 0 0 0 0 0 0 1\n0 1 0 0 0 0 0 1\n"),
-           "@/groundtruth.txt:2: time 0 has a second, different pose"},
+          {Text("groundtruth.txt", "0 0 0 0 0 0 0 1\nnan 1 0 0 0 0 0 1\n"),
+           "@/groundtruth.txt:2: 'nan' is not a time in seconds, expected t tx ty tz qx qy qz qw"},
           {Text("groundtruth.txt", "0 0 0 0 0 0 0 9\n"),
            "@/groundtruth.txt:1: '0 0 0 0 0 0 9' is not a pose: the quaternion's length is "
            "9.000000, not 1"},

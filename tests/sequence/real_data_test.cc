@@ -1,5 +1,4 @@
 // Datasets that we did not write: what their READMEs say of them must hold of what we read.
-#include "tests/sequence/real_data.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,12 +11,13 @@
 #include "sequence/pose_matrix.h"
 #include "sequence/text_lines.h"
 #include "tests/core/temp_folder.h"
+#include "tests/needs.h"
 
 namespace tsdfpp {
 namespace {
 
 namespace fs = std::filesystem;
-using test::RealData;
+using test::SharedData;
 using test::TempFolder;
 
 constexpr Intrinsics kRos{640, 480, 525, 525, 319.5, 239.5};
@@ -73,7 +73,7 @@ void ExpectMentions(const Error& error, const std::string& words) {
 
 // tum_fr1_rpy_subset without its poses, which `change` writes.
 void CopyOfTum(const fs::path& folder, const std::function<Pose(const Pose&)>& change) {
-  const fs::path from = RealData("tum_fr1_rpy_subset");
+  const fs::path from = SharedData("tum_fr1_rpy_subset");
   for (const char* name : {"rgb", "depth", "associations.txt"}) {
     fs::create_symlink(fs::absolute(from / name), folder / name);
   }
@@ -98,9 +98,9 @@ void CopyOfTum(const fs::path& folder, const std::function<Pose(const Pose&)>& c
 }
 
 TEST(RealData, TumAsItIs) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   SequenceNotes notes;
-  const auto source = OpenSequence(RealData("tum_fr1_rpy_subset"), {}, &notes);
+  const auto source = OpenSequence(SharedData("tum_fr1_rpy_subset"), {}, &notes);
   ASSERT_TRUE(source.has_value()) << source.error().message;
   const SequenceInfo& info = (*source)->info();
   EXPECT_EQ(info.name, "tum_fr1_rpy_subset");
@@ -118,9 +118,9 @@ TEST(RealData, TumAsItIs) {
 }
 
 TEST(RealData, TumListsAndAssociationsAgree) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
-  const fs::path from = RealData("tum_fr1_rpy_subset");
+  const fs::path from = SharedData("tum_fr1_rpy_subset");
   for (const char* name : {"rgb", "depth", "rgb.txt", "depth.txt", "groundtruth.txt"}) {
     fs::create_symlink(fs::absolute(from / name), folder / name);
   }
@@ -138,7 +138,7 @@ TEST(RealData, TumListsAndAssociationsAgree) {
 }
 
 TEST(RealData, TumInvertedPosesAreNamed) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   CopyOfTum(folder.path(), [](const Pose& T) { return T.inverse(); });
   ExpectMentions(ErrorOf(folder.path()), "camera poses look inverted");
@@ -148,7 +148,7 @@ TEST(RealData, TumInvertedPosesAreNamed) {
 }
 
 TEST(RealData, TumMillimetrePositionsAreNamed) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   CopyOfTum(folder.path(), [](Pose T) {
     T.translation() *= 1000;
@@ -158,7 +158,7 @@ TEST(RealData, TumMillimetrePositionsAreNamed) {
 }
 
 TEST(RealData, TumOpenGlAxesAreNamed) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   CopyOfTum(folder.path(), [](Pose T) {
     T.linear() = T.linear() * Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
@@ -168,22 +168,22 @@ TEST(RealData, TumOpenGlAxesAreNamed) {
 }
 
 TEST(RealData, TumWrongUnitIsNamed) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   SequenceOptions options;
   options.depth_units_per_m = 1;
-  ExpectMentions(ErrorOf(RealData("tum_fr1_rpy_subset"), options),
+  ExpectMentions(ErrorOf(SharedData("tum_fr1_rpy_subset"), options),
                  "at 1 units a metre, expected 0.05 to 50 m: another unit");
 }
 
 TEST(RealData, TumIntrinsicsOfHalfTheResolutionAreNamed) {
-  TSDFPP_NEEDS_REAL_DATA("tum_fr1_rpy_subset");
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   SequenceOptions options;
   options.intrinsics = Intrinsics{0, 0, 262.5, 262.5, 159.5, 119.5};
-  ExpectMentions(ErrorOf(RealData("tum_fr1_rpy_subset"), options),
+  ExpectMentions(ErrorOf(SharedData("tum_fr1_rpy_subset"), options),
                  "the principal point (159.5, 119.5) is far from the middle of the 640x480 image");
   options.intrinsics->width = 320;
   options.intrinsics->height = 240;
-  const auto source = OpenSequence(RealData("tum_fr1_rpy_subset"), options);
+  const auto source = OpenSequence(SharedData("tum_fr1_rpy_subset"), options);
   ASSERT_TRUE(source.has_value());
   const auto frame = (*source)->Read(0);
   ASSERT_FALSE(frame.has_value());
@@ -192,10 +192,10 @@ TEST(RealData, TumIntrinsicsOfHalfTheResolutionAreNamed) {
 
 // README: median 0.56 mm with fy = -480, 3.0 mm with +480.
 TEST(RealData, IclNuimWithDepthFirstAndNegativeFy) {
-  TSDFPP_NEEDS_REAL_DATA("icl_nuim_mini");
+  TSDFPP_NEEDS_SHARED("icl_nuim_mini");
   SequenceOptions options;
   options.intrinsics = Intrinsics{640, 480, 481.2, -480, 319.5, 239.5};
-  const auto source = OpenSequence(RealData("icl_nuim_mini"), options);
+  const auto source = OpenSequence(SharedData("icl_nuim_mini"), options);
   ASSERT_TRUE(source.has_value()) << source.error().message;
   EXPECT_EQ((*source)->info().frame_count, 3);
   EXPECT_EQ((*source)->info().intrinsics.fy, 480);
@@ -208,13 +208,13 @@ TEST(RealData, IclNuimWithDepthFirstAndNegativeFy) {
   EXPECT_LT(farthest, 3.45);
   EXPECT_LT(WarpError_m(**source), 0.001);
   options.intrinsics->fy = 480;
-  EXPECT_GT(WarpError_m(*OpenSequence(RealData("icl_nuim_mini"), options).value()), 0.002);
+  EXPECT_GT(WarpError_m(*OpenSequence(SharedData("icl_nuim_mini"), options).value()), 0.002);
 }
 
 // apc_shelf_scene0000 has 7-Scenes' layout, but 10000 units a metre: 0.09 to 1.9 m.
 TEST(RealData, ShelfInSevenScenesLayout) {
-  TSDFPP_NEEDS_REAL_DATA("apc_shelf_scene0000");
-  const fs::path folder = RealData("apc_shelf_scene0000");
+  TSDFPP_NEEDS_SHARED("apc_shelf_scene0000");
+  const fs::path folder = SharedData("apc_shelf_scene0000");
   ExpectMentions(ErrorOf(folder), "depth looks like 10000 units a metre, it was read as 1000");
   SequenceOptions options;
   options.depth_units_per_m = 10000;
@@ -230,7 +230,7 @@ TEST(RealData, ShelfInSevenScenesLayout) {
 
 // Open3D's frames laid out as ScanNet's: the poses come from its trajectory.log.
 void WriteAsScannet(const fs::path& folder, const std::function<Pose(const Pose&)>& change) {
-  const fs::path from = RealData("open3d_redwood5");
+  const fs::path from = SharedData("open3d_redwood5");
   for (const char* name : {"color", "depth"}) {
     fs::create_directory_symlink(fs::absolute(from / name), folder / name);
   }
@@ -250,7 +250,7 @@ void WriteAsScannet(const fs::path& folder, const std::function<Pose(const Pose&
 
 // README: 5.1 mm as camera-to-world, 39 mm inverted.
 TEST(RealData, RedwoodInScannetLayout) {
-  TSDFPP_NEEDS_REAL_DATA("open3d_redwood5");
+  TSDFPP_NEEDS_SHARED("open3d_redwood5");
   const TempFolder folder;
   WriteAsScannet(folder.path(), [](const Pose& T) { return T; });
   const auto source = OpenSequence(folder.path());
@@ -261,7 +261,7 @@ TEST(RealData, RedwoodInScannetLayout) {
 }
 
 TEST(RealData, RedwoodInvertedIsNamed) {
-  TSDFPP_NEEDS_REAL_DATA("open3d_redwood5");
+  TSDFPP_NEEDS_SHARED("open3d_redwood5");
   const TempFolder folder;
   WriteAsScannet(folder.path(), [](const Pose& T) { return T.inverse(); });
   ExpectMentions(ErrorOf(folder.path()), "camera poses look inverted");

@@ -11,6 +11,7 @@
 
 #include "core/files.h"
 #include "tests/core/temp_folder.h"
+#include "tests/needs.h"
 #include "tests/sim/scene_files.h"
 
 namespace tsdfpp {
@@ -117,9 +118,7 @@ TEST(CameraPath, JitterHasItsStatedSizeAndBand) {
 
 // The recording is a real one; what stays of it is its relative motion.
 TEST(CameraPath, ARecordingKeepsItsRelativeMotion) {
-  const std::string file =
-      std::string(TSDFPP_SHARED_DIR) + "/data/tum_fr1_rpy_subset/groundtruth.txt";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
+  const std::string file = test::CopiedData("evo_tum/freiburg1_xyz-groundtruth.txt");
   // Read here by hand.
   std::ifstream in(file);
   std::vector<std::pair<double, Pose>> lines;

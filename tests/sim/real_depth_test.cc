@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sim/depth_noise.h"
+#include "tests/needs.h"
 
 namespace tsdfpp {
 namespace {
@@ -16,7 +17,6 @@ namespace {
 // The distinct valid values of a folder's 16-bit depth images.
 std::set<int> DepthValues(const std::filesystem::path& folder) {
   std::set<int> values;
-  if (!std::filesystem::exists(folder)) return values;
   for (const auto& file : std::filesystem::directory_iterator(folder)) {
     if (file.path().extension() != ".png") continue;
     const cv::Mat image = cv::imread(file.path().string(), cv::IMREAD_UNCHANGED);
@@ -34,8 +34,8 @@ std::set<int> DepthValues(const std::filesystem::path& folder) {
 // Redwood's own simulated depth (whole millimetres, rounded down): every value is one of our
 // levels.
 TEST(RealDepth, RedwoodsFilesHoldOurLevels) {
-  const std::set<int> values = DepthValues(TSDFPP_SHARED_DIR "/data/open3d_redwood5/depth");
-  if (values.empty()) GTEST_SKIP() << "no open3d_redwood5 in shared data";
+  TSDFPP_NEEDS_SHARED("open3d_redwood5");
+  const std::set<int> values = DepthValues(test::SharedData("open3d_redwood5/depth"));
   ASSERT_GT(values.size(), 100U);
   for (const int millimetres : values) {
     // The level nearest to the middle of what was rounded down; levels are 2 mm apart or more.
@@ -50,8 +50,8 @@ TEST(RealDepth, RedwoodsFilesHoldOurLevels) {
 TEST(RealDepth, KinectStepsAreIclNuimSteps) {
   constexpr double kCalibration = 0.04;
   constexpr double kUnitsPerMetre = 5000;
-  const std::set<int> values = DepthValues(TSDFPP_SHARED_DIR "/data/tum_fr1_rpy_subset/depth");
-  if (values.empty()) GTEST_SKIP() << "no tum_fr1_rpy_subset in shared data";
+  TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
+  const std::set<int> values = DepthValues(test::SharedData("tum_fr1_rpy_subset/depth"));
   std::vector<double> steps;  // of inverse depth, 1 / m
   for (auto value = values.begin(); std::next(value) != values.end(); ++value) {
     steps.push_back(kUnitsPerMetre / *value - kUnitsPerMetre / *std::next(value));
