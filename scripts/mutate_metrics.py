@@ -47,9 +47,9 @@ def read_list(path):
             if len(parts) != 3:
                 sys.exit(f"{path}: cannot read the line '{line}', expected '# name | file | test'")
             mutations.append(Mutation(*parts, [], []))
-        elif line.startswith("- "):
+        elif line.startswith("- ") and mutations:
             mutations[-1].before.append(line[2:])
-        elif line.startswith("+ "):
+        elif line.startswith("+ ") and mutations:
             mutations[-1].after.append(line[2:])
         elif line.strip():
             sys.exit(f"{path}: cannot read the line '{line}'")

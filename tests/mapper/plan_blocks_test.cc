@@ -117,8 +117,8 @@ TEST_P(PlanBlocksTest, AllInViewIsSaidOfBlocksWithoutAVoxelOutside) {
   EXPECT_LT(inside, planned.size()) << "none at the border";
 }
 
-// What the plan tells the kernels of a block (that all of it is in view, from where on it is hidden)
-// takes no observation away and adds none.
+// What the plan tells the kernels of a block (that all of it is in view, from where on it is
+// hidden) takes no observation away and adds none.
 TEST_P(PlanBlocksTest, APlannedBlockIsObservedAsTheReferenceDoes) {
   Dice dice(static_cast<std::uint64_t>(GetParam()) + 11);
   const MapConfig config = ToyConfig(1 + GetParam() % 4);
@@ -130,9 +130,10 @@ TEST_P(PlanBlocksTest, APlannedBlockIsObservedAsTheReferenceDoes) {
   const reference::View plain(frame, frame.mask, Pose::Identity(), config);
   const std::vector<Index3> blocks = BlocksOfBox();
   std::size_t observed = 0;
-  for (const PlannedBlock& block :
-       PlanBlocks(view, blocks.size(), config.voxel(), config.back(),
-                  [&](std::size_t i) -> BlockCandidate { return {blocks[i], &T_CL, 1, true}; })) {
+  for (const PlannedBlock& block : PlanBlocks(view, blocks.size(), config.voxel(), config.back(),
+                                              [&](std::size_t i) -> BlockCandidate {
+                                                return {blocks[i], &T_CL, 1, true};
+                                              })) {
     const Index3& index = blocks[block.number];
     BlockObservation observation;
     const bool any = ObserveVoxels(view.kernel, PlaceOf(T_CL, index, config.voxel(), block),
