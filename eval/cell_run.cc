@@ -53,11 +53,6 @@ RunCosts CellMapper::costs() const {
   return {times_, frame_s_, pipeline_->map().Memory().bytes};
 }
 
-std::set<InstanceId> MoversNow(const SequenceInfo& info, const SceneTruth& truth) {
-  if (!info.reveal || info.reveal->removed.empty()) return truth.moved();
-  return {info.reveal->removed.begin(), info.reveal->removed.end()};
-}
-
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
                                            const std::function<void()>& progress) {

@@ -34,10 +34,6 @@ class CellMapper {
   std::vector<double> frame_s_;  // of each frame
 };
 
-// The objects whose removal the experiment is about: those that the scene names; in a scene that
-// names none, those that have moved so far.
-std::set<InstanceId> MoversNow(const SequenceInfo& info, const SceneTruth& truth);
-
 // The results of `cells`, which all have the frames of `variant`, in their order. `progress` is
 // called after each frame. Errors: those of the source; kData where a frame does not fit the truth.
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,

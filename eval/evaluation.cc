@@ -57,12 +57,11 @@ class Evaluator {
  public:
   Evaluator(const SceneTruth& truth, double voxel_m) : truth_(truth), voxel_m_(voxel_m) {}
 
-  // Everything about object i on the scene mesh `mesh`, from which `removed` were removed.
+  // Everything about object i on the scene mesh `mesh`, from which the other movers were removed.
   // `unlabelled` are samples of a mesh without labels, by the object that each is nearest to; null
   // where there are labels.
   ObjectScores ScoreObject(std::size_t i, const ObjectInfo& info, const TriangleMesh& mesh,
-                           const std::vector<SampleSet>* unlabelled,
-                           const std::set<InstanceId>& removed, LastSeenStore& last_seen,
+                           const std::vector<SampleSet>* unlabelled, LastSeenStore& last_seen,
                            Selection* reconstructed_out) const {
     const SeenTracker& tracker = truth_.trackers()[i];
     const SampleSet& samples = tracker.samples_O();
@@ -102,8 +101,9 @@ class Evaluator {
           ShareOf(samples, seen, Reconstructed(match, thresholds_m[k]), "nothing was seen yet");
       scores.f_score[k] = FScore(scores.accuracy.precision[k], scores.recall[k]);
     }
+    // The map has lost the movers, the world has not: their crust under another name is impure.
     scores.label_purity = unlabelled == nullptr
-                              ? ScoreLabelPurity(surface, info.id, truth_.PlacedWithout(removed))
+                              ? ScoreLabelPurity(surface, info.id, truth_.PlacedWithout({}))
                               : Measured::Undefined(kNoLabels);
     if (reconstructed_out != nullptr) *reconstructed_out = reconstructed;
     return scores;
@@ -213,8 +213,8 @@ Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
       std::set<InstanceId> removed = movers;
       removed.erase(id);
       result.objects.push_back(evaluator.ScoreObject(
-          i, names[i], meshes.Without(removed), meshes.labelled ? nullptr : &nearest, removed,
-          last_seen[i], id == kBackground ? &result.table_reconstructed : nullptr));
+          i, names[i], meshes.Without(removed), meshes.labelled ? nullptr : &nearest, last_seen[i],
+          id == kBackground ? &result.table_reconstructed : nullptr));
 
       const Selection visible = SelectSeenWith(tracker, SampleStatus::kVisible, SelectAll(samples));
       const Selection present =

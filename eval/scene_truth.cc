@@ -46,4 +46,9 @@ std::vector<PlacedTruth> SceneTruth::PlacedWithout(const std::set<InstanceId>& r
   return placed;
 }
 
+std::set<InstanceId> MoversNow(const SequenceInfo& info, const SceneTruth& truth) {
+  if (!info.reveal || info.reveal->removed.empty()) return truth.moved();
+  return {info.reveal->removed.begin(), info.reveal->removed.end()};
+}
+
 }  // namespace tsdfpp

@@ -57,4 +57,8 @@ class SceneTruth {
   std::deque<Frame> recent_;
 };
 
+// The objects whose removal the experiment is about: those that the scene names; in a scene that
+// names none, those that have moved so far.
+std::set<InstanceId> MoversNow(const SequenceInfo& info, const SceneTruth& truth);
+
 }  // namespace tsdfpp

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "tests/reference/analytic_scene.h"
 
@@ -216,6 +217,38 @@ TEST(SceneSanity, InvalidDepthIsNotMapped) {
   const cv::Mat mapped = MappedPixels({frame}, kSanityVoxel_m);
   EXPECT_EQ(Count(mapped.colRange(kEdge + 1, kSanityCamera.width)), 0);
   EXPECT_GT(Count(mapped.colRange(0, kEdge)), 0);
+}
+
+// A plane that is turned away from the camera by 80 deg: seen at more than 75 deg it is not mapped.
+TEST(SceneSanity, GrazingPixelsAreNotMapped) {
+  const double turn = 80 * std::numbers::pi / 180;
+  const double limit = std::cos(75 * std::numbers::pi / 180);
+  // Where the plane is as steep as this a pixel more or less decides.
+  constexpr double kDoubtful = 0.02;
+  Frame frame = Wall(1, kEdge, 1, kBackground);
+  const auto cosine = [&](int v, int u) {
+    const double x = (u - kSanityCamera.cx) / kSanityCamera.fx;
+    const double y = (v - kSanityCamera.cy) / kSanityCamera.fy;
+    return (std::sin(turn) * x + std::cos(turn)) / std::sqrt(1 + x * x + y * y);
+  };
+  // To the left of this column the plane runs into the distance, and its depth jumps.
+  const int first = static_cast<int>(kSanityCamera.cx);
+  for (int u = 0; u < kSanityCamera.width; ++u) {
+    const double x = (std::max(u, first - 5) - kSanityCamera.cx) / kSanityCamera.fx;
+    frame.depth.col(u).setTo(cv::Scalar(0.3 / (std::sin(turn) * x + std::cos(turn))));
+  }
+  const cv::Mat mapped = MappedPixels({frame}, kSanityVoxel_m);
+  int squarely = 0;
+  int grazing = 0;
+  for (int v = 0; v < kSanityCamera.height; ++v) {
+    for (int u = first; u < kSanityCamera.width; ++u) {
+      if (std::abs(cosine(v, u) - limit) < kDoubtful) continue;
+      EXPECT_EQ(mapped.at<std::uint8_t>(v, u) != 0, cosine(v, u) > limit) << u << " " << v;
+      ++(cosine(v, u) > limit ? squarely : grazing);
+    }
+  }
+  EXPECT_GT(squarely, 1000);
+  EXPECT_GT(grazing, 500);
 }
 
 // What an earlier frame did not see is not mapped yet.

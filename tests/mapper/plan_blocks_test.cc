@@ -1,16 +1,16 @@
-// Blocks that are left out of a frame's fusion would have taken nothing from it.
+// Blocks that are left out of a frame's fusion would have taken nothing from it. What a frame has
+// to say is asked of the reference, voxel by voxel, and of no kernel.
 #include <gtest/gtest.h>
 
-#include <limits>
+#include <optional>
 #include <set>
 
 #include "mapper/observation.h"
 #include "tests/mapper/toy_scene.h"
+#include "tests/reference/dense_voxel.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr PlannedBlock kUnplanned{0, kNoInstance, std::numeric_limits<float>::infinity(), false};
 
 std::vector<Index3> BlocksOfBox() {
   std::vector<Index3> blocks;
@@ -22,25 +22,27 @@ std::vector<Index3> BlocksOfBox() {
   return blocks;
 }
 
-// What a block's voxels see: labels of pixels that are not behind the band.
-std::set<InstanceId> LabelsSeen(const FrameView& view, const CameraFromLattice& T_CL,
-                                const Index3& block, const MapConfig& config) {
-  BlockObservation observation;
-  std::set<InstanceId> labels;
-  if (!ObserveVoxels(view.kernel, PlaceOf(T_CL, block, config.voxel(), kUnplanned), config.back(),
-                     observation)) {
-    return labels;
+// What the frame says of each of the block's voxels; nothing where it is not observed, or lies
+// behind the band.
+std::vector<std::optional<reference::Seen>> Observations(const reference::View& view,
+                                                         const Index3& block,
+                                                         const MapConfig& config) {
+  std::vector<std::optional<reference::Seen>> all;
+  for (int place = 0; place < kBlockVoxels; ++place) {
+    const Index3 v = VoxelAt(block, place);
+    all.push_back(view.Look({v.x, v.y, v.z}));
+    if (all.back() && all.back()->s < -config.back()) all.back().reset();
   }
-  for (const std::int32_t pixel : observation.pixel) {
-    if (pixel >= 0) labels.insert(view.kernel.label[pixel]);
-  }
-  return labels;
+  return all;
 }
 
-std::vector<std::int32_t> PixelsOf(const FrameView& view, const BlockPlace& place, float back) {
-  BlockObservation observation;
-  if (!ObserveVoxels(view.kernel, place, back, observation)) return {};
-  return {observation.pixel.begin(), observation.pixel.end()};
+std::set<InstanceId> LabelsSeen(const reference::View& view, const Index3& block,
+                                const MapConfig& config) {
+  std::set<InstanceId> labels;
+  for (const auto& seen : Observations(view, block, config)) {
+    if (seen) labels.insert(seen->label);
+  }
+  return labels;
 }
 
 class PlanBlocksTest : public ::testing::TestWithParam<int> {};
@@ -54,7 +56,10 @@ TEST_P(PlanBlocksTest, LeavesOutOnlyWhatTheFrameDoesNotSee) {
   frame.mask(cv::Rect(dice.Whole(60), dice.Whole(40), 20, 15)).setTo(kNoInstance);
   const FrameView view(frame, frame.mask);
   const CameraFromLattice T_CL(frame.T_WC, Pose::Identity(), true);
+  const reference::View plain(frame, frame.mask, Pose::Identity(), config);
   const std::vector<Index3> blocks = BlocksOfBox();
+  std::vector<std::set<InstanceId>> seen_in;
+  for (const Index3& block : blocks) seen_in.push_back(LabelsSeen(plain, block, config));
   for (const InstanceId id : ToyIds()) {
     for (const bool of_any_label : {false, true}) {
       std::map<std::size_t, InstanceId> planned;
@@ -68,7 +73,7 @@ TEST_P(PlanBlocksTest, LeavesOutOnlyWhatTheFrameDoesNotSee) {
       EXPECT_GT(planned.size(), 4U);
       EXPECT_LT(planned.size(), blocks.size() / 2) << "nothing is left out";
       for (std::size_t i = 0; i < blocks.size(); ++i) {
-        const std::set<InstanceId> seen = LabelsSeen(view, T_CL, blocks[i], config);
+        const std::set<InstanceId>& seen = seen_in[i];
         const auto plan = planned.find(i);
         if (plan == planned.end()) {
           EXPECT_FALSE(of_any_label ? !seen.empty() : seen.contains(id)) << "block " << i;
@@ -107,13 +112,45 @@ TEST_P(PlanBlocksTest, AllInViewIsSaidOfBlocksWithoutAVoxelOutside) {
     EXPECT_TRUE(all || !block.all_in_view) << "block " << block.number;
     inside += all ? 1 : 0;
     in_view += block.all_in_view ? 1 : 0;
-    BlockPlace place = PlaceOf(T_CL, blocks[block.number], config.voxel(), block);
-    const auto pixels = PixelsOf(view, place, config.back());
-    place.all_in_view = false;
-    EXPECT_EQ(pixels, PixelsOf(view, place, config.back()));
   }
   EXPECT_GT(2 * in_view, inside) << "hardly any";
   EXPECT_LT(inside, planned.size()) << "none at the border";
+}
+
+// What the plan tells the kernels of a block (that all of it is in view, from where on it is
+// hidden) takes no observation away and adds none.
+TEST_P(PlanBlocksTest, APlannedBlockIsObservedAsTheReferenceDoes) {
+  Dice dice(static_cast<std::uint64_t>(GetParam()) + 11);
+  const MapConfig config = ToyConfig(1 + GetParam() % 4);
+  Frame frame = RenderToys(TableWithToys(), dice.Uniform(0, 6.28));
+  frame.depth(cv::Rect(dice.Whole(60), dice.Whole(40), 20, 15)).setTo(0);
+  frame.mask(cv::Rect(dice.Whole(60), dice.Whole(40), 20, 15)).setTo(kNoInstance);
+  const FrameView view(frame, frame.mask);
+  const CameraFromLattice T_CL(frame.T_WC, Pose::Identity(), true);
+  const reference::View plain(frame, frame.mask, Pose::Identity(), config);
+  const std::vector<Index3> blocks = BlocksOfBox();
+  std::size_t observed = 0;
+  for (const PlannedBlock& block : PlanBlocks(view, blocks.size(), config.voxel(), config.back(),
+                                              [&](std::size_t i) -> BlockCandidate {
+                                                return {blocks[i], &T_CL, 1, true};
+                                              })) {
+    const Index3& index = blocks[block.number];
+    BlockObservation observation;
+    const bool any = ObserveVoxels(view.kernel, PlaceOf(T_CL, index, config.voxel(), block),
+                                   config.back(), observation);
+    const auto expected = Observations(plain, index, config);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      if (!expected[i]) {
+        ASSERT_TRUE(!any || observation.pixel[i] == -1) << "block " << block.number << ", " << i;
+        continue;
+      }
+      ASSERT_TRUE(any) << "block " << block.number << ", " << i;
+      ASSERT_EQ(observation.pixel[i], expected[i]->pixel) << "block " << block.number << ", " << i;
+      ASSERT_EQ(observation.distance[i], expected[i]->s) << "block " << block.number << ", " << i;
+      ++observed;
+    }
+  }
+  EXPECT_GT(observed, 1000U);
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ struct Seen {
   float s = 0;  // metres along the ray, positive in front of the surface
   InstanceId label = kNoInstance;
   Colour colour{};
+  int pixel = 0;  // row-major
 };
 
 // How one frame sees the lattice whose pose is T_WL.
