@@ -1,4 +1,5 @@
-// What a comparison leaves: summary.json, frames.csv, table.txt, report.html (docs/command-line.md).
+// What a comparison leaves: summary.json, frames.csv, table.txt, report.html
+// (docs/command-line.md).
 #pragma once
 
 #include <filesystem>
