@@ -15,16 +15,18 @@ Expected<void> RunFigures(const FigureOptions& options) {
     const char* name;
     Expected<void> (*measure)(const FigureOptions&);
   };
-  constexpr std::array<Part, 5> kParts{{{"decay", MeasureDecay},
+  constexpr std::array<Part, 6> kParts{{{"decay", MeasureDecay},
                                         {"layers", MeasureLayers},
                                         {"switches", MeasureSwitches},
                                         {"sweep", MeasureSweep},
-                                        {"slice", MeasureSlice}}};
+                                        {"slice", MeasureSlice},
+                                        {"ghosts", MeasureGhosts}}};
   for (const std::string& wanted : options.parts) {
     const auto is_wanted = [&](const Part& part) { return part.name == wanted; };
     if (std::none_of(kParts.begin(), kParts.end(), is_wanted)) {
       return UsageError(
-          "--parts has '{}', expected some of decay, layers, switches, sweep and slice", wanted);
+          "--parts has '{}', expected some of decay, layers, switches, sweep, slice and ghosts",
+          wanted);
     }
   }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));

@@ -11,7 +11,7 @@ namespace tsdfpp {
 
 struct FigureOptions {
   std::string out = "out/map-figures";
-  std::vector<std::string> parts{"decay", "layers", "switches", "sweep", "slice"};
+  std::vector<std::string> parts{"decay", "layers", "switches", "sweep", "slice", "ghosts"};
 };
 
 // Errors: kUsage for an unknown part, else those of the scenes and the renderer, kEnvironment where
@@ -34,5 +34,9 @@ Expected<void> MeasureSweep(const FigureOptions& options);
 // slice.csv: the voxels of a vertical slice through table and car of scenes/mini.toml, before,
 // during and after the car's passage.
 Expected<void> MeasureSlice(const FigureOptions& options);
+// ghosts.csv: where the ghosts of scenes/mini.toml and scenes/toycar3.toml (half-size images) lie
+// at the reveal, before and after the removal, and what the frames said of the space half a voxel
+// under them.
+Expected<void> MeasureGhosts(const FigureOptions& options);
 
 }  // namespace tsdfpp

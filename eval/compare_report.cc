@@ -1,5 +1,6 @@
 #include "eval/compare_report.h"
 
+#include <algorithm>
 #include <thread>
 
 #include "core/files.h"
@@ -106,28 +107,41 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"evaluations", evaluations}};
 }
 
+// The columns of an evaluation as cells of frames.csv, and their titles.
+std::string CsvCells(const CompareResult& result, const Evaluation& evaluation) {
+  std::string csv;
+  const auto add = [&](const Measured& value) {
+    csv += value.value ? fmt::format(",{:.6g}", *value.value) : ",";
+  };
+  for (const EvaluationColumn& column : EvaluationColumns()) {
+    add(column.value(result.movers, evaluation));
+    if (column.error) add(column.error(evaluation));
+  }
+  return csv;
+}
+std::string CsvTitles() {
+  std::string csv;
+  for (const EvaluationColumn& column : EvaluationColumns()) {
+    csv += "," + column.csv;
+    if (column.error) csv += "," + column.csv + "_se";
+  }
+  return csv;
+}
+
 std::string Csv(const CompareResult& result) {
-  std::string csv = "frame,method,profile,poses";
-  for (const EvaluationColumn& column : EvaluationColumns()) csv += "," + column.csv;
-  csv += ",mesh_s,evaluate_s\n";
+  std::string csv = "frame,method,profile,poses" + CsvTitles() + ",mesh_s,evaluate_s\n";
   for (const auto& run : result.runs) {
     for (const Evaluation& evaluation : run->evaluations) {
       csv += fmt::format("{},{},{},{}", evaluation.frame, MethodName(run->config.method),
                          run->profile, PoseSourceName(run->config.poses));
-      for (const EvaluationColumn& column : EvaluationColumns()) {
-        const Measured value = column.value(result.movers, evaluation);
-        csv += value.value ? fmt::format(",{:.6g}", *value.value) : ",";
-      }
+      csv += CsvCells(result, evaluation);
       csv += fmt::format(",{:.4f},{:.4f}\n", evaluation.mesh_s, evaluation.evaluate_s);
     }
   }
   for (const auto& run : result.adapters) {
     for (const Evaluation& evaluation : run->evaluations) {
       csv += fmt::format("{},{},,", evaluation.frame, run->config.name);
-      for (const EvaluationColumn& column : EvaluationColumns()) {
-        const Measured value = column.value(result.movers, evaluation);
-        csv += value.value ? fmt::format(",{:.6g}", *value.value) : ",";
-      }
+      csv += CsvCells(result, evaluation);
       csv += fmt::format(",,{:.4f}\n", evaluation.evaluate_s);
     }
   }
@@ -244,9 +258,11 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       "map had of it "
       "when it was last visible. visible: share of all that is seen now that the visible scene "
       "has. table: the same of the "
-      "table. movers: mean completion of the moving objects. ghost: reconstructed area where there "
-      "is nothing, before "
-      "and after the removal. sane: share of mapped pixels whose depth and id the visible scene "
+      "table. movers: mean completion of the moving objects. ghost: reconstructed area in space "
+      "known to be free, before "
+      "and after the removal, with the standard error of sampling; unseen: the same after the "
+      "removal where nobody has seen that there is nothing. sane: share of mapped pixels whose "
+      "depth and id the visible scene "
       "shows, over "
       "all and of the worst object. Times are medians a frame on this machine.</p>\n";
   if (!result.config.truth_note.empty()) {

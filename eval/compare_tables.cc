@@ -8,8 +8,10 @@
 namespace tsdfpp {
 namespace {
 
-std::string Text(const Measured& measured, int decimals) {
-  return measured.value ? fmt::format("{:.{}f}", *measured.value, decimals) : "-";
+// Characters of UTF-8.
+std::size_t WidthOf(const std::string& text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
 double MedianMs(const nlohmann::json& spread) {
@@ -22,7 +24,7 @@ using Rows = std::vector<std::vector<std::string>>;
 std::string Aligned(const Rows& rows) {
   std::vector<std::size_t> width(rows[0].size(), 0);
   for (const auto& row : rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], WidthOf(row[c]));
   }
   std::string text;
   for (const auto& row : rows) {
@@ -86,7 +88,7 @@ std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
     const Evaluation& evaluation = Examined(result, *run);
     std::vector<std::string> row{run->Title()};
     for (const EvaluationColumn& column : EvaluationColumns()) {
-      row.push_back(Text(column.value(result.movers, evaluation), column.decimals));
+      row.push_back(ColumnText(column, result.movers, evaluation));
     }
     const nlohmann::json times = run->times.ToJson();
     row.push_back(fmt::format("{:.1f}", MedianMs(times["update_poses"])));
@@ -100,7 +102,7 @@ std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
     const Evaluation& evaluation = Examined(result, run->evaluations);
     std::vector<std::string> row{TitleOf(*run)};
     for (const EvaluationColumn& column : EvaluationColumns()) {
-      row.push_back(Text(column.value(result.movers, evaluation), column.decimals));
+      row.push_back(ColumnText(column, result.movers, evaluation));
     }
     row.insert(row.end(), {"-", "-", "-"});  // its times and memory are another program's
     rows.push_back(std::move(row));
@@ -146,7 +148,7 @@ std::string FrontTable(const CompareResult& result) {
           1 + kFrontColumns.size() * static_cast<std::size_t>(profile - profiles.begin());
       for (const FrontColumn& front : kFrontColumns) {
         const EvaluationColumn& column = ColumnOf(front.csv);
-        row[at++] = Text(column.value(result.movers, Examined(result, *run)), column.decimals);
+        row[at++] = ColumnText(column, result.movers, Examined(result, *run));
       }
     }
     rows.push_back(std::move(row));

@@ -153,8 +153,7 @@ std::string EvaluateTable(const EvaluateResult& result) {
   for (const EvaluatedFrame& frame : result.frames) {
     text += fmt::format("{:<8}", frame.evaluation.frame);
     for (const EvaluationColumn& column : EvaluationColumns()) {
-      const Measured value = column.value(result.config.removed, frame.evaluation);
-      text += fmt::format("  {:>{}}", Cell(value, column.decimals),
+      text += fmt::format("  {:>{}}", ColumnText(column, result.config.removed, frame.evaluation),
                           std::max<std::size_t>(9, column.title.size()));
     }
     text += frame.evaluation.labelled ? "\n" : "  (any label)\n";

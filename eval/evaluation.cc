@@ -145,6 +145,27 @@ class Evaluator {
   double voxel_m_;
 };
 
+// Ghosts after the removal of `movers`; `revealed` is null where nothing can be removed.
+void ScoreRevealedGhosts(const TriangleMesh* revealed, const SceneTruth& truth,
+                         const std::set<InstanceId>& movers, double voxel_m, Evaluation& result) {
+  for (Measured* each : {&result.revealed_ghost_area_m2, &result.revealed_ghost_error_m2,
+                         &result.revealed_unseen_area_m2, &result.revealed_unseen_error_m2}) {
+    *each = Measured::Undefined(kNoLabels);
+  }
+  if (revealed == nullptr) return;
+  std::set<InstanceId> stay;
+  for (const SeenTracker& tracker : truth.trackers()) {
+    if (!movers.contains(tracker.id())) stay.insert(tracker.id());
+  }
+  const GhostScores scores = ScoreGhosts(*revealed, truth.PlacedWithout(movers),
+                                         truth.PlacedWithout(stay), voxel_m, truth.free_space());
+  const AreaEstimate& unseen = scores.space[static_cast<std::size_t>(GhostSpace::kUnseen)];
+  result.revealed_ghost_area_m2 = Measured::Of(scores.ghosts.area_m2);
+  result.revealed_ghost_error_m2 = Measured::Of(scores.ghosts.standard_error_m2);
+  result.revealed_unseen_area_m2 = Measured::Of(unseen.area_m2);
+  result.revealed_unseen_error_m2 = Measured::Of(unseen.standard_error_m2);
+}
+
 }  // namespace
 
 LastSeenStores MakeLastSeenStores(const SceneTruth& truth) {
@@ -235,15 +256,12 @@ Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
                                                  : Measured::Undefined("nothing seen is visible");
   };
   const auto score_scene = [&] {
-    const GhostScores ghosts = ScoreGhosts(SampleReconstruction(meshes.scene, {}),
-                                           truth.PlacedWithout({}), voxel_m, &truth.free_space());
-    result.ghost_area_m2 = ghosts.area_m2;
+    const GhostScores ghosts =
+        ScoreGhosts(meshes.scene, truth.PlacedWithout({}), {}, voxel_m, truth.free_space());
+    result.ghost_area_m2 = ghosts.ghosts.area_m2;
+    result.ghost_error_m2 = ghosts.ghosts.standard_error_m2;
     result.ghost_share = ghosts.share_of_mesh;
-    result.revealed_ghost_area_m2 =
-        meshes.labelled ? Measured::Of(ScoreGhosts(SampleReconstruction(revealed, {}),
-                                                   truth.PlacedWithout(movers), voxel_m, nullptr)
-                                           .area_m2)
-                        : Measured::Undefined(kNoLabels);
+    ScoreRevealedGhosts(meshes.labelled ? &revealed : nullptr, truth, movers, voxel_m, result);
     result.sanity = ScoreSanity(meshes.scene, truth.recent(), voxel_m);
   };
   // Each writes its own part of the result.
@@ -332,8 +350,12 @@ nlohmann::json ToJson(const Evaluation& evaluation) {
           {"objects", objects},
           {"visible_completion", ToJson(evaluation.visible_completion)},
           {"ghost_area_m2", evaluation.ghost_area_m2},
+          {"ghost_error_m2", evaluation.ghost_error_m2},
           {"ghost_share", ToJson(evaluation.ghost_share)},
           {"revealed_ghost_area_m2", ToJson(evaluation.revealed_ghost_area_m2)},
+          {"revealed_ghost_error_m2", ToJson(evaluation.revealed_ghost_error_m2)},
+          {"revealed_unseen_area_m2", ToJson(evaluation.revealed_unseen_area_m2)},
+          {"revealed_unseen_error_m2", ToJson(evaluation.revealed_unseen_error_m2)},
           {"sanity", sanity},
           {"mesh_s", evaluation.mesh_s},
           {"evaluate_s", evaluation.evaluate_s}};

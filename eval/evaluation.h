@@ -57,8 +57,14 @@ struct Evaluation {
   std::vector<ObjectScores> objects;  // background first
   Measured visible_completion;        // all regions and objects, by area
   double ghost_area_m2 = 0;           // of the visible scene, in observed free space
+  double ghost_error_m2 = 0;          // its standard error, of sampling alone; so below
   Measured ghost_share;
-  Measured revealed_ghost_area_m2;  // after all movers were removed
+  // After all movers were removed, in space known to be free: seen so, or where a mover was.
+  Measured revealed_ghost_area_m2;
+  Measured revealed_ghost_error_m2;
+  // The same in space that nobody has seen to be free.
+  Measured revealed_unseen_area_m2;
+  Measured revealed_unseen_error_m2;
   SanityScores sanity;
   TriangleMesh scene;             // visible, nothing removed
   TriangleMesh revealed;          // after all movers were removed

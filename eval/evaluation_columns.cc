@@ -1,5 +1,9 @@
 #include "eval/evaluation_columns.h"
 
+#include <fmt/format.h>
+
+#include "core/units.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -26,7 +30,20 @@ Measured LeastSanity(const Evaluation& evaluation) {
   return least;
 }
 
+Measured Cm2(const Measured& m2) { return m2.value ? Measured::Of(kCm2PerM2 * *m2.value) : m2; }
+
 }  // namespace
+
+std::string ColumnText(const EvaluationColumn& column, const Movers& movers,
+                       const Evaluation& evaluation) {
+  const Measured value = column.value(movers, evaluation);
+  if (!value.value) return "-";
+  const std::string text = fmt::format("{:.{}f}", *value.value, column.decimals);
+  const Measured error = column.error ? column.error(evaluation) : Measured{};
+  if (!error.value) return text;
+  // One digit more than the value has, while the error is that small.
+  return fmt::format("{} ±{:.{}f}", text, *error.value, column.decimals + (*error.value < 10));
+}
 
 const std::vector<EvaluationColumn>& EvaluationColumns() {
   static const std::vector<EvaluationColumn> columns{
@@ -49,13 +66,14 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        [](const Movers&, const Evaluation& e) { return e.objects.front().visible_completion; }, 3},
       {"movers", "movers_completion", MoversCompletion, 3},
       {"ghost cm2", "ghost_area_cm2",
-       [](const Movers&, const Evaluation& e) { return Measured::Of(1e4 * e.ghost_area_m2); }, 0},
+       [](const Movers&, const Evaluation& e) { return Measured::Of(kCm2PerM2 * e.ghost_area_m2); },
+       0, [](const Evaluation& e) { return Measured::Of(kCm2PerM2 * e.ghost_error_m2); }},
       {"ghost after", "revealed_ghost_area_cm2",
-       [](const Movers&, const Evaluation& e) {
-         return e.revealed_ghost_area_m2.value ? Measured::Of(1e4 * *e.revealed_ghost_area_m2.value)
-                                               : e.revealed_ghost_area_m2;
-       },
-       0},
+       [](const Movers&, const Evaluation& e) { return Cm2(e.revealed_ghost_area_m2); }, 0,
+       [](const Evaluation& e) { return Cm2(e.revealed_ghost_error_m2); }},
+      {"unseen after", "revealed_unseen_area_cm2",
+       [](const Movers&, const Evaluation& e) { return Cm2(e.revealed_unseen_area_m2); }, 0,
+       [](const Evaluation& e) { return Cm2(e.revealed_unseen_error_m2); }},
       {"sane", "sanity_all", [](const Movers&, const Evaluation& e) { return e.sanity.all; }, 3},
       {"sane least", "sanity_least",
        [](const Movers&, const Evaluation& e) { return LeastSanity(e); }, 3},

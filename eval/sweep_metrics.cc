@@ -24,6 +24,8 @@ constexpr Words kEvaluationWords[] = {
     {"movers_completion", "completion of the moving objects", "", Better::kHigher},
     {"ghost_area_cm2", "ghost area", "cm²", Better::kLower},
     {"revealed_ghost_area_cm2", "ghost area after the removal", "cm²", Better::kLower},
+    {"revealed_unseen_area_cm2", "surface in unseen space after the removal", "cm²",
+     Better::kLower},
     {"sanity_all", "right pixels", "", Better::kHigher},
     {"sanity_least", "right pixels of the worst object", "", Better::kHigher},
     {"table_preservation_any_label", "hidden table kept under any label", "", Better::kHigher},

@@ -6,6 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <optional>
+
+#include "core/units.h"
+#include "metrics/mesh_tools.h"
 
 namespace tsdfpp {
 namespace {
@@ -86,27 +91,226 @@ Selection FreeSpace::ObservedFree(std::span<const Eigen::Vector3f> points_W, dou
   return free;
 }
 
-GhostScores ScoreGhosts(const SampleSet& samples_W, std::span<const PlacedTruth> current,
-                        double tau_m, const FreeSpace* observed) {
+namespace {
+
+// Cutting stops at so many pieces: what is left undecided is sampled.
+constexpr std::size_t kMostPieces = 4'000'000;
+// Distances are in single precision.
+constexpr double kDistanceRounding_m = 1e-5;
+// Triangles of a mesh that follow each other are mostly near the same true triangle.
+constexpr std::size_t kRun = 16;
+
+using Corners = std::array<Eigen::Vector3f, 3>;
+
+// Triangles as three corners each, and the triangle of the mesh that each is a piece of.
+struct Pieces {
+  std::vector<Corners> corners;
+  std::vector<std::uint32_t> of;
+  void Add(const Corners& piece, std::uint32_t triangle) {
+    corners.push_back(piece);
+    of.push_back(triangle);
+  }
+};
+
+Corners CornersOf(const TriangleMesh& mesh, std::size_t triangle) {
+  return {Corner(mesh, triangle, 0), Corner(mesh, triangle, 1), Corner(mesh, triangle, 2)};
+}
+
+Eigen::Vector3f Centroid(const Corners& piece) { return (piece[0] + piece[1] + piece[2]) / 3.0F; }
+
+// The true triangle, in the world, that is nearest to each point; none where there is no truth.
+std::vector<std::optional<Corners>> NearestTriangles(const NearestTruth& nearest,
+                                                     std::span<const PlacedTruth> truths) {
+  std::vector<std::optional<Corners>> triangles(nearest.object.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (const PlacedTruth& truth : truths) {
+      if (truth.surface->id() != nearest.object[i]) continue;
+      Corners corners = CornersOf(truth.surface->model().mesh_O, nearest.triangle[i]);
+      for (Eigen::Vector3f& corner : corners) {
+        corner = (truth.T_WO * corner.cast<double>()).cast<float>();
+      }
+      triangles[i] = corners;
+      break;
+    }
+  }
+  return triangles;
+}
+
+// Whether all of the piece is within tau of one triangle: the distance to a convex set is largest
+// at a corner.
+bool IsAllNear(const Corners& piece, const std::optional<Corners>& truth, double tau_m) {
+  if (!truth) return false;
+  return std::all_of(piece.begin(), piece.end(), [&](const Eigen::Vector3f& corner) {
+    const double distance = PointTriangleDistance(corner, (*truth)[0], (*truth)[1], (*truth)[2]);
+    return distance + kDistanceRounding_m <= tau_m;
+  });
+}
+
+// The triangles of the mesh but for those near the true triangle that one of their run, or of the
+// run before or after it, is nearest to. Takes away most at a fraction of the queries.
+Pieces NotOnTheTruth(const TriangleMesh& mesh, std::span<const PlacedTruth> current, double tau_m) {
+  std::vector<Eigen::Vector3f> asked;
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += kRun) {
+    asked.push_back(Centroid(CornersOf(mesh, t)));
+  }
+  const auto truths = NearestTriangles(FindNearestTruth(asked, current), current);
+  Selection near(mesh.triangles.size(), 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, truths.size(), 64), [&](const auto& range) {
+    for (std::size_t run = range.begin(); run < range.end(); ++run) {
+      const std::size_t end = std::min((run + 1) * kRun, mesh.triangles.size());
+      for (std::size_t t = run * kRun; t < end; ++t) {
+        const Corners piece = CornersOf(mesh, t);
+        near[t] = IsAllNear(piece, truths[run], tau_m) ||
+                  (run > 0 && IsAllNear(piece, truths[run - 1], tau_m)) ||
+                  (run + 1 < truths.size() && IsAllNear(piece, truths[run + 1], tau_m));
+      }
+    }
+  });
+  Pieces pieces;
+  for (std::size_t t = 0; t < near.size(); ++t) {
+    if (near[t] == 0) pieces.Add(CornersOf(mesh, t), static_cast<std::uint32_t>(t));
+  }
+  return pieces;
+}
+
+// What of the mesh may lie farther than `tau_m` from all of `current`.
+Pieces MayBeFar(const TriangleMesh& mesh, std::span<const PlacedTruth> current, double tau_m) {
+  Pieces asked = NotOnTheTruth(mesh, current, tau_m);
+  Pieces may;
+  std::size_t made = asked.of.size();
+  std::vector<Eigen::Vector3f> centroids;
+  while (!asked.of.empty()) {
+    centroids.clear();
+    for (const Corners& piece : asked.corners) centroids.push_back(Centroid(piece));
+    const NearestTruth nearest = FindNearestTruth(centroids, current);
+    const auto truths = NearestTriangles(nearest, current);
+    Pieces cut;
+    for (std::size_t i = 0; i < centroids.size(); ++i) {
+      const Corners& piece = asked.corners[i];
+      double radius = 0;
+      std::size_t longest = 0;
+      double longest2 = -1;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double length2 = (piece[(k + 1) % 3] - piece[k]).cast<double>().squaredNorm();
+        radius = std::max(radius, (piece[k] - centroids[i]).cast<double>().norm());
+        if (length2 <= longest2) continue;
+        longest2 = length2;
+        longest = k;
+      }
+      const double distance = nearest.distance_m[i];
+      if (distance + radius + kDistanceRounding_m <= tau_m) continue;
+      if (IsAllNear(piece, truths[i], tau_m)) continue;
+      if (distance - radius > tau_m || 2 * radius <= tau_m || made >= kMostPieces) {
+        may.Add(piece, asked.of[i]);
+        continue;
+      }
+      const Eigen::Vector3f& a = piece[longest];
+      const Eigen::Vector3f& b = piece[(longest + 1) % 3];
+      const Eigen::Vector3f& c = piece[(longest + 2) % 3];
+      const Eigen::Vector3f middle = 0.5F * (a + b);
+      cut.Add({a, middle, c}, asked.of[i]);
+      cut.Add({middle, b, c}, asked.of[i]);
+      made += 2;
+    }
+    asked = std::move(cut);
+  }
+  return may;
+}
+
+// What is known of the space at each point; nothing where there is no ghost.
+std::vector<std::optional<GhostSpace>> Judge(std::span<const Eigen::Vector3f> points_W,
+                                             std::span<const PlacedTruth> current,
+                                             std::span<const PlacedTruth> removed, double tau_m,
+                                             const FreeSpace& observed) {
+  std::vector<std::optional<GhostSpace>> space(points_W.size());
+  std::vector<std::size_t> left(points_W.size());
+  std::iota(left.begin(), left.end(), 0U);
+  std::vector<Eigen::Vector3f> points(points_W.begin(), points_W.end());
+  const auto keep = [&](const auto& kept) {
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < left.size(); ++k) {
+      if (!kept(k)) continue;
+      left[count] = left[k];
+      points[count++] = points[k];
+    }
+    left.resize(count);
+    points.resize(count);
+  };
+  const auto is_far = [&](const NearestTruth& nearest, std::size_t k) {
+    return static_cast<double>(nearest.distance_m[k]) > tau_m;
+  };
+  const NearestTruth nearest = FindNearestTruth(points, current);
+  keep([&](std::size_t k) { return is_far(nearest, k); });
+  const std::vector<std::uint8_t> inside = InsideTruth(points, current);
+  keep([&](std::size_t k) { return inside[k] == 0; });
+  const NearestTruth vacated = FindNearestTruth(points, removed);
+  const std::vector<std::uint8_t> within = InsideTruth(points, removed);
+  keep([&](std::size_t k) {
+    if (is_far(vacated, k) && within[k] == 0) return true;
+    space[left[k]] = GhostSpace::kVacated;
+    return false;
+  });
+  const Selection free = observed.ObservedFree(points, tau_m);
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    space[left[k]] = free[k] != 0 ? GhostSpace::kSeenFree : GhostSpace::kUnseen;
+  }
+  return space;
+}
+
+}  // namespace
+
+GhostScores ScoreGhosts(const TriangleMesh& mesh_W, std::span<const PlacedTruth> current,
+                        std::span<const PlacedTruth> removed, double tau_m,
+                        const FreeSpace& observed, const GhostSampling& sampling) {
   GhostScores scores;
-  scores.is_ghost.assign(samples_W.size(), 0);
-  const NearestTruth nearest = FindNearestTruth(samples_W.points, current);
-  std::vector<std::size_t> candidates;
-  std::vector<Eigen::Vector3f> points_W;
-  for (std::size_t i = 0; i < samples_W.size(); ++i) {
-    if (static_cast<double>(nearest.distance_m[i]) <= tau_m) continue;
-    candidates.push_back(i);
-    points_W.push_back(samples_W.points[i]);
+  const double mesh_m2 = SurfaceArea(mesh_W);
+  scores.share_of_mesh = Measured::Undefined("the mesh is empty");
+  if (!(mesh_m2 > 0)) return scores;
+  const Pieces pieces = MayBeFar(mesh_W, current, tau_m);
+  TriangleMesh may;
+  for (const auto& corners : pieces.corners) {
+    const auto first = static_cast<std::uint32_t>(may.vertices.size());
+    may.vertices.insert(may.vertices.end(), corners.begin(), corners.end());
+    may.triangles.push_back({first, first + 1, first + 2});
   }
-  const Selection inside = InsideTruth(points_W, current);
-  const Selection free =
-      observed != nullptr ? observed->ObservedFree(points_W, tau_m) : Selection(points_W.size(), 1);
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    scores.is_ghost[candidates[k]] = inside[k] == 0 && free[k] != 0 ? 1 : 0;
+  const double may_cm2 = kCm2PerM2 * SurfaceArea(may);
+  const double per_cm2 =
+      may_cm2 > 0 ? std::min(sampling.per_cm2, static_cast<double>(sampling.max_samples) / may_cm2)
+                  : 0;
+  // Two independent samples a stretch.
+  std::array<std::vector<std::optional<GhostSpace>>, 2> space;
+  double stretch_m2 = 0;
+  for (std::uint32_t stream = 0; stream < 2; ++stream) {
+    const SampleSet samples = SampleMesh(may, 0.5 * per_cm2, sampling.seed, stream);
+    space[stream] = Judge(samples.points, current, removed, tau_m, observed);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      if (!space[stream][i]) continue;
+      SampleSet& ghosts = scores.samples;
+      ghosts.points.push_back(samples.points[i]);
+      ghosts.normals.push_back(samples.normals[i]);
+      ghosts.region.push_back(0);
+      ghosts.triangle.push_back(pieces.of[samples.triangle[i]]);
+      ghosts.area_m2.push_back(0.5F * samples.area_m2[i]);
+      scores.sample_space.push_back(*space[stream][i]);
+    }
+    if (samples.size() > 0) stretch_m2 = may_cm2 / kCm2PerM2 / static_cast<double>(samples.size());
   }
-  scores.area_m2 = SelectedArea_m2(samples_W, scores.is_ghost);
-  scores.share_of_mesh =
-      ShareOf(samples_W, SelectAll(samples_W), scores.is_ghost, "the mesh is empty");
+  const auto estimate = [&](const auto& belongs) {
+    double hits = 0;
+    double unlike = 0;
+    for (std::size_t i = 0; i < space[0].size(); ++i) {
+      const bool a = space[0][i] && belongs(*space[0][i]);
+      const bool b = space[1][i] && belongs(*space[1][i]);
+      hits += static_cast<double>(a) + static_cast<double>(b);
+      if (a != b) unlike += 1;
+    }
+    return AreaEstimate{0.5 * stretch_m2 * hits, 0.5 * stretch_m2 * std::sqrt(unlike)};
+  };
+  for (std::size_t k = 0; k < scores.space.size(); ++k) {
+    scores.space[k] = estimate([&](GhostSpace s) { return static_cast<std::size_t>(s) == k; });
+  }
+  scores.ghosts = estimate([](GhostSpace s) { return s != GhostSpace::kUnseen; });
+  scores.share_of_mesh = Measured::Of(scores.ghosts.area_m2 / mesh_m2);
   return scores;
 }
 

@@ -1,8 +1,8 @@
 // Ghosts: reconstructed surface where there is nothing (facts/metrics.md).
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -47,16 +47,56 @@ class FreeSpace {
   std::vector<View> views_;
 };
 
-struct GhostScores {
-  double area_m2 = 0;
-  Measured share_of_mesh;  // 0..1
-  Selection is_ghost;      // per sample, for pictures
+// How ghosts are sampled: only what may be one, so that the samples are dense where they matter.
+struct GhostSampling {
+  double per_cm2 = 16;
+  std::size_t max_samples = 100'000;  // the density falls until this holds
+  std::uint64_t seed = 1;
 };
 
-// The part of a reconstruction (`samples_W`, by area) that is farther than `tau_m` from every
-// surface in `current` (the objects not removed, at their current poses), outside their solids, and
-// in free space: that which was observed, or, after a removal (`observed` is null), all of it.
-GhostScores ScoreGhosts(const SampleSet& samples_W, std::span<const PlacedTruth> current,
-                        double tau_m, const FreeSpace* observed);
+// What is known of the place where there should be no surface.
+enum class GhostSpace : std::uint8_t {
+  kSeenFree,  // FreeSpace saw through it
+  // In a removed object's solid or within tau of its surface, at its last pose: the object's until
+  // the removal, free since.
+  kVacated,
+  // The rest: free in truth, but nobody has seen it to be, so a map cannot know. Behind surfaces,
+  // outside all images, and where something moved away unseen.
+  kUnseen,
+};
+inline constexpr std::array<const char*, 3> kGhostSpaceNames{"seen free", "vacated", "unseen"};
+
+// An area and how far off sampling may have put it. The standard error is that of the samples
+// alone: it says whether two figures of one scene differ, not what another scene would give.
+struct AreaEstimate {
+  double area_m2 = 0;
+  double standard_error_m2 = 0;
+};
+
+struct GhostScores {
+  AreaEstimate ghosts;                // kSeenFree and kVacated: space that is known to be free
+  std::array<AreaEstimate, 3> space;  // by GhostSpace
+  Measured share_of_mesh;             // of `ghosts`, 0..1
+  // For pictures and figures, the samples of all three; `triangle` is the mesh's.
+  SampleSet samples;
+  std::vector<GhostSpace> sample_space;
+};
+
+// The part of a reconstruction that is farther than `tau_m` from every surface in `current` (the
+// objects not removed, at their current poses) and outside their solids, by what is known of the
+// space there. `removed` are the objects that were removed; none before a removal.
+//
+// Two steps. Triangles (cut while they are longer than tau and undecided) are left out, without an
+// error, where they are near the truth all over: where their centroid's distance and their radius
+// come to tau at most, or all three corners are within tau of one true triangle. The rest is
+// sampled: its
+// area is cut into stretches of equal area as by SampleMesh, each with two independent samples, a
+// and b in {0, 1} with half of the stretch's area s each. The estimate is the sum of s (a + b) / 2,
+// its standard error the root of the sum of s^2 (a - b)^2 / 4, whose square is unbiased (two units
+// a stratum: W. G. Cochran, Sampling Techniques, 3rd ed., section 5A.12, without correction for a
+// finite population).
+GhostScores ScoreGhosts(const TriangleMesh& mesh_W, std::span<const PlacedTruth> current,
+                        std::span<const PlacedTruth> removed, double tau_m,
+                        const FreeSpace& observed, const GhostSampling& sampling = {});
 
 }  // namespace tsdfpp

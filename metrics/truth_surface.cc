@@ -25,6 +25,7 @@ NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,
   out.distance_m.assign(points_W.size(), std::numeric_limits<float>::infinity());
   if (!within_m.empty()) out.distance_m.assign(within_m.begin(), within_m.end());
   out.object.assign(points_W.size(), kNoInstance);
+  out.triangle.assign(points_W.size(), NearestSurface::kNone);
   std::vector<std::size_t> asked;
   std::vector<Eigen::Vector3f> points_O;
   for (const PlacedTruth& truth : truths) {
@@ -44,6 +45,7 @@ NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,
       if (nearest.distance_m[k] >= out.distance_m[asked[k]]) continue;
       out.distance_m[asked[k]] = nearest.distance_m[k];
       out.object[asked[k]] = truth.surface->id();
+      out.triangle[asked[k]] = nearest.triangle[k];
     }
   }
   return out;

@@ -38,13 +38,15 @@ struct PlacedTruth {
   Pose T_WO = Pose::Identity();
 };
 
-// For each point (world frame) the distance to the nearest of the true surfaces, metres, and its
-// object; infinite and kNoInstance where there is none. At equal distance the first in `truths`.
+// For each point (world frame) the distance to the nearest of the true surfaces, metres, its object
+// and the triangle of that object's mesh; infinite, kNoInstance and NearestSurface::kNone where
+// there is none. At equal distance the first in `truths`.
 // With `within_m`, a limit a point, surfaces that are not nearer than it are passed over (and that
 // limit is given back with kNoInstance): far cheaper where most points are far from everything.
 struct NearestTruth {
   std::vector<float> distance_m;
   std::vector<InstanceId> object;
+  std::vector<std::uint32_t> triangle;
 };
 NearestTruth FindNearestTruth(std::span<const Eigen::Vector3f> points_W,
                               std::span<const PlacedTruth> truths,

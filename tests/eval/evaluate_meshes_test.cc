@@ -311,6 +311,7 @@ TEST(EvaluateMeshes, WithoutLabelsEveryScoreTakesFacesOfAnyLabel) {
     EXPECT_EQ(Of(result, id).label_purity.why_not, "the mesh has no labels");
   }
   EXPECT_FALSE(evaluation.revealed_ghost_area_m2.value.has_value());
+  EXPECT_FALSE(evaluation.revealed_unseen_area_m2.value.has_value());
   EXPECT_EQ(evaluation.sanity.all.value, 1.0);
   EXPECT_NE(EvaluateTable(result).find("(any label)"), std::string::npos);
 
@@ -345,6 +346,34 @@ TEST(EvaluateMeshes, RemovalDropsFacesUnlessTheMapperRemoved) {
   EXPECT_EQ(Of(removed, kBackground).preserved.preservation_behind_other.value, 0.0);
   EXPECT_EQ(Of(removed, kLeft).preserved.completion.value, 1.0);
   EXPECT_EQ(removed.frames[0].evaluation.visible_completion.value, 1.0);
+}
+
+TEST(EvaluateMeshes, WhatIsLeftAfterTheRemovalByWhatIsKnownOfItsPlace) {
+  const TempFolder folder;
+  BoxSource source;
+  const auto meshes = TruthMeshes(source);
+  const TriangleMesh& box = meshes.at(kRight);
+  Put(folder / "m/scene.ply", SceneOf(meshes, true));
+  // The map has left the box where it was under another's name, and has one behind the wall.
+  auto left = meshes;
+  left.erase(kRight);
+  AppendMesh(box, left[kBackground]);
+  AppendMesh(Moved(box, {0, 0, 2}), left[kBackground]);
+  Put(folder / "m/scene-without-8.ply", SceneOf(left, true));
+  EvaluateConfig config = At(folder / "m");
+  config.removed = {kRight};
+  const EvaluateResult result = Evaluated(config);
+  const Evaluation& evaluation = result.frames[0].evaluation;
+  // All of either is far from what remains, so that sampling adds no error.
+  EXPECT_EQ(evaluation.ghost_area_m2, 0);
+  EXPECT_NEAR(*evaluation.revealed_ghost_area_m2.value, SurfaceArea(box), kRounding_m);
+  EXPECT_NEAR(*evaluation.revealed_unseen_area_m2.value, SurfaceArea(box), kRounding_m);
+  EXPECT_EQ(evaluation.revealed_ghost_error_m2.value, 0.0);
+  EXPECT_EQ(evaluation.revealed_unseen_error_m2.value, 0.0);
+  const std::string table = EvaluateTable(result);
+  EXPECT_NE(table.find("ghost after  unseen after"), std::string::npos) << table;
+  EXPECT_NE(table.find(fmt::format("{:.0f} ±0.0", 1e4 * SurfaceArea(box))), std::string::npos)
+      << table;
 }
 
 TEST(EvaluateMeshes, SeveralFramesNeedAFolderEach) {

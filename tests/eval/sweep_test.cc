@@ -108,6 +108,8 @@ TEST_F(Sweep, SaysWhatACompareSays) {
                 run.at("examined").at("visible_completion"));
       EXPECT_EQ(cell.at("examined").at("ghost_area_cm2").get<double>(),
                 1e4 * run.at("examined").at("ghost_area_m2").get<double>());
+      EXPECT_EQ(cell.at("examined").at("revealed_unseen_area_cm2").get<double>(),
+                1e4 * run.at("examined").at("revealed_unseen_area_m2").get<double>());
     }
     EXPECT_TRUE(cell.at("examined").at("table_preservation_behind_other").is_number());
   }

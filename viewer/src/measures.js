@@ -3,6 +3,10 @@
 
 const percent = { scale: 100, unit: '%', decimals: 1, better: 1 };
 
+const standardError = (of) => ({
+  scale: 1, unit: 'cm²', decimals: 1, better: 0, title: `${of}, standard error`, about: 'Of the sampling of the map alone',
+});
+
 export const kMeasures = {
   table_preservation_behind_other: {
     ...percent, title: 'Hidden table kept',
@@ -29,12 +33,19 @@ export const kMeasures = {
   },
   ghost_area_cm2: {
     scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Ghosts',
-    about: 'Area of surface in the map where there is nothing',
+    about: 'Area of surface in the map where there is nothing, in space that was seen to be free',
   },
+  ghost_area_cm2_se: standardError('Ghosts'),
   revealed_ghost_area_cm2: {
     scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Ghosts after the removal',
-    about: 'Area of surface where there is nothing, once the moving objects are taken out',
+    about: 'Area of surface where there is nothing, once the moving objects are taken out, in space that was seen to be free or held one of them',
   },
+  revealed_ghost_area_cm2_se: standardError('Ghosts after the removal'),
+  revealed_unseen_area_cm2: {
+    scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Surface in unseen space after the removal',
+    about: 'Area of surface where there is nothing, once the moving objects are taken out, in space that nobody has seen to be free',
+  },
+  revealed_unseen_area_cm2_se: standardError('Surface in unseen space after the removal'),
   sanity_all: {
     ...percent, title: 'Pixels as seen',
     about: 'Share of mapped pixels where the map, seen from the camera, has the right depth and object',

@@ -5,7 +5,7 @@ import { colourOfRun, dashOfRun, kMeasures, measureOf, shortLabel, valueOf } fro
 import { nearestFrame } from './state.js';
 
 const kFromCsv = ['table_preservation_behind_other', 'table_hole_area_cm2', 'movers_completion',
-  'visible_completion', 'ghost_area_cm2', 'revealed_ghost_area_cm2'];
+  'visible_completion', 'ghost_area_cm2', 'revealed_ghost_area_cm2', 'revealed_unseen_area_cm2'];
 const kHeight = 190;
 
 function seriesFromCsv(column) {

@@ -106,7 +106,7 @@ function tracksTable(data) {
 // A row a map that both reports have: the first, the second, and the difference.
 function comparedTable(data) {
   if (data.reports.length < 2) return null;
-  const columns = Object.keys(kMeasures);
+  const columns = Object.keys(kMeasures).filter((column) => kMeasures[column].better !== 0);
   const rows = [];
   for (const a of data.runs.filter((run) => run.report === 0)) {
     const b = data.runs.find((run) => run.report === 1 && run.folder === a.folder);
