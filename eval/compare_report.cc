@@ -148,6 +148,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
             {"moved_confidence", map.moved_confidence},
             {"contradiction", map.contradiction},
             {"relist_on_removal", map.relist_on_removal},
+            {"colour_whole_band", map.colour_whole_band},
             {"resampling", ResamplingName(map.resampling)}}},
           {"examined", ToJson(Examined(result, run))},
           {"difference_to_tsdf", PairedDifferences(result, run)},

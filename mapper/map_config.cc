@@ -103,6 +103,7 @@ Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::str
       .Get("moved_confidence", config.moved_confidence)
       .Get("contradiction", config.contradiction)
       .Get("relist_on_removal", config.relist_on_removal)
+      .Get("colour_whole_band", config.colour_whole_band)
       .Get("resampling", resampling);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   const Expected<Resampling> named = ResamplingFromName(resampling);
@@ -124,6 +125,7 @@ toml::table MapConfig::ToToml() const {
                      {"moved_confidence", moved_confidence},
                      {"contradiction", contradiction},
                      {"relist_on_removal", relist_on_removal},
+                     {"colour_whole_band", colour_whole_band},
                      {"resampling", ResamplingName(resampling)}};
 }
 
