@@ -40,7 +40,7 @@ Expected<std::vector<Peer>> StartPeers(const SideBySideCase& of, const SideBySid
   for (const OpenMpWait wait : {OpenMpWait::kPassive, OpenMpWait::kActive}) {
     if (threads == 1 && wait == OpenMpWait::kActive) continue;
     TSDFPP_ASSIGN(auto process, PeerProcess::Start(arguments, wait, threads));
-    const char* how = threads == 1                   ? "alone"
+    const char* how = threads == 1                   ? "one thread"
                       : wait == OpenMpWait::kPassive ? "threads that sleep while they wait"
                                                      : "threads that spin while they wait";
     peers.push_back({how, std::move(process), {}});
@@ -146,7 +146,8 @@ std::string Machine() {
 }
 
 // Where, on what and how the figures were made.
-std::string Measured(const SideBySideOptions& options, const SequenceInfo& info, double minutes) {
+std::string MeasuredHow(const SideBySideOptions& options, const SequenceInfo& info,
+                        double minutes) {
   const int first = info.first_index + options.first;
   const int end = std::min(info.frame_count, options.first + options.frames);
   return fmt::format(
@@ -204,7 +205,7 @@ Expected<void> RunSideBySide(const SideBySideOptions& options) {
     fmt::print("{}\n\n{}\n", speeds.of.title, CaseTable(speeds));
   }
   const std::string measured =
-      Measured(options, source->info(), (WallMilliseconds() - start) / 60e3);
+      MeasuredHow(options, source->info(), (WallMilliseconds() - start) / 60e3);
   fmt::print("{}\n{}", SummaryTable(cases), measured);
   return options.out.empty() ? Expected<void>{} : WriteTables(options.out, cases, measured);
 }

@@ -30,7 +30,7 @@ struct ExperimentGrid {
 
   std::string name;
   Values values;
-  std::vector<Values> except;  // a cell that has one of each of these values is left out
+  std::vector<Values> except{};  // a cell that has one of each of these values is left out
 };
 
 // How the plot shows the experiment: a panel a metric, a line a method.
