@@ -31,6 +31,11 @@ void AddScene(CLI::App* command, std::string& scene) {
 void AddProfile(CLI::App* command, std::string& profile) {
   command->add_option("--profile", profile, "paper or close")->capture_default_str();
 }
+void AddOpen3dBand(CLI::App* command, double& voxels) {
+  command->add_option("--open3d-band", voxels, "Open3D's band on both sides, voxels")
+      ->check(CLI::Range(1.0, 100.0))
+      ->capture_default_str();
+}
 void AddCount(CLI::App* command, const char* name, int& count, const char* what, int least,
               int most) {
   command->add_option(name, count, what)->check(CLI::Range(least, most))->capture_default_str();
@@ -47,7 +52,10 @@ void AddSideBySide(CLI::App& app, Chosen& chosen) {
     command->add_option("--cases", options->cases, "Resolutions: 1cm, 5mm, 2mm")
         ->delimiter(',')
         ->capture_default_str();
-    AddCount(command, "--frames", options->frames, "Frames from the first on", 16, 100000);
+    AddCount(command, "--first", options->first, "Frames of the sequence that are left out", 0,
+             100000);
+    AddCount(command, "--frames", options->frames, "Frames of a run; the first 8 warm up", 9,
+             100000);
     command->add_option("--threads", options->threads, "Numbers of threads")
         ->delimiter(',')
         ->check(CLI::Range(1, 1024))
@@ -56,8 +64,8 @@ void AddSideBySide(CLI::App& app, Chosen& chosen) {
   run->add_option("--methods", options->methods, "Some of the methods")
       ->delimiter(',')
       ->capture_default_str();
-  AddCount(run, "--runs", options->runs, "Of all; medians are over their frames", 1, 100);
-  run->add_option("--page", options->page, "Write the tables to this file as well");
+  AddCount(run, "--runs", options->runs, "Of all; intervals are over them", 1, 100);
+  run->add_option("--out", options->out, "Write the tables into this folder as well");
   run->callback([=, &chosen] { chosen = [=] { return RunSideBySide(*options); }; });
   peers->callback([=, &chosen] { chosen = [=] { return RunPeers(*options); }; });
 }
@@ -78,6 +86,7 @@ void AddRays(CLI::App& app, Chosen& chosen) {
       "rays", "Ray casting beside Open3D's VoxelBlockGrid, and what more ids cost");
   AddScene(command, options->scene);
   AddProfile(command, options->profile);
+  AddOpen3dBand(command, options->open3d_band);
   AddCount(command, "--frames", options->frames, "Frames from the first on", 8, 1000);
   AddCount(command, "--every", options->every, "Frames between casts", 1, 8);
   AddCount(command, "--repeats", options->repeats, "Of each cast; the fastest counts", 1, 1000);
@@ -94,11 +103,12 @@ void AddMesh(CLI::App& app, Chosen& chosen) {
   CLI::App* grid = app.add_subcommand("voxel-block-grid", "What mesh runs in a process of its own");
   for (CLI::App* command : {mesh, grid}) {
     AddScene(command, options->scene);
-    AddProfile(command, options->profile);
+    AddOpen3dBand(command, options->open3d_band);
     command->add_option("--voxel", options->voxel_m, "Voxel size, metres")->capture_default_str();
     AddCount(command, "--frames", options->frames, "Frames from the first on", 16, 100000);
     AddCount(command, "--threads", options->threads, "Number of threads", 1, 1024);
   }
+  AddProfile(mesh, options->profile);
   mesh->callback([=, &chosen] { chosen = [=] { return RunMeshBench(*options); }; });
   grid->callback([=, &chosen] { chosen = [=] { return RunVoxelBlockGrid(*options); }; });
 }

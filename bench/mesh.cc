@@ -124,9 +124,9 @@ ChildResult AskChild(const MeshBenchOptions& options) {
   ChildResult result;
   if (length <= 0) return result;
   const std::string command = fmt::format(
-      "timeout {} '{}' voxel-block-grid --scene '{}' --profile {} --voxel {} --frames {} --threads "
-      "{} 2>/dev/null",
-      kLimit_s, self.data(), options.scene, options.profile, options.voxel_m, options.frames,
+      "timeout {} '{}' voxel-block-grid --scene '{}' --open3d-band {} --voxel {} --frames {} "
+      "--threads {} 2>/dev/null",
+      kLimit_s, self.data(), options.scene, options.open3d_band, options.voxel_m, options.frames,
       options.threads);
   FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return result;
@@ -212,7 +212,7 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
     runs.back().pipeline = std::make_unique<Pipeline>(
         PipelineConfig{method, config, PoseSource::kGiven, {}}, info.objects);
   }
-  Open3dVolume peer(config.voxel_m, config.trunc_front_voxels * config.voxel_m);
+  Open3dVolume peer(config.voxel_m, options.open3d_band * config.voxel_m);
   double peer_growth_mb = 0;
   const int count = std::min(info.frame_count, options.frames);
   for (int i = 0; i < count; ++i) {
@@ -236,9 +236,12 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
       }
     }
   }
-  std::printf("%s, frames %d to %d, profile %s, voxels of %g m, %d threads\n", info.name.c_str(),
-              info.first_index, info.first_index + count - 1, options.profile.c_str(),
-              options.voxel_m, options.threads);
+  std::printf(
+      "%s, frames %d to %d, profile %s (bands of %g voxels in front, %g behind; Open3D's of %g), "
+      "voxels of %g m, %d threads\n",
+      info.name.c_str(), info.first_index, info.first_index + count - 1, options.profile.c_str(),
+      config.trunc_front_voxels, config.trunc_back_voxels, options.open3d_band, options.voxel_m,
+      options.threads);
 
   std::vector<double> peer_ms;
   std::vector<std::vector<double>> whole_ms(runs.size());
@@ -266,10 +269,8 @@ Expected<void> RunVoxelBlockGrid(const MeshBenchOptions& options) {
   constexpr int kBlockSide_voxels = 16;  // Open3D's own default
   TSDFPP_ASSIGN(auto source, OpenSource(options.scene));
   const SequenceInfo& info = source->info();
-  MapConfig config;
-  TSDFPP_RETURN_IF_ERROR(config.SetProfile(options.profile));
   SetOpen3dThreads(options.threads);
-  VoxelBlockGridPeer peer(options.voxel_m, config.trunc_front_voxels * options.voxel_m,
+  VoxelBlockGridPeer peer(options.voxel_m, options.open3d_band * options.voxel_m,
                           kBlockSide_voxels);
   double growth_mb = 0;
   const int count = std::min(info.frame_count, options.frames);

@@ -10,6 +10,7 @@ namespace tsdfpp {
 struct MeshBenchOptions {
   std::string scene = "scenes/toycar3.toml";
   std::string profile = "paper";
+  double open3d_band = 10;  // voxels on both sides of a surface
   double voxel_m = 0.01;
   int frames = 256;  // from the first on
   int every = 16;    // frames between two meshes from scratch, beside the kept ones

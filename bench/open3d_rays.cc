@@ -48,13 +48,15 @@ int RangeFactor(const Intrinsics& k) {
 }
 
 std::vector<RayTiming> Measure(const std::vector<Frame>& frames, const std::vector<bool>& cast,
-                               double voxel_m, double truncation_voxels, int threads, int repeats) {
+                               double voxel_m, double truncation_voxels, int side, int threads,
+                               int repeats) {
   omp_set_num_threads(threads);
   constexpr float kFar_m = 10;
-  constexpr int kReserve = 20000;
+  constexpr int kReserve = 20000;  // of blocks of 16; of 8 they are as many as take half as much
   const auto truncation = static_cast<float>(truncation_voxels);
   VoxelBlockGrid grid({"tsdf", "weight", "color"}, {o3c::Float32, o3c::UInt16, o3c::UInt16},
-                      {{1}, {1}, {3}}, static_cast<float>(voxel_m), 16, kReserve);
+                      {{1}, {1}, {3}}, static_cast<float>(voxel_m), side,
+                      side < 16 ? 4 * kReserve : kReserve);
   std::vector<RayTiming> timings;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Frame& frame = frames[i];
@@ -109,8 +111,8 @@ void ScoreDepth(const cv::Mat& depth, const Frame& frame, RayTiming& timing) {
 
 Expected<std::vector<RayTiming>> CastWithOpen3d(const std::vector<Frame>& frames,
                                                 const std::vector<bool>& cast, double voxel_m,
-                                                double truncation_voxels, int threads, int repeats,
-                                                double limit_s) {
+                                                double truncation_voxels, int side, int threads,
+                                                int repeats, double limit_s) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) return EnvironmentError("no pipe to the Open3D process");
   std::fflush(nullptr);
@@ -118,7 +120,7 @@ Expected<std::vector<RayTiming>> CastWithOpen3d(const std::vector<Frame>& frames
   if (child < 0) return EnvironmentError("the Open3D process could not be started");
   if (child == 0) {
     close(ends[0]);
-    const auto timings = Measure(frames, cast, voxel_m, truncation_voxels, threads, repeats);
+    const auto timings = Measure(frames, cast, voxel_m, truncation_voxels, side, threads, repeats);
     const std::size_t bytes = timings.size() * sizeof(RayTiming);
     // Far below what a pipe holds, so that this never waits for a reader.
     const bool written = write(ends[1], timings.data(), bytes) == static_cast<ssize_t>(bytes);

@@ -20,12 +20,12 @@ struct RayTiming {
 // Depth errors of one cast against a frame's own depth; fills the last two fields.
 void ScoreDepth(const cv::Mat& depth, const Frame& frame, RayTiming& timing);
 
-// Integrates the frames with colour in order and casts depth and normals at those whose `cast` is
-// true, `repeats` times, of which the fastest counts. Errors: kEnvironment where the child process
-// could not be started, died or took longer than `limit_s`.
+// Integrates the frames with colour in order, in blocks of `side`^3 voxels, and casts depth and
+// normals at those whose `cast` is true, `repeats` times, of which the fastest counts. Errors:
+// kEnvironment where the child process could not be started, died or took longer than `limit_s`.
 Expected<std::vector<RayTiming>> CastWithOpen3d(const std::vector<Frame>& frames,
                                                 const std::vector<bool>& cast, double voxel_m,
-                                                double truncation_voxels, int threads, int repeats,
-                                                double limit_s);
+                                                double truncation_voxels, int side, int threads,
+                                                int repeats, double limit_s);
 
 }  // namespace tsdfpp

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
 #include <optional>
 
 #include "bench/clocks.h"
@@ -86,23 +87,34 @@ Expected<void> RunRaysBench(const RaysBenchOptions& options) {
   }
   MapConfig map;
   TSDFPP_RETURN_IF_ERROR(map.SetProfile(options.profile));
-  const auto peer = CastWithOpen3d(frames, cast, map.voxel_m, map.trunc_front_voxels,
-                                   options.threads, options.repeats, options.limit_s);
+  std::map<int, Expected<std::vector<RayTiming>>> peers;  // by the side of its blocks
+  std::optional<double> peer_ms;                          // the fastest one's
+  for (const int side : {8, 16}) {
+    auto peer = CastWithOpen3d(frames, cast, map.voxel_m, options.open3d_band, side,
+                               options.threads, options.repeats, options.limit_s);
+    if (peer && !peer->empty()) {
+      const double wall_ms = MedianOf(*peer, &RayTiming::wall_ms);
+      peer_ms = std::min(wall_ms, peer_ms.value_or(wall_ms));
+    }
+    peers.emplace(side, std::move(peer));
+  }
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(options.threads));
-  std::printf("%s, frames %d to %d, a cast every %d, %dx%d, profile %s, %d threads; medians\n",
-              info.name.c_str(), frames.front().index, frames.back().index, options.every,
-              info.intrinsics.width, info.intrinsics.height, options.profile.c_str(),
-              options.threads);
+  std::printf(
+      "%s, frames %d to %d, a cast every %d, %dx%d, profile %s (bands of %g voxels in front, %g "
+      "behind; Open3D's of %g), %d threads; medians\n",
+      info.name.c_str(), frames.front().index, frames.back().index, options.every,
+      info.intrinsics.width, info.intrinsics.height, options.profile.c_str(),
+      map.trunc_front_voxels, map.trunc_back_voxels, options.open3d_band, options.threads);
   std::printf("%-28s %9s %9s %12s %12s %8s\n", "", "wall ms", "CPU ms", "Open3D over", "error mm",
               "seen");
-  std::optional<double> peer_ms;
-  if (peer && !peer->empty()) {
-    peer_ms = MedianOf(*peer, &RayTiming::wall_ms);
-    PrintLine("Open3D VoxelBlockGrid", *peer, peer_ms);
-  } else {
-    std::printf("%-28s %s\n", "Open3D VoxelBlockGrid",
-                peer ? "no casts" : peer.error().message.c_str());
+  for (const auto& [side, peer] : peers) {
+    const std::string name = fmt::format("Open3D VoxelBlockGrid {}^3", side);
+    if (peer && !peer->empty()) {
+      PrintLine(name, *peer, peer_ms);
+    } else {
+      std::printf("%-28s %s\n", name.c_str(), peer ? "no casts" : peer.error().message.c_str());
+    }
   }
   for (const Method method : AllMethods()) {
     Pipeline pipeline(PipelineConfig{method, map, PoseSource::kGiven, {}}, info.objects);

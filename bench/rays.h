@@ -10,9 +10,10 @@ namespace tsdfpp {
 struct RaysBenchOptions {
   std::string scene = "scenes/toycar3.toml";
   std::string profile = "paper";
-  int frames = 48;  // from the first on; mapped by all
-  int every = 4;    // frames between casts
-  int repeats = 5;  // of each cast; the fastest counts
+  double open3d_band = 10;  // voxels on both sides of a surface
+  int frames = 48;          // from the first on; mapped by all
+  int every = 4;            // frames between casts
+  int repeats = 5;          // of each cast; the fastest counts
   int threads = 2;
   double limit_s = 300;  // for Open3D's process
 };

@@ -8,9 +8,9 @@ namespace tsdfpp {
 
 const std::vector<SideBySideCase>& SideBySideCases() {
   static const std::vector<SideBySideCase> cases{
-      {"1cm", "1 cm, truncation 10 voxels", 0.01, 10, false},
-      {"5mm", "5 mm, truncation 6 voxels", 0.005, 6, false},
-      {"2mm", "2 mm, truncation 6 voxels, one object alone", 0.002, 6, true}};
+      {"1cm", "1 cm, band of 10 voxels", 0.01, 10, false},
+      {"5mm", "5 mm, band of 6 voxels", 0.005, 6, false},
+      {"2mm", "2 mm, band of 6 voxels, one object alone", 0.002, 6, true}};
   return cases;
 }
 

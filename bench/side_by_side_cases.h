@@ -11,17 +11,17 @@ namespace tsdfpp {
 
 // Frames are made, then mapped in a row: a map that takes turns with others, or with the renderer,
 // at each frame pays for what they leave in the caches, which a mapper on a robot does not.
-inline constexpr int kFramesInARow = 10;
+inline constexpr int kFramesInARow = 8;
 
 struct SideBySideCase {
   std::string name;
   std::string title;
   double voxel_m = 0;
-  double truncation_voxels = 0;
-  bool one_object = false;  // the first object's pixels alone
+  double truncation_voxels = 0;  // in front and behind, of all maps
+  bool one_object = false;       // the first object's pixels alone
 };
 
-// "1cm" (truncation 10 voxels), "5mm" (6 voxels), "2mm" (6 voxels, the first object alone).
+// "1cm" (band of 10 voxels), "5mm" (6 voxels), "2mm" (6 voxels, the first object alone).
 const std::vector<SideBySideCase>& SideBySideCases();
 
 // Those of these names. kUsage for a name that there is not.

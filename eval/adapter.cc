@@ -141,7 +141,8 @@ Expected<std::vector<std::string>> CommandOf(const AdapterConfig& config, const 
       {"frames", Joined(task.frames)},
       {"removed", Joined(task.removed)},
       {"voxel", fmt::format("{}", task.voxel_m)},
-      {"truncation", fmt::format("{}", task.truncation_m)}};
+      {"truncation", fmt::format("{}", task.truncation_m)},
+      {"truncation_back", fmt::format("{}", task.truncation_back_m)}};
   std::vector<std::string> command;
   for (const std::string& given : config.command) {
     std::string word;

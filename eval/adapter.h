@@ -48,7 +48,8 @@ struct AdapterTask {
   std::vector<int> frames;       // after which meshes are wanted
   std::set<InstanceId> removed;  // objects to remove from the map
   double voxel_m = 0.01;
-  double truncation_m = 0.1;
+  double truncation_m = 0.1;  // in front of the surface
+  double truncation_back_m = 0.1;
 };
 
 // The command with the words in braces replaced. Errors: kUsage where a word is unknown.

@@ -169,6 +169,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     TSDFPP_RETURN_IF_ERROR(settings.SetProfile(config.profiles.front()));
   }
   task.truncation_m = settings.voxel_m * settings.trunc_front_voxels;
+  task.truncation_back_m = settings.voxel_m * settings.trunc_back_voxels;
   TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, out, result));
   Trajectory camera;
   PictureMaker pictures(result, out);

@@ -94,6 +94,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
             {"moved_confidence", map.moved_confidence},
             {"contradiction", map.contradiction},
             {"relist_on_removal", map.relist_on_removal},
+            {"colour_whole_band", map.colour_whole_band},
             {"resampling", ResamplingName(map.resampling)},
             {"moved_voxels", MovedVoxelsName(map.moved_voxels)},
             {"removed_voxels", RemovedVoxelsName(map.removed_voxels)},

@@ -43,7 +43,7 @@ std::vector<AxisValue> ReadValues(TomlReader& reader, const toml::table& table,
   return values;
 }
 
-void ReadAxes(TomlReader& reader, const toml::table& table, ExperimentGrid& grid) {
+void ReadAxes(TomlReader& reader, const toml::table& table, ExperimentGrid::Values& all) {
   for (const Axis& axis : Axes()) {
     if (!table.contains(axis.name)) continue;
     std::vector<AxisValue> values = ReadValues(reader, table, axis.name);
@@ -61,8 +61,18 @@ void ReadAxes(TomlReader& reader, const toml::table& table, ExperimentGrid& grid
       }
       kept.push_back(canonical);
     }
-    grid.values[axis.name] = std::move(kept);
+    all[axis.name] = std::move(kept);
   }
+}
+
+Expected<void> ReadGrid(TomlReader& reader, const toml::table& table, ExperimentGrid& grid) {
+  ReadAxes(reader, table, grid.values);
+  for (const toml::table* exception : reader.Tables("except")) {
+    TomlReader of_exception(*exception, reader.where(), reader.PathOf("except"));
+    ReadAxes(of_exception, *exception, grid.except.emplace_back());
+    TSDFPP_RETURN_IF_ERROR(of_exception.Finish());
+  }
+  return reader.Finish();
 }
 
 void ReadMetrics(TomlReader& reader, std::vector<std::string>& metrics, bool required) {
@@ -148,6 +158,45 @@ Expected<PlotPlan> ReadPlot(const toml::table& table, const std::string& where,
   return plot;
 }
 
+std::vector<CellSettings> AllCombinations(const ExperimentGrid& grid) {
+  std::vector<CellSettings> made(1);
+  for (const Axis& axis : Axes()) {
+    const auto values = grid.values.find(axis.name);
+    if (values == grid.values.end()) continue;
+    std::vector<CellSettings> more;
+    for (const CellSettings& settings : made) {
+      for (const AxisValue& value : values->second) {
+        more.push_back(settings);
+        // Was set once when the file was read.
+        if (!axis.set(more.back(), value)) std::abort();
+      }
+    }
+    made = std::move(more);
+  }
+  return made;
+}
+
+// Whether the cell has, of each axis named, one of the values.
+bool Fits(const CellSettings& settings, const ExperimentGrid::Values& values) {
+  return std::all_of(values.begin(), values.end(), [&](const auto& named) {
+    const auto& [axis, some] = named;
+    return std::find(some.begin(), some.end(), FindAxis(axis)->get(settings)) != some.end();
+  });
+}
+
+// An exception that leaves out nothing is a slip of the pen, as is one that leaves nothing.
+void CheckExceptions(TomlReader& reader, const ExperimentGrid& grid) {
+  std::vector<CellSettings> left = AllCombinations(grid);
+  for (const ExperimentGrid::Values& exception : grid.except) {
+    const auto count = std::erase_if(
+        left, [&](const CellSettings& settings) { return Fits(settings, exception); });
+    if (count == 0) {
+      reader.Fault("except", fmt::format("leaves out no further cell of grid '{}'", grid.name));
+    }
+  }
+  if (left.empty()) reader.Fault("except", fmt::format("leaves no cell of grid '{}'", grid.name));
+}
+
 // Sets that only show once the file is read whole.
 void CheckTogether(TomlReader& reader, const ExperimentConfig& config) {
   for (const std::string& axis : config.replicates) {
@@ -174,6 +223,7 @@ void CheckTogether(TomlReader& reader, const ExperimentConfig& config) {
       reader.Fault("baseline", fmt::format("is {}, which is not among the methods of grid '{}'",
                                            config.baseline, grid.name));
     }
+    CheckExceptions(reader, grid);
   }
 }
 
@@ -217,8 +267,7 @@ Expected<ExperimentConfig> ExperimentConfig::Parse(std::string_view text,
   ExperimentGrid common;
   if (const toml::table* table = reader.Table("common")) {
     TomlReader of_common(*table, where, "common");
-    ReadAxes(of_common, *table, common);
-    TSDFPP_RETURN_IF_ERROR(of_common.Finish());
+    TSDFPP_RETURN_IF_ERROR(ReadGrid(of_common, *table, common));
   }
   std::vector<std::string> names;
   for (const toml::table* table : reader.Tables("grid", true)) {
@@ -229,8 +278,7 @@ Expected<ExperimentConfig> ExperimentConfig::Parse(std::string_view text,
     if (Has(names, grid.name))
       of_grid.Fault("name", fmt::format("is '{}', a second time", grid.name));
     names.push_back(grid.name);
-    ReadAxes(of_grid, *table, grid);
-    TSDFPP_RETURN_IF_ERROR(of_grid.Finish());
+    TSDFPP_RETURN_IF_ERROR(ReadGrid(of_grid, *table, grid));
     config.grids.push_back(std::move(grid));
   }
   if (config.grids.empty()) reader.Fault("grid", "is missing, expected one [[grid]] at least");
@@ -244,19 +292,9 @@ Expected<ExperimentConfig> ExperimentConfig::Parse(std::string_view text,
 std::vector<PlannedCell> CellsOf(const ExperimentConfig& config) {
   std::vector<PlannedCell> cells;
   for (const ExperimentGrid& grid : config.grids) {
-    std::vector<CellSettings> made(1);
-    for (const Axis& axis : Axes()) {
-      const auto values = grid.values.find(axis.name);
-      if (values == grid.values.end()) continue;
-      std::vector<CellSettings> more;
-      for (const CellSettings& settings : made) {
-        for (const AxisValue& value : values->second) {
-          more.push_back(settings);
-          // Was set once when the file was read.
-          if (!axis.set(more.back(), value)) std::abort();
-        }
-      }
-      made = std::move(more);
+    std::vector<CellSettings> made = AllCombinations(grid);
+    for (const ExperimentGrid::Values& exception : grid.except) {
+      std::erase_if(made, [&](const CellSettings& settings) { return Fits(settings, exception); });
     }
     for (CellSettings& settings : made) cells.push_back({grid.name, std::move(settings)});
   }

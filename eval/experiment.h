@@ -23,10 +23,14 @@ struct FrameChoice {
   std::string until = "reveal";
 };
 
-// All combinations of the values of its axes; an axis that is absent has its default.
+// All combinations of the values of its axes but those excepted; an axis that is absent has its
+// default.
 struct ExperimentGrid {
+  using Values = std::map<std::string, std::vector<AxisValue>>;  // by the name of the axis
+
   std::string name;
-  std::map<std::string, std::vector<AxisValue>> values;  // by the name of the axis
+  Values values;
+  std::vector<Values> except{};  // a cell that has one of each of these values is left out
 };
 
 // How the plot shows the experiment: a panel a metric, a line a method.

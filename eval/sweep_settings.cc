@@ -1,7 +1,9 @@
 #include "eval/sweep_settings.h"
 
+#include <charconv>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "mapper/voxel_list.h"
 #include "sim/sensor_config.h"
@@ -73,14 +75,26 @@ Expected<void> SetSensor(Settings& settings, const AxisValue& value) {
   return preset ? Expected<void>{} : Because(value, preset.error());
 }
 
+// The N of "open3d/N".
+std::optional<double> Open3dBand_voxels(std::string_view method) {
+  if (!method.starts_with(kOpen3dMethod)) return std::nullopt;
+  method.remove_prefix(kOpen3dMethod.size());
+  double voxels = 0;
+  const auto [end, fault] = std::from_chars(method.begin(), method.end(), voxels);
+  const bool whole = fault == std::errc() && end == method.end();
+  return whole && voxels >= 1 && voxels <= 100 ? std::optional(voxels) : std::nullopt;
+}
+
 Expected<void> SetMethod(Settings& settings, const AxisValue& value) {
   TSDFPP_ASSIGN(const std::string name, Text(value, "the name of a method"));
-  if (name == kOpen3dMethod) {
-    settings.method = name;
+  if (name.starts_with("open3d")) {
+    const auto voxels = Open3dBand_voxels(name);
+    if (!voxels) return Wrong(value, "open3d/N, a band of N voxels on both sides, N from 1 to 100");
+    settings.method = fmt::format("{}{}", kOpen3dMethod, *voxels);
     return {};
   }
   const auto method = MethodFromName(name);
-  if (!method) return UsageError("{}, or {}", method.error().message, kOpen3dMethod);
+  if (!method) return UsageError("{}, or {}N", method.error().message, kOpen3dMethod);
   settings.method = MethodName(*method);
   return {};
 }
@@ -203,12 +217,15 @@ const Axis* FindAxis(std::string_view name) {
 
 Expected<PipelineConfig> CellSettings::Pipeline() const {
   PipelineConfig config;
-  if (!is_open3d()) {
-    TSDFPP_ASSIGN(config.method, MethodFromName(method));
-  }
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(profile));
-  if (trunc_front > 0) config.map.trunc_front_voxels = trunc_front;
-  if (trunc_back > 0) config.map.trunc_back_voxels = trunc_back;
+  if (const auto band_voxels = Open3dBand_voxels(method)) {
+    config.map.trunc_front_voxels = *band_voxels;
+    config.map.trunc_back_voxels = *band_voxels;
+  } else {
+    TSDFPP_ASSIGN(config.method, MethodFromName(method));
+    if (trunc_front > 0) config.map.trunc_front_voxels = trunc_front;
+    if (trunc_back > 0) config.map.trunc_back_voxels = trunc_back;
+  }
   config.map.voxel_m = voxel_m;
   config.map.layers = layers;
   TSDFPP_ASSIGN(config.map.resampling, ResamplingFromName(resampling));
@@ -255,7 +272,7 @@ std::string MapKey(const CellSettings& settings) {
   const std::string sabotage =
       sabotaged ? fmt::format(" sabotage {}", SabotageName(settings.sabotage)) : "";
   if (settings.is_open3d()) {
-    return fmt::format("{} voxel_m {} truncation_voxels {}{}", kOpen3dMethod, config.map.voxel_m,
+    return fmt::format("open3d voxel_m {} truncation_voxels {}{}", config.map.voxel_m,
                        config.map.trunc_front_voxels, sabotage);
   }
   const bool moves_values = config.method != Method::kTsdfppAnchored &&

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -14,8 +15,9 @@
 
 namespace tsdfpp {
 
-// The name, among methods, of Open3D's ScalableTSDFVolume, which maps a static world.
-inline constexpr const char* kOpen3dMethod = "open3d";
+// The names, among methods, of Open3D's ScalableTSDFVolume, which maps a static world, begin with
+// this; its band follows, in voxels on both sides: "open3d/10".
+inline constexpr std::string_view kOpen3dMethod = "open3d/";
 
 struct CellSettings {
   // What determines the frames.
@@ -47,10 +49,10 @@ struct CellSettings {
   // What is broken on purpose, of either or of the scoring (eval/sabotage.h).
   Sabotage sabotage = Sabotage::kNone;
 
-  // The map's configuration; not of Open3D, which has voxel size and truncation in it alone.
+  // The map's configuration; of Open3D voxel size and, front and back, its own band alone.
   // Errors: kUsage.
   Expected<PipelineConfig> Pipeline() const;
-  bool is_open3d() const { return method == kOpen3dMethod; }
+  bool is_open3d() const { return method.starts_with(kOpen3dMethod); }
 };
 
 using AxisValue = std::variant<std::string, double>;

@@ -147,6 +147,7 @@ Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::str
       .Get("moved_confidence", config.moved_confidence)
       .Get("contradiction", config.contradiction)
       .Get("relist_on_removal", config.relist_on_removal)
+      .Get("colour_whole_band", config.colour_whole_band)
       .Get("resampling", resampling)
       .Get("moved_voxels", moved_voxels)
       .Get("removed_voxels", removed_voxels)
@@ -177,6 +178,7 @@ toml::table MapConfig::ToToml() const {
                      {"moved_confidence", moved_confidence},
                      {"contradiction", contradiction},
                      {"relist_on_removal", relist_on_removal},
+                     {"colour_whole_band", colour_whole_band},
                      {"resampling", ResamplingName(resampling)},
                      {"moved_voxels", MovedVoxelsName(moved_voxels)},
                      {"removed_voxels", RemovedVoxelsName(removed_voxels)},

@@ -1,6 +1,7 @@
 // The settings of a map, shared by all methods. docs/map.md defines each rule they steer.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -81,6 +82,7 @@ struct MapConfig {
   int moved_confidence = 1;        // of an object in a voxel that it was moved to; up to the cap
   bool contradiction = true;  // tsdf++ and anchored: pixels of others clear what o wrongly claims
   bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped
+  bool colour_whole_band = false;  // colour far from the surface too, as one field always does
   Resampling resampling = Resampling::kAll;  // of the methods that move values
   // Of the methods with one field:
   MovedVoxels moved_voxels = MovedVoxels::kAll;
@@ -93,8 +95,9 @@ struct MapConfig {
   float back() const { return RoundToHalf(static_cast<float>(trunc_back_voxels * voxel_m)); }
 
   float vote_band() const { return static_cast<float>(vote_band_voxels * voxel_m); }
-  float colour_band() const { return static_cast<float>(kColourBand_voxels * voxel_m); }
-  float first_colour_band() const { return static_cast<float>(kFirstColourBand_voxels * voxel_m); }
+  // Metres; infinite where the whole band is coloured.
+  float colour_band() const { return ColourBandOf(kColourBand_voxels); }
+  float first_colour_band() const { return ColourBandOf(kFirstColourBand_voxels); }
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;
@@ -104,6 +107,12 @@ struct MapConfig {
   static Expected<MapConfig> FromToml(const toml::table& table, const std::string& where);
   toml::table ToToml() const;
   bool operator==(const MapConfig&) const = default;
+
+ private:
+  float ColourBandOf(double voxels) const {
+    return colour_whole_band ? std::numeric_limits<float>::infinity()
+                             : static_cast<float>(voxels * voxel_m);
+  }
 };
 
 // K for this method: 2 for tsdf++ and literal (the paper's), 4 for anchored, 1 for one field;

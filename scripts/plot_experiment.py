@@ -38,7 +38,8 @@ STYLES = {
     "tsdf++/literal": ("#E69F00", "v", "-."),
     "tsdf++/anchored": ("#D55E00", "^", "-"),
     "volumes": ("#009E73", "P", "--"),
-    "open3d": ("#CC79A7", "X", ":"),
+    "open3d/3": ("#CC79A7", "X", ":"),
+    "open3d/10": ("#A0527D", "x", ":"),
 }
 # A second line of one method, of another setting.
 SECOND = {"tsdf++": ("#56B4E9", "h", "--")}

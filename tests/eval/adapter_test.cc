@@ -118,16 +118,18 @@ AdapterConfig Read(const TempFolder& folder, const std::string& text) {
 
 TEST(Adapter, IsReadStrictlyAndWrittenBack) {
   const TempFolder folder;
-  const AdapterConfig config =
-      Read(folder, Toml("mine", R"(["run", "{sequence}", "--out={out}", "{frames}"])",
-                        "layout = \"tum\"\ntime_limit_s = 5\nmemory_limit_mb = 100.0\nscale = "
-                        "0.001\nmatch = \"overlap\"\n"));
+  const AdapterConfig config = Read(
+      folder,
+      Toml("mine",
+           R"(["run", "{sequence}", "--out={out}", "{frames}", "{truncation},{truncation_back}"])",
+           "layout = \"tum\"\ntime_limit_s = 5\nmemory_limit_mb = 100.0\nscale = "
+           "0.001\nmatch = \"overlap\"\n"));
   EXPECT_EQ(config.layout, DatasetFormat::kTum);
   EXPECT_EQ(config.match, MatchMode::kOverlap);
-  const AdapterTask task{"/s", 1, 9, {3, 9}, {1, 2}, 0.01, 0.1};
+  const AdapterTask task{"/s", 1, 9, {3, 9}, {1, 2}, 0.01, 0.1, 0.03};
   const auto command = CommandOf(config, task, "/o");
   ASSERT_TRUE(command.has_value());
-  EXPECT_EQ(*command, (std::vector<std::string>{"run", "/s", "--out=/o", "3,9"}));
+  EXPECT_EQ(*command, (std::vector<std::string>{"run", "/s", "--out=/o", "3,9", "0.1,0.03"}));
   EXPECT_EQ(Read(folder, config.ToToml()).ToToml(), config.ToToml());
 
   const std::vector<std::pair<std::string, std::string>> wrong{
@@ -293,10 +295,10 @@ TEST_F(AdapterCompare, ALayoutMayBeChosenAndOldFilesDoNotCount) {
 }
 
 nlohmann::json CompareMini(const TempFolder& folder, const std::string& methods) {
-  const auto command =
-      test::RunTsdfpp({"compare", TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out", folder / "out",
-                       "--methods", methods, "--until", "6", "--every", "6", "--json"},
-                      folder.path());
+  const auto command = test::RunTsdfpp(
+      {"compare", TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out", folder / "out", "--methods",
+       methods, "--profiles", "close", "--until", "6", "--every", "6", "--json"},
+      folder.path());
   EXPECT_EQ(command.exit_code, 0) << command.err;
   return nlohmann::json::parse(command.out, nullptr, false);
 }
@@ -311,10 +313,10 @@ TEST(BundledAdapters, MapTheStaticWorld) {
   const bool python = RunChildProcess("python", {"/usr/bin/python3", "-c", "import open3d"},
                                       folder.path(), folder / "log", kRoomy)
                           .failure == std::nullopt;
-  const std::string methods = "open3d-scalable,open3d-voxelblockgrid";
+  const std::string methods = "open3d-scalable,open3d-scalable-back,open3d-voxelblockgrid";
   const nlohmann::json summary = CompareMini(folder, python ? methods + ",open3d-python" : methods);
   ASSERT_FALSE(summary.is_discarded());
-  ASSERT_EQ(summary.at("adapters").size(), python ? 3U : 2U);
+  ASSERT_EQ(summary.at("adapters").size(), python ? 4U : 3U);
   std::map<std::string, double> completion;
   for (const nlohmann::json& adapter : summary.at("adapters")) {
     ASSERT_TRUE(adapter.at("failure").is_null()) << adapter.at("failure");
@@ -328,6 +330,8 @@ TEST(BundledAdapters, MapTheStaticWorld) {
     EXPECT_LT(examined.at("objects")[0].at("accuracy").at("mean_m").get<double>(), kAccuracy_m)
         << name;
   }
+  // Its band is thinner.
+  EXPECT_NE(completion["open3d-scalable-back"], completion["open3d-scalable"]);
   TSDFPP_NEEDS(python, "python3-open3d");
   EXPECT_NEAR(completion["open3d-python"], completion["open3d-scalable"], kSameCompletion);
 }

@@ -63,6 +63,16 @@ TEST(Experiment, FaultsGetOneSentenceWithFileLineAndKey) {
       {good + "profile = \"near\"\n", "profile 'near' is unknown"},
       {good + "poses = \"slam\"\n", "pose source 'slam' is unknown"},
       {Replaced(good, "\"anchored\"", "\"kinfu\""), "method 'kinfu' is unknown"},
+      {Replaced(good, "\"anchored\"", "\"open3d\""),
+       "'grid.method' holds 'open3d', expected open3d/N, a band of N voxels on both sides"},
+      {Replaced(good, "\"anchored\"", "\"open3d/0.5\""), "holds 'open3d/0.5', expected open3d/N"},
+      {Replaced(good, "\"anchored\"", "\"open3d/3x\""), "holds 'open3d/3x', expected open3d/N"},
+      {Replaced(good, "\"anchored\"", "\"open3d/3\", \"open3d/3.0\""), "holds open3d/3 twice"},
+      {good + "except = [{ method = \"tsdf++\" }]\n",
+       "'except' leaves out no further cell of grid"},
+      {good + "except = [{ method = [\"tsdf\", \"anchored\"] }]\n",
+       "'except' leaves no cell of grid"},
+      {good + "except = [{ voxel = 0.01 }]\n", "'grid.except.voxel' is not a known key here"},
       {Replaced(good, "\"tsdf\"", "\"anchored\""), "holds tsdf++/anchored twice"},
       {Replaced(good, "\"tsdf\"", "\"tsdf++\""), "'baseline' is tsdf, which is not among"},
       {Replaced(good, "scene = \"mini.toml\"\n", ""), "'grid' '1' has no scene"},
@@ -125,7 +135,7 @@ voxel_m = [0.01, 0.02, 0.03]
 [[grid]]
 name = "alone"
 scene = "a.toml"
-method = "open3d"
+method = "open3d/10"
 )");
   ASSERT_TRUE(config.has_value()) << config.error().message;
   const auto cells = CellsOf(*config);
@@ -140,6 +150,33 @@ method = "open3d"
   EXPECT_EQ(cells.back().settings.seed, 4U);
   EXPECT_EQ(cells.back().settings.voxel_m, 0.02);
   EXPECT_TRUE(cells.back().settings.is_open3d());
+}
+
+// Of "open3d/3" in `paper` and of tsdf++ there as well.
+TEST(Experiment, ExceptionsLeaveCombinationsOut) {
+  const auto config = Parse(R"(name = "e"
+question = "?"
+metrics = ["fuse_ms"]
+[common]
+method = ["tsdf", "tsdf++", "open3d/3", "open3d/10"]
+profile = ["paper", "close"]
+except = [{ method = "open3d/3", profile = "paper" }]
+[[grid]]
+scene = "a.toml"
+[[grid]]
+scene = "b.toml"
+except = [{ method = ["tsdf++", "open3d/10"], profile = "paper" }]
+)");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  std::multiset<std::string> made;
+  for (const PlannedCell& cell : CellsOf(*config)) {
+    made.insert(cell.settings.scene + " " + cell.settings.profile + " " + cell.settings.method);
+  }
+  EXPECT_EQ(made, (std::multiset<std::string>{
+                      "a.toml paper tsdf", "a.toml paper tsdf++", "a.toml paper open3d/10",
+                      "a.toml close tsdf", "a.toml close tsdf++", "a.toml close open3d/3",
+                      "a.toml close open3d/10", "b.toml paper tsdf", "b.toml close tsdf",
+                      "b.toml close tsdf++", "b.toml close open3d/3", "b.toml close open3d/10"}));
 }
 
 TEST(Experiment, SettingsComeBackFromJson) {
@@ -179,14 +216,18 @@ TEST(Experiment, TheKeyOfAMapIsWhatItDependsOn) {
   const auto paper = [](CellSettings& s) { s.profile = "paper"; };
   EXPECT_EQ(key("tsdf", back), key("tsdf", paper));
   EXPECT_NE(key("tsdf", back), key("tsdf", nothing));
-  EXPECT_EQ(key("open3d", paper), key("open3d", nothing));
+  // Open3D's band is its own, and all that tells two of its maps apart but the voxel.
+  EXPECT_NE(key("open3d/3", nothing), key("open3d/10", nothing));
+  EXPECT_EQ(key("open3d/3", paper), key("open3d/3", nothing));
+  EXPECT_EQ(key("open3d/10", back), key("open3d/10", nothing));
+  EXPECT_EQ(key("open3d/10", layers(4)), key("open3d/10", nothing));
   const auto observed = [](CellSettings& s) { s.resampling = "observed"; };
   EXPECT_EQ(key("tsdf++/anchored", observed), key("tsdf++/anchored", nothing));
   EXPECT_NE(key("tsdf++", observed), key("tsdf++", nothing));
   const auto icp = [](CellSettings& s) { s.poses = "icp"; };
   EXPECT_NE(key("tsdf", icp), key("tsdf", nothing));
   const auto voxel = [](CellSettings& s) { s.voxel_m = 0.02; };
-  for (const char* method : {"tsdf", "tsdf++", "tsdf++/anchored", "volumes", "open3d"}) {
+  for (const char* method : {"tsdf", "tsdf++", "tsdf++/anchored", "volumes", "open3d/10"}) {
     EXPECT_NE(key(method, voxel), key(method, nothing)) << method;
   }
 }

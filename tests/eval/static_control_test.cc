@@ -196,7 +196,7 @@ TEST(StaticControl, AllMapsAndOpen3dAgree) {
   SetOpen3dThreads(1);
   Open3dVolume open3d(config.voxel_m, config.front(), Open3dColour::kNone);
   for (const Frame& frame : set->frames) open3d.Integrate(frame);
-  candidates.emplace_back("Open3D", open3d.Triangles(), *set, margin_m);
+  candidates.emplace_back("Open3D, the same band", open3d.Triangles(), *set, margin_m);
 
   const TruthScore truth(*set, config.voxel_m);
   const std::vector<Part> parts = Parts(*set);

@@ -117,8 +117,8 @@ TEST_F(Sweep, SaysWhatACompareSays) {
 }
 
 TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
-  const fs::path file =
-      Experiment("method = [\"tsdf\", \"tsdf++\", \"open3d\"]\nseed = [1, 2]\nvoxel_m = 0.02", "");
+  const fs::path file = Experiment(
+      "method = [\"tsdf\", \"tsdf++\", \"open3d/3\"]\nseed = [1, 2]\nvoxel_m = 0.02", "");
   EXPECT_EQ(RunSweep(file, "one", {"--jobs", "1"}).at("run_now"), 6);
   EXPECT_EQ(RunSweep(file, "two", {"--jobs", "2"}).at("run_now"), 6);
   ASSERT_EQ(CellFiles("one").size(), 6U);
@@ -139,7 +139,7 @@ TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
   EXPECT_EQ(Timeless(fs::path("one/cells") / first), before);
   EXPECT_EQ(Bytes(fs::path("one/cells") / last), kept);
   // A larger experiment adds what is new.
-  EXPECT_EQ(RunSweep(Experiment("method = [\"tsdf\", \"tsdf++\", \"open3d\"]\nseed = [1, 2]\n"
+  EXPECT_EQ(RunSweep(Experiment("method = [\"tsdf\", \"tsdf++\", \"open3d/3\"]\nseed = [1, 2]\n"
                                 "voxel_m = [0.02, 0.03]",
                                 ""),
                      "one")

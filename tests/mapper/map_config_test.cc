@@ -101,6 +101,7 @@ TEST(MapConfigTest, TomlRoundTrip) {
   config.moved_confidence = 4;
   config.contradiction = false;
   config.relist_on_removal = true;
+  config.colour_whole_band = true;
   config.resampling = Resampling::kObserved;
   config.moved_voxels = MovedVoxels::kNearSurface;
   config.removed_voxels = RemovedVoxels::kUnobserved;

@@ -88,6 +88,18 @@ TEST_P(ReferenceTest, WeightsAndConfidencesSaturate) {
   for (int i = 0; i < 4; ++i) maps.SetPosesAndFuse(RenderToys(scene, 0.1 + 0.05 * i, i));
 }
 
+// Colour goes wherever distances do, and moves along.
+TEST_P(ReferenceTest, ColoursOfTheWholeBand) {
+  Scene scene = TableWithToys();
+  MapConfig coloured = config();
+  coloured.colour_whole_band = true;
+  SideBySide maps = Begin(coloured);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  scene.T_WO[kBrick].translation() += Eigen::Vector3d(0.03, 0.01, 0.02);
+  maps.SetPosesAndFuse(RenderToys(scene, 0.8));
+  maps.CompareWholeBox();
+}
+
 // A brick drives and turns over the table while a ball rolls towards it and the tray stays.
 TEST_P(ReferenceTest, ObjectsDriveAndTurn) {
   Scene scene = TableWithToys();

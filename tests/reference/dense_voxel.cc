@@ -72,7 +72,7 @@ void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel, bool
   voxel.weight = std::min(voxel.weight + 1.0F, cap);
   const auto colour_band = static_cast<float>((voxel.colours > 0 ? 2 : 3) * config.voxel_m);
   if (!InBand(seen.s, config)) return;
-  if (!colour_all && !(std::abs(seen.s) <= colour_band)) return;
+  if (!colour_all && !config.colour_whole_band && !(std::abs(seen.s) <= colour_band)) return;
   const float share = 1.0F / (static_cast<float>(voxel.colours) + 1.0F);
   for (int c = 0; c < 3; ++c) {
     const float old = voxel.colour[c];
