@@ -17,7 +17,8 @@ struct SideBySideOptions {
   int warm_up = 8;  // of these, the first ones, not counted
   int runs = 5;     // of everything
   std::vector<int> threads{1, 2};
-  std::vector<std::string> methods{"tsdf", "tsdf++", "tsdf++/literal", "tsdf++/anchored",
+  std::vector<std::string> methods{"tsdf/static", "tsdf",           "tsdf/guarded",
+                                   "tsdf++",      "tsdf++/literal", "tsdf++/anchored",
                                    "volumes"};
   std::filesystem::path out;  // where given, the tables are written into this folder as well
 };

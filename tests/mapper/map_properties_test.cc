@@ -384,7 +384,8 @@ TEST(Reveal, TsdfppAndAnchoredKeepTheTableUnderATray) {
 // How much that is, is for the evaluation to say; RunReveal compares it with the reference.
 TEST(Reveal, OneFieldKeepsOfTheTableWhatItsReferenceKeeps) {
   for (const Method method : AllMethods()) {
-    if (IsOneField(method)) EXPECT_FALSE(RunReveal(method).bare.empty()) << MethodName(method);
+    if (!IsOneField(method)) continue;
+    EXPECT_FALSE(RunReveal(method).bare.empty()) << MethodName(method);
   }
 }
 
