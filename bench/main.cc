@@ -121,6 +121,8 @@ void AddReleased(CLI::App& app, Chosen& chosen) {
   command->add_option("--scenes", options->scenes, "Some of them")
       ->delimiter(',')
       ->capture_default_str();
+  command->add_option("--settings", options->settings, "Some of the rows, by name; default: all")
+      ->delimiter(',');
   command->callback([=, &chosen] { chosen = [=] { return RunReleased(*options); }; });
 }
 

@@ -36,7 +36,7 @@ struct SmallScene {
 };
 const std::vector<SmallScene>& SmallScenes() {
   static const std::vector<SmallScene> scenes{{"mini", 1, 1, 40, {1}},
-                                              {"toycar3", 0.35, 2, 256, {1, 2}}};
+                                              {"toycar3", 0.35, 4, 256, {1, 2}}};
   return scenes;
 }
 
@@ -59,6 +59,7 @@ constexpr float kOurCap = 50;
 constexpr float kReleasedCap = 10000;
 constexpr Weighting kOurWeighting{false, false, false, kOurCap};
 constexpr Weighting kReleasedWeighting{true, true, false, kReleasedCap};
+constexpr const char* kOursName = "10/10; ours";
 constexpr const char* kReleasedName = "released";
 constexpr const char* kRaysName = "released; weights summed over rays";
 
@@ -193,6 +194,13 @@ Expected<void> MeasureScene(const SmallScene& scene, const std::vector<Setting>&
       job.scores = CellsOf(EvaluateMeshes(std::move(meshes), *truth, footage.names, scene.movers,
                                           config.voxel_m, last_seen),
                            scene.movers);
+      fmt::print("{}, {}, {}:", scene.name, settings[job.setting].name,
+                 kFloatMethods[job.method].name);
+      for (std::size_t k = 0; k < kScores.size(); ++k) {
+        fmt::print(" {} {}", kScores[k].title, job.scores[k]);
+      }
+      fmt::print("\n");
+      std::fflush(stdout);
     }
   };
   {
@@ -222,7 +230,7 @@ Expected<void> MeasureScene(const SmallScene& scene, const std::vector<Setting>&
 
   for (const Job& job : jobs) {
     const std::string& name = settings[job.setting].name;
-    if (name != settings.front().name && name != kReleasedName && name != kRaysName) continue;
+    if (name != kOursName && name != kReleasedName && name != kRaysName) continue;
     std::vector<std::string> row{scene.name, name, kFloatMethods[job.method].name};
     row.insert(row.end(), job.weights.begin(), job.weights.end());
     weights.Add(std::move(row));
@@ -240,6 +248,20 @@ Expected<void> RunReleased(const ReleasedOptions& options) {
       return UsageError("--scenes has '{}', expected some of mini and toycar3", wanted);
     }
   }
+  std::vector<Setting> settings = Settings();
+  for (const std::string& wanted : options.settings) {
+    if (std::none_of(settings.begin(), settings.end(),
+                     [&](const Setting& setting) { return setting.name == wanted; })) {
+      return UsageError("--settings has '{}', expected some of the rows' names in docs/released.md",
+                        wanted);
+    }
+  }
+  if (!options.settings.empty()) {
+    std::erase_if(settings, [&](const Setting& setting) {
+      return std::find(options.settings.begin(), options.settings.end(), setting.name) ==
+             options.settings.end();
+    });
+  }
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
   FigureTable weights({"scene", "setting", "map", "median weight", "largest", "share below 0.5",
                        "share below 1", "share above 255"});
@@ -249,7 +271,7 @@ Expected<void> RunReleased(const ReleasedOptions& options) {
       continue;
     }
     const auto start = std::chrono::steady_clock::now();
-    TSDFPP_RETURN_IF_ERROR(MeasureScene(scene, Settings(), options, weights));
+    TSDFPP_RETURN_IF_ERROR(MeasureScene(scene, settings, options, weights));
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     fmt::print("{}: {}/{}.csv ({:.0f} s)\n", scene.name, options.out, scene.name, seconds);

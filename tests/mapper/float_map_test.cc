@@ -254,8 +254,7 @@ std::vector<std::vector<float>> SortedTriangles(const TriangleMesh& mesh) {
 class FloatMapTest : public ::testing::TestWithParam<std::tuple<Method, double>> {
  protected:
   Pair Begin(bool half_distances, bool byte_weights) const {
-    return MakePair(std::get<0>(GetParam()), std::get<1>(GetParam()), half_distances,
-                    byte_weights);
+    return MakePair(std::get<0>(GetParam()), std::get<1>(GetParam()), half_distances, byte_weights);
   }
 };
 
@@ -302,25 +301,20 @@ TEST_P(FloatMapTest, StoringAsProductionDoesItIsProduction) {
 TEST_P(FloatMapTest, FloatsAreWithinTheRoundingOfProduction) {
   constexpr float kHalfPlace_m = 1.0F / (1 << 15);
   constexpr float kRoundingTolerance_m = (2 * kDriveFrames - 1) * kHalfPlace_m;
-  // Where a threshold (0, h or h / 2) falls between the two values one of them is cleared or left.
-  constexpr double kPartedShare = 0.002;
   Pair maps = Begin(false, true);
   Drive(maps);
   for (const InstanceId id : ToyIds()) {
     const auto observed = maps.production->ObservedVoxels(id);
-    std::size_t parted = 0;
     std::size_t different = 0;
     for (const Eigen::Vector3i& v : observed) {
       const auto value = maps.floats->ValueAt(id, v);
       const float expected = maps.production->ValueAt(id, v)->distance_m;
-      if (!value || std::abs(value->distance - expected) > kRoundingTolerance_m) ++parted;
-      if (value && value->distance != expected) ++different;
+      // A threshold between the two values would part them; here none does.
+      ASSERT_TRUE(value) << Text(v) << " of object " << id;
+      ASSERT_NEAR(value->distance, expected, kRoundingTolerance_m) << Text(v) << " of " << id;
+      if (value->distance != expected) ++different;
     }
-    const auto count = static_cast<double>(observed.size());
-    EXPECT_LE(static_cast<double>(parted), kPartedShare * count) << "object " << id;
-    EXPECT_GT(static_cast<double>(different), 0.25 * count) << "stored as production's: " << id;
-    RecordProperty("parted_" + std::to_string(id), static_cast<int>(parted));
-    std::printf("%d: parted %zu different %zu of %zu\n", id, parted, different, observed.size());
+    EXPECT_GT(different, observed.size() / 4) << "stored as production does it: object " << id;
   }
 }
 

@@ -27,11 +27,20 @@ Marked CoverOf(const Values& values, const FloatRule& rule) {
   Marked cover;
   for (const auto& [key, block] : values.blocks()) {
     const CubesOfBlock<FloatVoxel> cubes(values, key);
+    // The block's own marks and those around it are looked up once.
+    std::array<Marked::Block*, 8> marks{};
+    const auto mark = [&](const Eigen::Vector3i& v) {
+      const Marked::Key of = Marked::KeyOf(v);
+      Marked::Block*& there = marks[static_cast<std::size_t>(
+          (of[0] - key[0]) * 4 + (of[1] - key[1]) * 2 + of[2] - key[2])];
+      if (there == nullptr) there = &cover.FindOrAdd(of);
+      (*there)[Marked::PlaceOf(v)] = 1;
+    };
     for (std::size_t place = 0; place < block.size(); ++place) {
       const FloatVoxel& voxel = block[place];
       if (!voxel.observed()) continue;
       const Eigen::Vector3i v = Values::VoxelAt(key, place);
-      if (voxel.distance < 0 && voxel.distance >= -rule.back()) cover.At(v) = 1;
+      if (voxel.distance < 0 && voxel.distance >= -rule.back()) mark(v);
       bool inside = false;
       bool outside = false;
       bool observed = true;
@@ -41,7 +50,7 @@ Marked CoverOf(const Values& values, const FloatRule& rule) {
         (corner.distance < 0 ? inside : outside) = true;
       }
       if (!observed || !inside || !outside) continue;
-      for (int i = 0; i < 8; ++i) cover.At(CubeCorner(v, i)) = 1;
+      for (int i = 0; i < 8; ++i) mark(CubeCorner(v, i));
     }
   }
   return cover;
@@ -170,21 +179,27 @@ class FloatTsdfpp : public FloatMap {
   void FuseObject(InstanceId id, const View& view, const Intrinsics& camera, Values& values,
                   Marked& votes) const {
     const float h = rule_.voxel();
-    values.ForEach([&](const Eigen::Vector3i& v, FloatVoxel& voxel) {
-      const std::optional<Seen> seen = view.Look(v);
-      if (!seen) return;
-      const float weight = rule_.WeightOf(*seen, camera);
-      if (seen->label == id) {
-        rule_.Fuse(*seen, weight, voxel);
-        if (rule_.InBand(seen->s)) votes.At(v) = 1;
-        return;
+    for (auto& [key, block] : values.blocks()) {
+      Marked::Block* block_votes = nullptr;
+      for (std::size_t place = 0; place < block.size(); ++place) {
+        FloatVoxel& voxel = block[place];
+        const std::optional<Seen> seen = view.Look(Values::VoxelAt(key, place));
+        if (!seen) continue;
+        const float weight = rule_.WeightOf(*seen, camera);
+        if (seen->label == id) {
+          rule_.Fuse(*seen, weight, voxel);
+          if (!rule_.InBand(seen->s)) continue;
+          if (block_votes == nullptr) block_votes = &votes.FindOrAdd(key);
+          (*block_votes)[place] = 1;
+          continue;
+        }
+        const bool contradicted =
+            voxel.observed() && voxel.distance < -0.5F * h && seen->s >= -0.5F * h;
+        if (!contradicted) continue;
+        voxel = FloatVoxel{};
+        if (seen->s > h) voxel = rule_.Fresh(std::min(seen->s, rule_.front()), weight);
       }
-      const bool contradicted =
-          voxel.observed() && voxel.distance < -0.5F * h && seen->s >= -0.5F * h;
-      if (!contradicted) return;
-      voxel = FloatVoxel{};
-      if (seen->s > h) voxel = rule_.Fresh(std::min(seen->s, rule_.front()), weight);
-    });
+    }
   }
 
   void UpdateLists(const std::map<InstanceId, Change>& changes) {
