@@ -6,6 +6,7 @@
 #include <set>
 
 #include "eval/scene_sanity.h"
+#include "eval/scene_seams.h"
 #include "eval/scene_truth.h"
 #include "mapper/map_representation.h"
 #include "metrics/accuracy.h"
@@ -60,6 +61,7 @@ struct Evaluation {
   Measured ghost_share;
   Measured revealed_ghost_area_m2;  // after all movers were removed
   SanityScores sanity;
+  SeamScores seams;
   TriangleMesh scene;             // visible, nothing removed
   TriangleMesh revealed;          // after all movers were removed
   Selection table_reconstructed;  // of the background's samples, on `revealed`

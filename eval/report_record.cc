@@ -27,10 +27,10 @@ constexpr int kDepthStride = 4;  // pixels between those that the depth images' 
 nlohmann::json PoseJson(const Pose& T) {
   const Eigen::Quaterniond q(T.rotation());
   const auto rounded = [](double x) { return std::round(x * 1e5) / 1e5; };
-  nlohmann::json json = nlohmann::json::array();
-  for (int axis = 0; axis < 3; ++axis) json.push_back(rounded(T.translation()[axis]));
-  for (const double x : {q.x(), q.y(), q.z(), q.w()}) json.push_back(rounded(x));
-  return json;
+  nlohmann::json numbers = nlohmann::json::array();
+  for (int axis = 0; axis < 3; ++axis) numbers.push_back(rounded(T.translation()[axis]));
+  for (const double x : {q.x(), q.y(), q.z(), q.w()}) numbers.push_back(rounded(x));
+  return numbers;
 }
 
 nlohmann::json GridJson(const PositionGrid& grid) {

@@ -38,6 +38,7 @@ class DenseAnchored : public DenseMap {
     index_.reset();
     for (auto& [id, volume] : volumes_) {
       FuseObject(id, View(frame, labels, ObjectLattice(id), config_), config_, volume, nullptr);
+      CompleteRims(id, frame, labels, ObjectLattice(id), config_, volume);
       volume.FreeEmptyBlocks();
     }
   }
