@@ -15,7 +15,8 @@
 namespace tsdfpp {
 namespace {
 
-// A cube's corners are within its diagonal of a point in it: 1.8 voxels, and the rounding of pixels.
+// A cube's corners are within its diagonal of a point in it: 1.8 voxels, and the rounding of
+// pixels.
 constexpr double kRimReach_voxels = 2;
 constexpr int kRowsPerTask = 16;
 constexpr std::size_t kBlocksPerRimTask = 8;
@@ -128,8 +129,9 @@ std::vector<RimVoxel> FindRimVoxels(const FrameView& frame, const MapConfig& con
     std::optional<NearbyVoxels> voxels;
     Index3 last{std::numeric_limits<int>::max(), 0, 0};
     for (int u = 0; u < frame.width; ++u) {
-      const std::size_t pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width) +
-                                static_cast<std::size_t>(u);
+      const std::size_t pixel =
+          static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width) +
+          static_cast<std::size_t>(u);
       if (near[pixel] == 0 || !frame.IsUsable(pixel)) continue;
       if (frame.kernel.label[pixel] != id) {
         id = frame.kernel.label[pixel];
@@ -243,8 +245,7 @@ void FuseRims(const FrameView& frame, const MapConfig& config, ObjectVolumes& vo
     NearbyVoxels voxels(volumes.at(target.id).grid);
     PlannedBlock planned{};
     planned.behind_m = std::numeric_limits<float>::infinity();
-    const BlockPlace place =
-        PlaceOf(cameras.at(target.id), target.index, config.voxel(), planned);
+    const BlockPlace place = PlaceOf(cameras.at(target.id), target.index, config.voxel(), planned);
     BlockObservation seen;
     const bool any_seen = ObserveVoxels(frame.kernel, place, back, seen);
     for (const std::uint32_t i : target.voxels) {
@@ -279,13 +280,13 @@ void FuseRims(const FrameView& frame, const MapConfig& config, ObjectVolumes& vo
       const float d = *distance[i];
       const auto at = static_cast<std::size_t>(PlaceInBlock(rim[i].voxel));
       const bool coloured = std::abs(d) <= config.first_colour_band();
-      FuseVoxel(block, at, d, coloured ? frame.kernel.colour + 3 * std::size_t{rim[i].pixel} : nullptr,
+      FuseVoxel(block, at, d,
+                coloured ? frame.kernel.colour + 3 * std::size_t{rim[i].pixel} : nullptr,
                 static_cast<float>(config.weight_cap));
     }
     block.UpdateMasks(back);
     block.full = full;  // of other voxels
-    target.result.changed_signs =
-        ChangedSigns(observed, negative, block.observed, block.negative);
+    target.result.changed_signs = ChangedSigns(observed, negative, block.observed, block.negative);
     target.result.band_changed = band != block.band;
   });
   static const BlockMask kNoVotes{};

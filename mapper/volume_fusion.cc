@@ -5,7 +5,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <iterator>
 
 #include "mapper/allocation.h"
@@ -144,8 +143,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
       },
       tbb::simple_partitioner());
   std::erase_if(fused, [](const FusedBlock& block) { return block.block == nullptr; });
-  static const bool kRims = std::getenv("NO_RIMS") == nullptr;
-  if (kRims) FuseRims(frame, config, volumes, fused);
+  FuseRims(frame, config, volumes, fused);
   InstanceId last = kNoInstance;
   for (const FusedBlock& block : fused) {
     if (block.id != last) volumes.at(block.id).revision = NewRevision();
