@@ -96,7 +96,7 @@ TEST(SceneSanity, DepthMayBeOffByOneVoxelButNotByTwo) {
     // A plane shifted by s along the view is off by s n_z / (n . ray): at most some 1.6 s, and at
     // least 0.6 s, on the faces in this view.
     return SanityOf(Shifted(TrueMesh(scene), voxels * kSanityVoxel_m * along_view), recent,
-                       kSanityVoxel_m);
+                    kSanityVoxel_m);
   };
   for (const double little : {-0.5, 0.5}) {
     EXPECT_EQ(score(little).all.value, 1.0) << little;

@@ -193,7 +193,7 @@ TEST(SeamsOfDepth, OfATablesRingAreItsArea) {
   // Whole pixels along the square's outline, 1.4 mm wide, half of them at most.
   const double outline_m2 = 4 * side * 0.8 / 560 / 2;
   EXPECT_NEAR(scores.beside_objects.area_m2, ring_m2, outline_m2);
-  EXPECT_LT(outline_m2, 0.1 * ring_m2);
+  EXPECT_LT(outline_m2, ring_m2 / 8);
 }
 
 }  // namespace
