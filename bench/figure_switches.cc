@@ -84,6 +84,7 @@ Expected<void> MeasureSwitches(const FigureOptions& options) {
   const std::vector<Switch> switches{
       {"as it is", [](MapConfig&) {}, false},
       {"contradiction = false", [](MapConfig& c) { c.contradiction = false; }, false},
+      {"rims = false", [](MapConfig& c) { c.rims = false; }, false},
       {"weight_cap = 200", [](MapConfig& c) { c.weight_cap = 200; }, false},
       {"resampling = observed", [](MapConfig& c) { c.resampling = Resampling::kObserved; }, true},
       {"relist_on_removal = true", [](MapConfig& c) { c.relist_on_removal = true; }, true},

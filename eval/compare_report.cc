@@ -93,6 +93,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
             {"confidence_cap", map.confidence_cap},
             {"moved_confidence", map.moved_confidence},
             {"contradiction", map.contradiction},
+            {"rims", map.rims},
             {"relist_on_removal", map.relist_on_removal},
             {"colour_whole_band", map.colour_whole_band},
             {"resampling", ResamplingName(map.resampling)},

@@ -262,7 +262,10 @@ Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
     result.ghost_error_m2 = ghosts.ghosts.standard_error_m2;
     result.ghost_share = ghosts.share_of_mesh;
     ScoreRevealedGhosts(meshes.labelled ? &revealed : nullptr, truth, movers, voxel_m, result);
-    result.sanity = ScoreSanity(meshes.scene, truth.recent(), voxel_m);
+    const Frame& now = truth.recent().back();
+    const Raster raster = Rasterise(meshes.scene, now.intrinsics, now.T_WC);
+    result.sanity = ScoreSanity(meshes.scene, raster, truth.recent(), voxel_m);
+    result.seams = ScoreSeams(raster.depth, truth.recent(), voxel_m);
   };
   // Each writes its own part of the result.
   tbb::parallel_invoke(score_objects, score_scene);
@@ -327,6 +330,12 @@ nlohmann::json ToJson(const ObjectScores& scores) {
           {"label_purity", tsdfpp::ToJson(scores.label_purity)}};
 }
 
+nlohmann::json ToJson(const SeamScore& score) {
+  return {{"share", tsdfpp::ToJson(score.share)},
+          {"area_cm2", 1e4 * score.area_m2},
+          {"asked_area_cm2", 1e4 * score.asked_area_m2}};
+}
+
 }  // namespace
 
 nlohmann::json ToJson(const ObjectTrajectoryScores& scores) {
@@ -357,6 +366,9 @@ nlohmann::json ToJson(const Evaluation& evaluation) {
           {"revealed_unseen_area_m2", ToJson(evaluation.revealed_unseen_area_m2)},
           {"revealed_unseen_error_m2", ToJson(evaluation.revealed_unseen_error_m2)},
           {"sanity", sanity},
+          {"seams",
+           {{"beside_objects", ToJson(evaluation.seams.beside_objects)},
+            {"elsewhere", ToJson(evaluation.seams.elsewhere)}}},
           {"mesh_s", evaluation.mesh_s},
           {"evaluate_s", evaluation.evaluate_s}};
 }

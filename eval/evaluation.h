@@ -6,6 +6,7 @@
 #include <set>
 
 #include "eval/scene_sanity.h"
+#include "eval/scene_seams.h"
 #include "eval/scene_truth.h"
 #include "mapper/map_representation.h"
 #include "metrics/accuracy.h"
@@ -66,6 +67,7 @@ struct Evaluation {
   Measured revealed_unseen_area_m2;
   Measured revealed_unseen_error_m2;
   SanityScores sanity;
+  SeamScores seams;
   TriangleMesh scene;             // visible, nothing removed
   TriangleMesh revealed;          // after all movers were removed
   Selection table_reconstructed;  // of the background's samples, on `revealed`

@@ -77,6 +77,13 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
       {"sane", "sanity_all", [](const Movers&, const Evaluation& e) { return e.sanity.all; }, 3},
       {"sane least", "sanity_least",
        [](const Movers&, const Evaluation& e) { return LeastSanity(e); }, 3},
+      {"seam", "seam_share",
+       [](const Movers&, const Evaluation& e) { return e.seams.beside_objects.share; }, 4},
+      {"seam cm2", "seam_area_cm2",
+       [](const Movers&, const Evaluation& e) {
+         return Measured::Of(1e4 * e.seams.beside_objects.area_m2);
+       },
+       1},
       {"kept any label", "table_preservation_any_label",
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.by_cause.front().any_label;

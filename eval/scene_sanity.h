@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/types.h"
+#include "eval/rasteriser.h"
 #include "metrics/measured.h"
 
 namespace tsdfpp {
@@ -18,14 +19,12 @@ struct SanityScores {
 inline constexpr double kSaneShareAll = 0.99;
 inline constexpr double kSaneShareObject = 0.95;
 
-// Casts `scene_W` from the last frame's camera. A pixel is right where its depth is within one
-// voxel of the frame's and its id is the mask's; a mesh without face ids is not asked for them.
-// Mapped pixels: valid depth, and the surface point was also seen (depth within one voxel, same id;
-// objects moved by their poses) by each of the frames before in `recent`, whose last entry is the
-// current frame. Pixels within max(2, ceil(1.5 f voxel / z)) of a depth or id edge are left out; z
-// is the nearer side's depth.
-SanityScores ScoreSanity(const TriangleMesh& scene_W, const std::deque<Frame>& recent,
-                         double voxel_m);
+// `raster` is `scene_W`, cast from the last frame's camera. A pixel is right where its depth is
+// within one voxel of the frame's and its id is the mask's; a mesh without face ids is not asked
+// for them. Mapped pixels: those of SeenByAll() (eval/mapped_pixels.h), but for those in
+// EdgeBorder() and those seen at a steep incidence.
+SanityScores ScoreSanity(const TriangleMesh& scene_W, const Raster& raster,
+                         const std::deque<Frame>& recent, double voxel_m);
 
 // The pixels (CV_8UC1, 255 or 0) that ScoreSanity counts.
 cv::Mat MappedPixels(const std::deque<Frame>& recent, double voxel_m);

@@ -66,11 +66,14 @@ void Insert(const BlockMask& covered, const float* distance, InstanceId id,
     if (hn::AllFalse(df, carried)) continue;
     auto d = hn::LoadU(df, distance + i);
     auto o = hn::Set(di, id);
+    // What is displaced stays before those that are as near: it came before them.
+    auto displaces = hn::MaskFromVec(hn::Zero(df));
     for (int layer = 0; layer < lists.layers; ++layer) {
       const std::size_t at = static_cast<std::size_t>(layer) * kBlockVoxels + i;
       const auto other_d = hn::LoadU(df, lists.distance + at);
       const auto other_o = hn::PromoteTo(di, hn::LoadU(du, lists.id + at));
-      const auto swap = hn::And(carried, hn::Lt(d, other_d));
+      const auto swap = hn::And(carried, hn::Or(displaces, hn::Lt(d, other_d)));
+      displaces = swap;
       const auto swap_o = hn::RebindMask(di, swap);
       hn::StoreU(hn::IfThenElse(swap, d, other_d), df, lists.distance + at);
       hn::StoreU(hn::DemoteTo(du, hn::IfThenElse(swap_o, o, other_o)), du, lists.id + at);

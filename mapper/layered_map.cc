@@ -112,10 +112,10 @@ std::optional<LayeredMap::VisibilityChanges> LayeredMap::WhereVisibilityChanged(
   std::vector<BlockBox> values;
   for (const auto& [id, object] : meshes_) {
     const auto add = [&, &of = object](const Index3& block) {
-      // An interpolated distance reads a voxel further along each axis.
-      const bool is_world = of.lattice_is_world;
-      values.push_back(MovedBox({block, block, false}, is_world ? nullptr : &of.T_WL,
-                                config_.voxel_m, is_world ? 0 : 1));
+      // An interpolated distance reads a voxel further along each axis, from a point that is less
+      // than a voxel from the one where a triangle is looked up.
+      values.push_back(MovedBox({block, block, false}, of.lattice_is_world ? nullptr : &of.T_WL,
+                                config_.voxel_m, 2));
     };
     if (object.has_moved) {
       for (const MeshPart* part : object.mesh.parts()) add(part->index);
@@ -173,37 +173,28 @@ std::vector<MeshPart*> LayeredMap::PartsToLookUp(
   return parts;
 }
 
-// A triangle is dropped where another object is active at its look-up voxel, deep enough.
+// A triangle is dropped where another object is active at its look-up voxel, and its look-up point
+// deep enough in that object.
 void LayeredMap::FindHiddenTriangles(const std::optional<VisibilityChanges>& where) const {
   struct Object {
-    const TsdfGrid* grid;
     bool lattice_is_world;
     BlockBox reach;
-    std::optional<VoxelReader> reader;  // unless the lattice is the world's
+    VoxelReader reader;
     Pose T_LW;
   };
   std::map<InstanceId, Object> objects;
   for (const auto& [id, volume] : volumes_) {
-    const bool is_world = volume.lattice_is_world;
-    Object object{&volume.grid,
-                  is_world,
-                  ReachOf(meshes_.at(id), config_.voxel_m),
-                  {},
-                  volume.T_WL.inverse()};
-    if (!is_world) object.reader.emplace(volume.grid);
-    objects.emplace(id, std::move(object));
+    objects.emplace(id, Object{volume.lattice_is_world, ReachOf(meshes_.at(id), config_.voxel_m),
+                               VoxelReader(volume.grid), volume.T_WL.inverse()});
   }
   const float voxel = config_.voxel();
-  const auto is_inside = [&](InstanceId id, const Index3& v) {
+  const auto is_inside = [&](InstanceId id, const Eigen::Vector3f& point) {
     const Object& of = objects.at(id);
-    if (of.lattice_is_world) {
-      const TsdfBlock* block = of.grid->Find(BlockOf(v));
-      const auto i = static_cast<std::size_t>(PlaceInBlock(v));
-      return block != nullptr && block->weight[i] > 0 && block->distance[i] < -voxel;
-    }
+    const auto p = point.cast<double>();
     const Eigen::Vector3d q =
-        of.T_LW * (Eigen::Vector3d(v.x, v.y, v.z) * config_.voxel_m) / config_.voxel_m;
-    const auto distance = DistanceAt(FindCorners(*of.reader, q));
+        of.lattice_is_world ? Eigen::Vector3d(p)
+                            : Eigen::Vector3d(of.T_LW * (p * config_.voxel_m) / config_.voxel_m);
+    const auto distance = DistanceAt(FindCorners(of.reader, q));
     return distance && *distance < -voxel;
   };
   for (auto& [self, object] : meshes_) {
@@ -216,20 +207,21 @@ void LayeredMap::FindHiddenTriangles(const std::optional<VisibilityChanges>& whe
                return other.first != id && other.second.reach.Meets(place);
              });
     };
-    const auto hidden_at = [&, id = self](std::span<const Index3> voxels,
+    const auto hidden_at = [&, id = self](std::span<const LookUpPlace> look_ups,
                                           std::span<std::uint8_t> hidden) {
       std::uint64_t others = 0;
       // One voxel after another is in the same block.
       std::optional<Index3> last;
       const InstanceId* ids = nullptr;
-      for (std::size_t i = 0; i < voxels.size(); ++i) {
-        const Index3 block = BlockOf(voxels[i]);
+      for (std::size_t i = 0; i < look_ups.size(); ++i) {
+        const auto& [looked_up, point] = look_ups[i];
+        const Index3 block = BlockOf(looked_up);
         if (last != block) ids = ActiveIn(block);
         last = block;
-        const InstanceId active = ids == nullptr ? kNoInstance : ids[PlaceInBlock(voxels[i])];
+        const InstanceId active = ids == nullptr ? kNoInstance : ids[PlaceInBlock(looked_up)];
         const bool is_other = active != kNoInstance && active != id;
         if (is_other) others |= IdBit(active);
-        hidden[i] = is_other && is_inside(active, voxels[i]) ? 1 : 0;
+        hidden[i] = is_other && is_inside(active, point) ? 1 : 0;
       }
       return others;
     };

@@ -113,17 +113,17 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
                                              const RayCastOptions& options) const {
   struct Reader {
     VoxelReader reader;
+    bool lattice_is_world;
     Pose T_LW;
   };
   RayPass pass;
   pass.voxel_m = config_.voxel_m;
-  std::map<InstanceId, Reader> moved;
+  std::map<InstanceId, Reader> readers;
   for (const auto& [id, volume] : volumes_) {
     if (volume.grid.empty()) continue;
     pass.volumes.push_back({id, &volume.grid, volume.T_WL, volume.lattice_is_world});
-    if (!volume.lattice_is_world) {
-      moved.emplace(id, Reader{VoxelReader(volume.grid), volume.T_WL.inverse()});
-    }
+    readers.emplace(
+        id, Reader{VoxelReader(volume.grid), volume.lattice_is_world, volume.T_WL.inverse()});
   }
   const Claims claims(volumes_, config_.voxel_m);
   if (pass.volumes.size() > 1) {
@@ -131,19 +131,12 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
       return claims.Contested(volume, low, high);
     };
   }
-  // A voxel's distance in the volume of an object.
-  const auto distance_at = [&](InstanceId id, const Index3& v) -> std::optional<float> {
-    const auto of = moved.find(id);
-    if (of == moved.end()) {
-      const TsdfBlock* block = volumes_.at(id).grid.Find(BlockOf(v));
-      const auto i = static_cast<std::size_t>(PlaceInBlock(v));
-      if (block == nullptr || block->weight[i] <= 0) return std::nullopt;
-      return block->distance[i];
-    }
-    const Eigen::Vector3d voxel(v.x, v.y, v.z);
+  // A point's distance in the volume of an object.
+  const auto distance_at = [&](InstanceId id, const Eigen::Vector3f& p_W) {
+    const Reader& of = readers.at(id);
+    const Eigen::Vector3d p = p_W.cast<double>();
     return DistanceAt(FindCorners(
-        of->second.reader,
-        Eigen::Vector3d(of->second.T_LW * (voxel * config_.voxel_m) / config_.voxel_m)));
+        of.reader, (of.lattice_is_world ? p : Eigen::Vector3d(of.T_LW * p)) / config_.voxel_m));
   };
   const float voxel_m = config_.voxel();
   pass.make_hidden = [&]() -> RayPass::Hidden {
@@ -170,7 +163,7 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
         const InstanceId active =
             without.empty() ? *place : FirstOf(ListAt({v.x, v.y, v.z}), without);
         if (active == kNoInstance || active == queries[i].id) continue;
-        const auto distance = distance_at(active, v);
+        const auto distance = distance_at(active, queries[i].look_up_W);
         queries[i].hidden = distance && *distance < -voxel_m;
       }
     };

@@ -146,6 +146,7 @@ Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::str
       .Get("confidence_cap", config.confidence_cap)
       .Get("moved_confidence", config.moved_confidence)
       .Get("contradiction", config.contradiction)
+      .Get("rims", config.rims)
       .Get("relist_on_removal", config.relist_on_removal)
       .Get("colour_whole_band", config.colour_whole_band)
       .Get("resampling", resampling)
@@ -177,6 +178,7 @@ toml::table MapConfig::ToToml() const {
                      {"confidence_cap", confidence_cap},
                      {"moved_confidence", moved_confidence},
                      {"contradiction", contradiction},
+                     {"rims", rims},
                      {"relist_on_removal", relist_on_removal},
                      {"colour_whole_band", colour_whole_band},
                      {"resampling", ResamplingName(resampling)},

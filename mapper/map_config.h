@@ -81,6 +81,7 @@ struct MapConfig {
   int confidence_cap = 10;         // votes at which a listing saturates, at most 255
   int moved_confidence = 1;        // of an object in a voxel that it was moved to; up to the cap
   bool contradiction = true;  // tsdf++ and anchored: pixels of others clear what o wrongly claims
+  bool rims = true;           // object volumes: cubes at a mask's outline are completed
   bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped
   bool colour_whole_band = false;  // colour far from the surface too, as one field always does
   Resampling resampling = Resampling::kAll;  // of the methods that move values

@@ -44,9 +44,8 @@ class CornersOf {
   std::array<const Eigen::Vector3f*, 8> positions_{};
 };
 
-// The voxels where the part's triangles are looked up: those nearest to a point half a voxel in
-// front of each one's centroid. Returns a box around them.
-BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<Index3>& voxels) {
+// Where the part's triangles are looked up. Returns a box around the voxels.
+BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<LookUpPlace>& look_ups) {
   constexpr int kMost = std::numeric_limits<int>::max();
   constexpr std::size_t kAtOnce = 64;
   using Numbers = std::array<float, kAtOnce>;
@@ -54,9 +53,10 @@ BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<Index3>& vox
   const CornersOf corner(part);
   Index3 low{kMost, kMost, kMost};
   Index3 high{-kMost, -kMost, -kMost};
-  voxels.resize(part.triangles.size());
+  look_ups.resize(part.triangles.size());
   std::array<std::array<Numbers, 3>, 3> at;  // coordinates of the corners, by axis
   std::array<std::array<int, kAtOnce>, 3> found;
+  std::array<Numbers, 3> point;
   for (std::size_t first = 0; first < part.triangles.size(); first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, part.triangles.size() - first);
     for (std::size_t t = 0; t < count; ++t) {
@@ -80,14 +80,15 @@ BlockBox FindLookUps(const MeshPart& part, float voxel, std::vector<Index3>& vox
       const float half = squared > 0 ? 0.5F / std::sqrt(squared) : 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const float centroid = (of(axis, 0) + of(axis, 1) + of(axis, 2)) * (1.0F / 3);
-        found[axis][t] = NearestAlong(centroid + half * normal(axis), 1);
+        point[axis][t] = centroid + half * normal(axis);
+        found[axis][t] = NearestAlong(point[axis][t], 1);
       }
     }
     for (std::size_t t = 0; t < count; ++t) {
       const Index3 v{found[0][t], found[1][t], found[2][t]};
       low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
       high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
-      voxels[first + t] = v;
+      look_ups[first + t] = {v, {point[0][t], point[1][t], point[2][t]}};
     }
   }
   return {low, high, false};
@@ -334,7 +335,7 @@ std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float 
   constexpr std::uint32_t kNamesChanged = 1;
   constexpr std::uint32_t kToBeNamed = 2;
   ForEachPart(parts, [&](MeshPart& part) {
-    thread_local std::vector<Index3> voxels;
+    thread_local std::vector<LookUpPlace> look_ups;
     thread_local std::vector<std::uint8_t> hidden;
     hidden.clear();
     part.looked_up = {};
@@ -345,10 +346,10 @@ std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float 
       part.looked_up.Extend(place.low + Index3{-1, -1, -1});
       part.looked_up.Extend(place.high + Index3{1, 1, 1});
     } else if (!place.is_empty) {
-      const BlockBox box = FindLookUps(part, voxel, voxels);
+      const BlockBox box = FindLookUps(part, voxel, look_ups);
       part.looked_up = {BlockOf(box.low), BlockOf(box.high), false};
-      hidden.resize(voxels.size());
-      part.others = hidden_at(voxels, hidden);
+      hidden.resize(look_ups.size());
+      part.others = hidden_at(look_ups, hidden);
       if (std::find(hidden.begin(), hidden.end(), 1) == hidden.end()) hidden.clear();
     }
     if (part.is_settled && part.hidden == hidden) return;

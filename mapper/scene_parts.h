@@ -53,9 +53,17 @@ BlockBox ReachOf(const PlacedMesh& object, double voxel_m);
 // The parts of the set's blocks.
 std::vector<MeshPart*> PartsIn(const BlockSet& blocks, const GridMesh& mesh);
 
-// Which triangles are hidden, from the global voxels where they are looked up: 1 for those, 0 for
-// the others. Returns IdBit of all objects whose values say it. For several threads at once.
-using HiddenAt = std::function<std::uint64_t(std::span<const Index3>, std::span<std::uint8_t>)>;
+// Where it is looked up whether a triangle is hidden, in voxels of the world: half a voxel in front
+// of its centroid, and the voxel nearest to that.
+struct LookUpPlace {
+  Index3 voxel;
+  Eigen::Vector3f point;
+};
+
+// Which triangles are hidden, from where they are looked up: 1 for those, 0 for the others. Returns
+// IdBit of all objects whose values say it. For several threads at once.
+using HiddenAt =
+    std::function<std::uint64_t(std::span<const LookUpPlace>, std::span<std::uint8_t>)>;
 
 // Finds out which triangles of some parts of the mesh are hidden: of those whose global blocks, by
 // `place_of`, are `in_doubt`; no others are. `voxel` in metres.

@@ -9,6 +9,7 @@
 
 #include "mapper/allocation.h"
 #include "mapper/cube_masks.h"
+#include "mapper/rims.h"
 
 namespace tsdfpp {
 namespace {
@@ -26,17 +27,6 @@ void AllocateBlocks(const FrameView& frame, const MapConfig& config, ObjectVolum
     TsdfGrid& grid = volumes[id].grid;
     for (const Index3& index : indices) grid.FindOrAdd(index);
   }
-}
-
-// See FusedBlock::stale_cubes: the blocks with a cube of which one of the voxels is a corner.
-std::uint8_t BlocksOfCubesAt(const BlockMask& voxels) {
-  std::uint64_t any = 0;
-  for (const std::uint64_t slice : voxels) any |= slice;
-  if (any == 0) return 0;
-  // Bit 0: its own, 1: the one before.
-  const unsigned x = (any & kFirstColumn) != 0 ? 3 : 1;
-  const unsigned xy = (any & 0xFFU) != 0 ? x | x << 2U : x;
-  return static_cast<std::uint8_t>(voxels.front() != 0 ? xy | xy << 4U : xy);
 }
 
 struct Candidate {
@@ -89,6 +79,16 @@ class Candidates {
 };
 
 }  // namespace
+
+std::uint8_t BlocksOfCubesAt(const BlockMask& voxels) {
+  std::uint64_t any = 0;
+  for (const std::uint64_t slice : voxels) any |= slice;
+  if (any == 0) return 0;
+  // Bit 0: its own, 1: the one before.
+  const unsigned x = (any & kFirstColumn) != 0 ? 3 : 1;
+  const unsigned xy = (any & 0xFFU) != 0 ? x | x << 2U : x;
+  return static_cast<std::uint8_t>(voxels.front() != 0 ? xy | xy << 4U : xy);
+}
 
 std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig& config,
                                         ObjectVolumes& volumes, BlockVotes* votes) {
@@ -143,6 +143,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
       },
       tbb::simple_partitioner());
   std::erase_if(fused, [](const FusedBlock& block) { return block.block == nullptr; });
+  if (config.rims) FuseRims(frame, config, volumes, fused);
   InstanceId last = kNoInstance;
   for (const FusedBlock& block : fused) {
     if (block.id != last) volumes.at(block.id).revision = NewRevision();

@@ -50,13 +50,16 @@ struct FusedBlock {
   bool is_empty = false;               // no voxel is observed
 };
 
+// See FusedBlock::stale_cubes: the blocks with a cube of which one of the voxels is a corner.
+std::uint8_t BlocksOfCubesAt(const BlockMask& voxels);
+
 // Of each fused block, the voxels with an observation of its object in band.
 using BlockVotes = std::unique_ptr<BlockMask[]>;
 
 // Allocates the blocks of the labels in the frame (making volumes for new labels), fuses, applies
-// the contradiction rule if the config asks for it, and returns the blocks in which a voxel
-// changed. Their masks are up to date but for `crossed` and `cover`. `votes`, where given, must
-// outlive them.
+// the contradiction rule if the config asks for it, completes rims, and returns the blocks in
+// which a voxel changed. Their masks are up to date but for `crossed` and `cover`. `votes`, where
+// given, must outlive them.
 std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig& config,
                                         ObjectVolumes& volumes, BlockVotes* votes = nullptr);
 

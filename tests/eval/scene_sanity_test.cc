@@ -67,6 +67,11 @@ std::deque<Frame> Views(const reference::Scene& scene, int count = 3) {
   return frames;
 }
 
+SanityScores SanityOf(const TriangleMesh& mesh, const std::deque<Frame>& recent, double voxel_m) {
+  const Raster raster = Rasterise(mesh, recent.back().intrinsics, recent.back().T_WC);
+  return ScoreSanity(mesh, raster, recent, voxel_m);
+}
+
 int Count(const cv::Mat& pixels) { return cv::countNonZero(pixels); }
 
 int MappedOf(const std::deque<Frame>& recent, InstanceId id) {
@@ -78,7 +83,7 @@ TEST(SceneSanity, TrueMeshIsWhollySane) {
   const std::deque<Frame> recent = Views(scene);
   ASSERT_GT(MappedOf(recent, kBackground), 500);
   ASSERT_GT(MappedOf(recent, kBrick), 50);
-  const SanityScores scores = ScoreSanity(TrueMesh(scene), recent, kSanityVoxel_m);
+  const SanityScores scores = SanityOf(TrueMesh(scene), recent, kSanityVoxel_m);
   EXPECT_EQ(scores.all.value, 1.0);
   EXPECT_EQ(scores.by_object.at(kBackground).value, 1.0);
   EXPECT_EQ(scores.by_object.at(kBrick).value, 1.0);
@@ -91,8 +96,8 @@ TEST(SceneSanity, DepthMayBeOffByOneVoxelButNotByTwo) {
     const Eigen::Vector3d along_view = recent.back().T_WC.linear().col(2);
     // A plane shifted by s along the view is off by s n_z / (n . ray): at most some 1.6 s, and at
     // least 0.6 s, on the faces in this view.
-    return ScoreSanity(Shifted(TrueMesh(scene), voxels * kSanityVoxel_m * along_view), recent,
-                       kSanityVoxel_m);
+    return SanityOf(Shifted(TrueMesh(scene), voxels * kSanityVoxel_m * along_view), recent,
+                    kSanityVoxel_m);
   };
   for (const double little : {-0.5, 0.5}) {
     EXPECT_EQ(score(little).all.value, 1.0) << little;
@@ -110,7 +115,7 @@ TEST(SceneSanity, WrongLabelsAreNotSane) {
   const std::deque<Frame> recent = Views(scene);
   TriangleMesh mesh = TrueMesh(scene);
   for (InstanceId& id : mesh.face_ids) id = id == kBrick ? kBackground : kBrick;
-  const SanityScores scores = ScoreSanity(mesh, recent, kSanityVoxel_m);
+  const SanityScores scores = SanityOf(mesh, recent, kSanityVoxel_m);
   EXPECT_EQ(scores.all.value, 0.0);
   EXPECT_EQ(scores.by_object.at(kBrick).value, 0.0);
 }
@@ -119,7 +124,7 @@ TEST(SceneSanity, MissingObjectCostsItsOwnPixelsOnly) {
   reference::Scene scene = BrickOnSlab();
   const std::deque<Frame> recent = Views(scene);
   scene.Erase(kBrick);
-  const SanityScores scores = ScoreSanity(TrueMesh(scene), recent, kSanityVoxel_m);
+  const SanityScores scores = SanityOf(TrueMesh(scene), recent, kSanityVoxel_m);
   EXPECT_EQ(scores.by_object.at(kBrick).value, 0.0);
   EXPECT_EQ(scores.by_object.at(kBackground).value, 1.0);
   const double background = MappedOf(recent, kBackground);
@@ -128,7 +133,7 @@ TEST(SceneSanity, MissingObjectCostsItsOwnPixelsOnly) {
 }
 
 TEST(SceneSanity, EmptyMeshHasNothingRight) {
-  const SanityScores scores = ScoreSanity({}, Views(BrickOnSlab()), kSanityVoxel_m);
+  const SanityScores scores = SanityOf({}, Views(BrickOnSlab()), kSanityVoxel_m);
   EXPECT_EQ(scores.all.value, 0.0);
 }
 
@@ -138,7 +143,7 @@ TEST(SceneSanity, ObjectWithoutMappedPixelsIsUndefined) {
   for (std::size_t i = 0; i + 1 < recent.size(); ++i) {
     recent[i].mask.setTo(cv::Scalar(kBackground));
   }
-  const SanityScores scores = ScoreSanity(TrueMesh(BrickOnSlab()), recent, kSanityVoxel_m);
+  const SanityScores scores = SanityOf(TrueMesh(BrickOnSlab()), recent, kSanityVoxel_m);
   EXPECT_FALSE(scores.by_object.at(kBrick).value.has_value());
   EXPECT_FALSE(scores.by_object.at(kBrick).why_not.empty());
   EXPECT_TRUE(scores.by_object.at(kBackground).value.has_value());
@@ -291,7 +296,7 @@ TEST(SceneSanity, MovingObjectsPixelsFollowItsPose) {
   const int followed = MappedOf(recent, kBrick);
   // Its sides come into view as it turns; the top was always seen.
   EXPECT_GT(followed, 0.8 * still);
-  EXPECT_EQ(ScoreSanity(TrueMesh(scene), recent, kSanityVoxel_m).all.value, 1.0);
+  EXPECT_EQ(SanityOf(TrueMesh(scene), recent, kSanityVoxel_m).all.value, 1.0);
 
   // Without poses only what happens to lie in the old brick's surface counts.
   std::deque<Frame> blind = recent;

@@ -205,7 +205,8 @@ struct Pair {
 };
 
 Pair MakePair(Method method, double back_voxels, bool half_distances, bool byte_weights) {
-  const MapConfig settings = ToyConfig(back_voxels);
+  MapConfig settings = ToyConfig(back_voxels);
+  settings.rims = false;  // the float maps have none
   FloatConfig config;
   config.voxel_m = settings.voxel_m;
   config.front_voxels = settings.trunc_front_voxels;

@@ -100,6 +100,7 @@ TEST(MapConfigTest, TomlRoundTrip) {
   config.confidence_cap = 5;
   config.moved_confidence = 4;
   config.contradiction = false;
+  config.rims = false;
   config.relist_on_removal = true;
   config.colour_whole_band = true;
   config.resampling = Resampling::kObserved;

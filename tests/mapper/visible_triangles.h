@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <set>
 
 #include "mapper/map_representation.h"
@@ -10,16 +11,17 @@
 
 namespace tsdfpp {
 
-// The distance of an object at a global voxel, from the interface alone.
-inline double DistanceAtGlobal(const MapRepresentation& map, InstanceId id,
-                               const Eigen::Vector3i& v) {
-  const Eigen::Vector3d q = reference::SourcePoint(map.ObjectLattice(id).inverse(), v, kToyVoxel_m);
-  const reference::Neighbourhood place(q);
+// The distance of an object at a point of the world, from the interface alone; nothing where a
+// corner that counts is unobserved.
+inline std::optional<float> DistanceAtGlobal(const MapRepresentation& map, InstanceId id,
+                                             const Eigen::Vector3d& p_W) {
+  const reference::Neighbourhood place(map.ObjectLattice(id).inverse() * p_W / kToyVoxel_m);
   std::array<float, 8> distances{};
   for (int i = 0; i < 8; ++i) {
     if (place.Coefficient(i) == 0) continue;
     const auto value = map.ValueAt(id, reference::CubeCorner(place.base, i));
-    if (value) distances[i] = value->distance_m;
+    if (!value) return std::nullopt;
+    distances[i] = value->distance_m;
   }
   return place.Interpolate(distances);
 }
@@ -44,8 +46,8 @@ inline std::multiset<Triangle> VisibleTriangles(const MapRepresentation& map) {
           (p / kToyVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor();
       const Eigen::Vector3i v = nearest.cast<int>();
       const auto list = map.ListAt(v);
-      const bool hidden =
-          !list.empty() && list[0].id != id && DistanceAtGlobal(map, list[0].id, v) < -kToyVoxel_m;
+      const bool other = !list.empty() && list[0].id != id;
+      const bool hidden = other && DistanceAtGlobal(map, list[0].id, p).value_or(0) < -kToyVoxel_m;
       if (!hidden) visible.insert(AsTriangle(mesh, t, id));
     }
   }

@@ -38,6 +38,9 @@ class DenseAnchored : public DenseMap {
     index_.reset();
     for (auto& [id, volume] : volumes_) {
       FuseObject(id, View(frame, labels, ObjectLattice(id), config_), config_, volume, nullptr);
+      if (config_.rims) {
+        CompleteRims(id, frame, labels, ObjectLattice(id), config_, volume);
+      }
       volume.FreeEmptyBlocks();
     }
   }

@@ -50,6 +50,9 @@ class DenseTsdfpp : public DenseMap {
     for (auto& [id, volume] : volumes_) {
       covered_before.emplace(id, CoverOfLattice(volume.grid, config_));
       FuseObject(id, view, config_, volume, &votes.try_emplace(id, box_).first->second);
+      if (config_.rims) {
+        CompleteRims(id, frame, labels, Pose::Identity(), config_, volume);
+      }
       covered.emplace(id, CoverOfLattice(volume.grid, config_));
     }
     ForEachVoxel(box_, [&](const Eigen::Vector3i& v) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace tsdfpp::reference {
 
@@ -181,6 +182,114 @@ void FuseObject(InstanceId id, const View& view, const MapConfig& config, DenseV
       voxel.weight = 1;
     }
   });
+}
+
+namespace {
+
+bool IsUsable(const Frame& frame, const cv::Mat& labels, int v, int u) {
+  return labels.at<std::uint16_t>(v, u) != kNoInstance && IsValidDepth(frame.depth.at<float>(v, u));
+}
+
+// Marks the pixels near an outline pixel of their own label.
+cv::Mat AtOutlines(const Frame& frame, const cv::Mat& labels, const MapConfig& config) {
+  cv::Mat near(labels.size(), CV_8UC1, cv::Scalar(0));
+  const double f = std::max(frame.intrinsics.fx, frame.intrinsics.fy);
+  for (int v = 0; v < labels.rows; ++v) {
+    for (int u = 0; u < labels.cols; ++u) {
+      if (!IsUsable(frame, labels, v, u)) continue;
+      const auto label = labels.at<std::uint16_t>(v, u);
+      const auto two_voxels = static_cast<float>(2 * config.voxel_m);
+      const auto ends_at = [&](int row, int column) {
+        return row >= 0 && column >= 0 && row < labels.rows && column < labels.cols &&
+               labels.at<std::uint16_t>(row, column) != label &&
+               IsUsable(frame, labels, row, column) &&
+               frame.depth.at<float>(v, u) + two_voxels >= frame.depth.at<float>(row, column);
+      };
+      if (!ends_at(v, u - 1) && !ends_at(v, u + 1) && !ends_at(v - 1, u) && !ends_at(v + 1, u)) {
+        continue;
+      }
+      const double reach = std::ceil(2 * config.voxel_m * f / frame.depth.at<float>(v, u));
+      for (int row = 0; row < labels.rows; ++row) {
+        for (int column = 0; column < labels.cols; ++column) {
+          const bool is_near = std::abs(row - v) <= reach && std::abs(column - u) <= reach;
+          if (is_near && labels.at<std::uint16_t>(row, column) == label) {
+            near.at<std::uint8_t>(row, column) = 1;
+          }
+        }
+      }
+    }
+  }
+  return near;
+}
+
+// What the distances on all sides go on to; nothing where no side tells.
+std::optional<float> GoneOn(const DenseGrid<DenseVoxel>& grid, const Eigen::Vector3i& voxel,
+                            float h) {
+  float sum = 0;
+  float count = 0;
+  ForEachVoxel(Box{{-1, -1, -1}, {1, 1, 1}}, [&](const Eigen::Vector3i& step) {
+    if (step.isZero()) return;
+    const Eigen::Vector3i far = voxel + 2 * step;
+    if (!grid(voxel + step).observed() || !grid(far).observed()) return;
+    const float next = grid(voxel + step).distance;
+    const float after = grid(far).distance;
+    if (std::abs(next - after) > 4 * h) return;
+    sum += 2 * next - after;
+    count += 1;
+  });
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
+}  // namespace
+
+void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, const Pose& T_WL,
+                  const MapConfig& config, DenseVolume& volume) {
+  const float h = config.voxel();
+  const cv::Mat near = AtOutlines(frame, labels, config);
+  const Pose T_LC = T_WL.inverse() * frame.T_WC;
+  const View view(frame, labels, T_WL, config);
+  struct Rim {
+    Eigen::Vector3i voxel;
+    DenseVoxel value;
+  };
+  std::map<std::array<int, 3>, std::optional<Rim>> rims;
+  for (int v = 0; v < labels.rows; ++v) {
+    for (int u = 0; u < labels.cols; ++u) {
+      if (near.at<std::uint8_t>(v, u) == 0 || labels.at<std::uint16_t>(v, u) != id) continue;
+      if (!IsUsable(frame, labels, v, u)) continue;
+      const Intrinsics& camera = frame.intrinsics;
+      const double z = frame.depth.at<float>(v, u);
+      const Eigen::Vector3d p_C((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z,
+                                z);
+      const Eigen::Vector3d q = (T_LC * p_C) / config.voxel_m;
+      const Eigen::Vector3i cube = q.array().floor().matrix().cast<int>();
+      for (int i = 0; i < 8; ++i) {
+        const Eigen::Vector3i corner = CubeCorner(cube, i);
+        if (volume.grid(corner).observed()) continue;
+        const auto [place, first] =
+            rims.try_emplace(std::array{corner.x(), corner.y(), corner.z()});
+        if (!first) continue;
+        std::optional<float> distance = GoneOn(volume.grid, corner, h);
+        const std::optional<Seen> seen = view.Look(corner);
+        if (!distance) continue;
+        if (seen && seen->s > 0) distance = std::max(*distance, std::min(seen->s, h));
+        Rim& rim = place->second.emplace();
+        rim.voxel = corner;
+        rim.value.distance = Kept(std::clamp(*distance, -config.back(), config.front()));
+        rim.value.weight = 1;
+        const bool is_far = std::abs(rim.value.distance) > static_cast<float>(3 * config.voxel_m);
+        if (is_far && !config.colour_whole_band) continue;
+        rim.value.colours = 1;
+        const auto& rgb = frame.colour.at<cv::Vec3b>(v, u);
+        for (int c = 0; c < 3; ++c) rim.value.colour[c] = 256.0F * rgb[c];
+      }
+    }
+  }
+  for (const auto& [place, rim] : rims) {
+    if (!rim) continue;
+    volume.grid.At(rim->voxel) = rim->value;
+    volume.blocks.AddBlockOf(rim->voxel);
+  }
 }
 
 }  // namespace tsdfpp::reference

@@ -78,4 +78,8 @@ DenseVolume Resample(const DenseVolume& old, const Pose& T_rel, const MapConfig&
 void FuseObject(InstanceId id, const View& view, const MapConfig& config, DenseVolume& volume,
                 DenseGrid<std::uint8_t>* votes);
 
+// docs/map.md, "Rims", of one object, after FuseObject of the same frame.
+void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, const Pose& T_WL,
+                  const MapConfig& config, DenseVolume& volume);
+
 }  // namespace tsdfpp::reference

@@ -40,7 +40,7 @@ class FloatMap {
 };
 
 std::unique_ptr<FloatMap> MakeFloatTsdf(const FloatConfig& config, FieldMoves moves);
-// K = 2, resampling `all`, contradiction.
+// K = 2, resampling `all`, contradiction, no rims.
 std::unique_ptr<FloatMap> MakeFloatTsdfpp(const FloatConfig& config);
 
 }  // namespace tsdfpp::reference

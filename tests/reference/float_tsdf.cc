@@ -42,9 +42,12 @@ class FloatTsdf : public FloatMap {
   }
 
   void Remove(InstanceId id) override {
-    Vacate(id);
+    field_.ForEach([&](const Eigen::Vector3i&, FieldVoxel& voxel) {
+      if (!IsSource(id, voxel) || !Moves(voxel)) return;
+      voxel = FieldVoxel{};
+      static_cast<FloatVoxel&>(voxel) = rule_.Fresh(rule_.front(), 1);
+    });
     poses_.Forget(id);
-    FreeEmptyBlocks();
   }
 
   TriangleMesh SceneMesh() const override {

@@ -299,8 +299,15 @@ class FloatTsdfpp : public FloatMap {
     const Eigen::Vector3i v = NearestVoxel(p, h);
     const List& list = lists_(v);
     if (list.empty() || list[0].id == id) return false;
-    const auto active = ValueAt(list[0].id, v);
-    return active && active->distance < -h;
+    const Neighbourhood place(p.cast<double>() / rule_.map().voxel_m);
+    std::array<float, 8> distances{};
+    for (int i = 0; i < 8; ++i) {
+      if (place.Coefficient(i) == 0) continue;
+      const auto active = ValueAt(list[0].id, CubeCorner(place.base, i));
+      if (!active) return false;
+      distances[static_cast<std::size_t>(i)] = active->distance;
+    }
+    return place.Interpolate(distances) < -h;
   }
 
   FloatRule rule_;

@@ -66,13 +66,13 @@ RayReference::RayReference(const MapRepresentation& map, Method method, const Ma
 bool RayReference::Hidden(InstanceId id, const RayHit& hit, const Eigen::Vector3d& p_W,
                           const std::vector<InstanceId>& without) const {
   const double h = config_.voxel_m;
-  const Eigen::Vector3i v =
-      ((p_W + 0.5 * h * hit.normal_W) / h).array().round().matrix().cast<int>();
+  const Eigen::Vector3d look_up_W = p_W + 0.5 * h * hit.normal_W;
+  const Eigen::Vector3i v = (look_up_W / h).array().round().matrix().cast<int>();
   for (const Listing& entry : map_.ListAt(v)) {
     if (std::find(without.begin(), without.end(), entry.id) != without.end()) continue;
     if (entry.id == id) return false;
     const Field& active = fields_.at(entry.id);
-    const auto distance = DistanceAt(active.grid, SourcePoint(active.T_LW, v, h));
+    const auto distance = DistanceAt(active.grid, active.T_LW * look_up_W / h);
     return distance && *distance < -h;
   }
   return false;

@@ -53,6 +53,14 @@ export const kMeasures = {
   sanity_least: {
     ...percent, title: 'Pixels as seen, worst object', about: 'The same of the worst object',
   },
+  seam_share: {
+    ...percent, decimals: 2, better: -1, title: 'Seams',
+    about: 'Share of the background pixels beside objects where the map, seen from the camera, shows nothing, or only what lies behind',
+  },
+  seam_area_cm2: {
+    scale: 1, unit: 'cm²', decimals: 1, better: -1, title: 'Ring',
+    about: 'Area of background that is missing beside objects, in the visible scene',
+  },
   table_preservation_any_label: {
     ...percent, title: 'Hidden table kept, any label',
     about: 'As hidden table kept, whatever object the surface is said to belong to',
