@@ -36,6 +36,7 @@ REGISTRY = "docs/tables.toml"
 PAGES = ["README.md", "docs/*.md", "results/**/*.md"]
 FILES = ["docs/pictures/**", "docs/*/*.csv", "results/**"]  # what is no page, and has to be in the list
 KINDS = ["scored", "timed", "picture"]
+LINES = 60  # that check prints of a table's differences, those that are judged first
 MARKER = re.compile(r"<!-- (?:(?:table|text|file): (?P<name>\S+)|(?P<audit>audit) begins) -->\n(?P<text>.*?)"
                     r"<!-- (?:end|audit ends) -->", re.DOTALL)
 COMMAND_KEYS = {"name", "each", "target", "run", "draw", "out", "minutes", "pictures", "copies", "table", "file", "why"}
@@ -258,6 +259,13 @@ def run_lines(root, lines, out, pictures, options=()):
             raise Fault(f"'{line}' ended with exit code {status}")
 
 
+def forget(out, command):
+    """What an earlier run left is no result of the next one."""
+    for entry in command["table"] + command["file"]:
+        for path in glob.glob(str(out / entry["from"])):
+            os.remove(path)
+
+
 def build(root, commands):
     targets = sorted({command["target"] for command in commands if "target" in command})
     if targets:
@@ -281,6 +289,8 @@ def make(registry, names, options, run):
         out = pathlib.Path(command["out"])
         try:
             if run:
+                if not options:  # which may be to make a part
+                    forget(root / out, command)
                 run_lines(root, command["run"], out, "docs/pictures", options)
             try:
                 run_lines(root, command.get("draw", []), out, "docs/pictures")
@@ -300,6 +310,7 @@ def shown(value):
 def check_command(registry, command, out, say=print):
     """Runs a command into a folder of its own; the number of judged values that differ."""
     root = registry.root
+    forget(root / out, command)
     run_lines(root, command["run"], out, out / "pictures")
     wrong = 0
     entries = [(table["page"], table["name"], table, None) for table in command["table"]]
@@ -314,9 +325,12 @@ def check_command(registry, command, out, say=print):
         else:
             said = (root / path).read_text() if (root / path).exists() else ""
         differences, equal = page_compare.compare(said, found, judge_of(entry), ending=os.path.splitext(page)[1])
-        for d in differences:
+        differences.sort(key=lambda d: not d.judged)
+        for d in differences[:LINES]:
             where = ", ".join(filter(None, (page, name and f"table {name}", f"row {d.row}", d.column and f"column {d.column}")))
             say(f"{'differs' if d.judged else 'not judged'}: {where}: said {shown(d.said)}, found {shown(d.found)}")
+        if len(differences) > LINES:
+            say(f"and {len(differences) - LINES} more")
         bad = sum(d.judged for d in differences)
         say(f"{page}{name and ', table ' + name}: {equal} values as found, {bad} differ, "
             f"{len(differences) - bad} differ and are not judged")

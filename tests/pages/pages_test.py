@@ -160,6 +160,35 @@ class Pages(unittest.TestCase):
         self.assertIn("cannot be made of slow.csv", printed)
         self.assertEqual((self.root / "README.md").read_text(), README)
 
+    def test_an_output_of_an_earlier_run_is_none(self):
+        self.assertEqual(self.run_it("check", "planted")[0], 0)
+        self.replace("docs/tables.toml", "cp planted/* {out}", "true")
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 1)
+        self.assertIn("speeds cannot be made of speeds.csv", printed)
+
+    def test_a_picture_that_cannot_be_drawn_leaves_the_tables_filled(self):
+        self.replace("docs/tables.toml", 'run = ["cp planted/* {out}"]', 'run = ["cp planted/* {out}"]\ndraw = ["exit 5"]')
+        self.put("planted/speeds.csv", CSV.replace("0.992", "0.5"))
+        status, printed = self.run_it("make", "planted")
+        self.assertEqual(status, 1)
+        self.assertIn("ended with exit code 5", printed)
+        self.assertIn("| tsdf++ | 0.5 |", (self.root / "README.md").read_text())
+
+    def test_options_go_to_the_program_and_may_make_a_part(self):
+        self.replace("docs/tables.toml", "cp planted/* {out}", "printf '%s;' > {out}/said")
+        status, printed = self.run_it("make", "planted", "--", "--part", "a b")
+        self.assertEqual(status, 0, printed)
+        self.assertEqual((self.root / "out/planted/said").read_text(), "--part;a b;")
+        self.assertIn("speeds: left as it is, ", printed)
+        self.assertEqual((self.root / "README.md").read_text(), README)
+
+    def test_a_page_that_is_still_to_be_filled(self):
+        self.put("README.md", "# A page\n\n<!-- table: speeds -->\n(Run it.)\n<!-- end -->\n")
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 1)
+        self.assertIn("differs: README.md, table speeds, row tables: said '0', found '1'", printed)
+
     def test_names_and_options(self):
         self.assertIn("'plant' is no command", self.run_it("check", "plant")[1])
         status, printed = self.run_it("list")
