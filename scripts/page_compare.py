@@ -71,8 +71,10 @@ def read(text):
         i += 1
         if line.startswith("```"):
             fenced = not fenced
-        elif fenced and len(page_text.cells_of(line)) >= 3:
+        elif fenced and max(map(len, map(page_text.cells_of, lines[i - 1:i + 1]))) >= 3 and "  " in line:
             rows = [page_text.cells_of(line)]
+            if i < len(lines) and len(page_text.cells_of(lines[i])) == len(rows[0]) + 1:
+                rows[0].insert(0, "")  # names have no title
             while i < len(lines) and len(page_text.cells_of(lines[i])) == len(rows[0]):
                 rows.append(page_text.cells_of(lines[i]))
                 i += 1

@@ -251,7 +251,9 @@ def run_lines(root, lines, out, pictures, options=()):
     out.mkdir(parents=True, exist_ok=True)
     for i, line in enumerate(lines):
         line = line.replace("{out}", shlex.quote(str(out))).replace("{pictures}", shlex.quote(str(pictures)))
-        if i == 0 and options:
+        if "{options}" in line:
+            line = line.replace("{options}", shlex.join(options))
+        elif i == 0 and options:
             line += " " + shlex.join(options)
         print(f"$ {line}", flush=True)
         status = subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=root, check=False).returncode
@@ -307,11 +309,25 @@ def shown(value):
     return "nothing" if value is None else f"'{value}'"
 
 
+def check_pictures(root, command, out, say):
+    """Says which pictures are not, byte by byte, what these results draw; another matplotlib may draw other bytes."""
+    drawn = {os.path.join("docs/pictures", path.name): path for path in (root / out / "pictures").glob("*")}
+    drawn |= {path: root / out / source for source, path in command.get("copies", {}).items()}
+    for path, made in drawn.items():
+        if made.is_file() and any(fnmatch.fnmatchcase(path, pattern) for pattern in command.get("pictures", [])):
+            if not (root / path).exists() or (root / path).read_bytes() != made.read_bytes():
+                say(f"not judged: {path} is another picture than {made.relative_to(root)}")
+
+
 def check_command(registry, command, out, say=print):
     """Runs a command into a folder of its own; the number of judged values that differ."""
     root = registry.root
     forget(root / out, command)
+    (root / out / "pictures").mkdir(parents=True, exist_ok=True)
     run_lines(root, command["run"], out, out / "pictures")
+    # A line that knows no other place than the pages' draws nothing.
+    run_lines(root, [line for line in command.get("draw", []) if "{pictures}" in line], out, out / "pictures")
+    check_pictures(root, command, out, say)
     wrong = 0
     entries = [(table["page"], table["name"], table, None) for table in command["table"]]
     for entry in command["file"]:

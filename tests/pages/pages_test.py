@@ -175,8 +175,22 @@ class Pages(unittest.TestCase):
         self.assertIn("ended with exit code 5", printed)
         self.assertIn("| tsdf++ | 0.5 |", (self.root / "README.md").read_text())
 
+    def test_a_picture_of_other_results_is_printed_and_not_judged(self):
+        self.replace("docs/tables.toml", 'run = ["cp planted/* {out}"]',
+                     'run = ["cp planted/* {out}"]\ndraw = ["cp planted/*.csv {pictures}/a.svg", "touch here"]\n'
+                     'pictures = ["docs/pictures/a.svg"]')
+        self.put("docs/pictures/a.svg", CSV)
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 0, printed)
+        self.assertNotIn("another picture", printed)
+        self.put("docs/pictures/a.svg", "old")
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 0)
+        self.assertIn("not judged: docs/pictures/a.svg is another picture than", printed)
+        self.assertFalse((self.root / "here").exists())
+
     def test_options_go_to_the_program_and_may_make_a_part(self):
-        self.replace("docs/tables.toml", "cp planted/* {out}", "printf '%s;' > {out}/said")
+        self.replace("docs/tables.toml", "cp planted/* {out}", "printf '%s;' {options} > {out}/said; true")
         status, printed = self.run_it("make", "planted", "--", "--part", "a b")
         self.assertEqual(status, 0, printed)
         self.assertEqual((self.root / "out/planted/said").read_text(), "--part;a b;")
@@ -311,6 +325,15 @@ class Texts(unittest.TestCase):
         text = "frame,method,profile," + ",".join(columns) + "\n1,tsdf,paper,0.5,,1,1,1,0.25\n2,tsdf,paper,0.75,0.5,1,1,0.5,1\n"
         self.assertEqual(self.made("frames.csv", text, "least").splitlines()[2],
                          "| tsdf, paper | 0.500 | 0.500 | 1.000 | 1.000 | 0.500 | 0.250 |")
+
+    def test_aligned_columns_whose_names_have_no_title(self):
+        text = "a bench, 2 threads\n                 wall ms  error mm\nOpen3D 8^3         107.0      4.72\ntsdf                17.4      0.13\n"
+        judge = page_compare.Judge("timed", judged=["error mm"], unjudged_rows=["Open3D *"])
+        said = self.made("rays.txt", text, "fenced")
+        found = said.replace("107.0", "108.0").replace("4.72", "4.73").replace("0.13", "0.14").replace("2 threads", "3 threads")
+        differences, _ = page_compare.compare(said, found, judge)
+        self.assertEqual([(d.row, d.column) for d in differences if d.judged], [("tsdf", "error mm")])
+        self.assertEqual(len(differences), 5)  # of the sentence two
 
     def test_a_csv_without_its_times(self):
         self.assertEqual(self.made("a.csv", "map,kept,s\nx,1,2\n", None, without=["s"]), "map,kept\nx,1\n")
