@@ -230,7 +230,7 @@ class Pages(unittest.TestCase):
             ("docs/clock.md", "| bytes | what |", "| bits | what |", "the by_hand entry of docs/clock.md (| bytes | what |) fits nothing"),
             ("docs/tables.toml", 'name = "planted"', 'name = "clock"', "the command clock stands twice"),
             ("docs/tables.toml", 'name = "planted"', 'nam = "planted"', "has the unknown key 'nam'"),
-            ("docs/tables.toml", 'kind = "timed"', 'kind = "slow"', "is of kind 'slow', expected scored, timed, picture"),
+            ("docs/tables.toml", 'kind = "timed"', 'kind = "slow"', "is of kind 'slow', expected scored, timed"),
             ("docs/tables.toml", 'kind = "timed"', 'kind = "timed"\nas = "art"', "is made as 'art', expected one of"),
             ("docs/tables.toml", 'why = "a layout"', "", "has no why"),
             ("docs/tables.toml", 'minutes = 0.1', "minutes = ", "cannot be read"),
