@@ -15,6 +15,7 @@
 #include "bench/figures.h"
 #include "bench/mesh.h"
 #include "bench/rays.h"
+#include "bench/released.h"
 #include "bench/render.h"
 #include "bench/scaling.h"
 #include "bench/side_by_side.h"
@@ -123,6 +124,18 @@ void AddFigures(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunFigures(*options); }; });
 }
 
+void AddReleased(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<ReleasedOptions>();
+  CLI::App* command = app.add_subcommand("released", "What docs/released.md shows, as CSV");
+  command->add_option("--out", options->out, "Output folder")->capture_default_str();
+  command->add_option("--scenes", options->scenes, "Some of them")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--settings", options->settings, "Some of the rows, by name; default: all")
+      ->delimiter(',');
+  command->callback([=, &chosen] { chosen = [=] { return RunReleased(*options); }; });
+}
+
 void AddScaling(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<ScalingOptions>();
   CLI::App* command = app.add_subcommand("scaling", "What docs/scaling.md shows, as CSV");
@@ -158,6 +171,7 @@ int main(int argc, char** argv) {
   tsdfpp::AddRays(app, chosen);
   tsdfpp::AddMesh(app, chosen);
   tsdfpp::AddFigures(app, chosen);
+  tsdfpp::AddReleased(app, chosen);
   tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {

@@ -221,7 +221,8 @@ Expected<void> WriteSummary(const CompareResult& result, const std::string& comm
   TSDFPP_RETURN_IF_ERROR(
       WriteFile(out / "summary.json", SummaryJson(result, command).dump(1) + "\n"));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "frames.csv", Csv(result)));
-  return WriteFile(out / "table.txt", FrontTable(result) + "\n" + SummaryTable(result));
+  return WriteFile(out / "table.txt",
+                   FrontTable(result) + "\n" + SummaryTable(result, Times::kLeftOut));
 }
 
 Expected<void> WriteReport(const CompareResult& result, const std::vector<PictureFile>& pictures,
@@ -244,7 +245,7 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       Escaped(result.info.name), result.info.first_index, result.last_frame, result.config.every,
       result.movers.size(), Headline(result));
   html += "<div class=\"scroll\"><table>\n";
-  const auto rows = TableRows(result);
+  const auto rows = TableRows(result, Times::kShown);
   for (std::size_t r = 0; r < rows.size(); ++r) {
     html += "<tr>";
     for (const std::string& cell : rows[r]) {

@@ -15,7 +15,7 @@ namespace tsdfpp {
 nlohmann::json SummaryJson(const CompareResult& result, const std::string& command);
 
 // summary.json, frames.csv (a row an evaluated frame and map) and table.txt (FrontTable and
-// SummaryTable). Errors: kEnvironment.
+// SummaryTable without times). Errors: kEnvironment.
 Expected<void> WriteSummary(const CompareResult& result, const std::string& command,
                             const std::filesystem::path& out);
 

@@ -79,20 +79,24 @@ std::string TitleOf(const AdapterRun& run) {
   return run.config.name + (run.evaluations.back().labelled ? "" : " (any label)");
 }
 
-std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
+std::vector<std::vector<std::string>> TableRows(const CompareResult& result, Times times) {
   std::vector<std::vector<std::string>> rows(1);
   rows[0] = {"map"};
   for (const EvaluationColumn& column : EvaluationColumns()) rows[0].push_back(column.title);
-  rows[0].insert(rows[0].end(), {"move ms", "fuse ms", "MB"});
+  const bool timed = times == Times::kShown;
+  if (timed) rows[0].insert(rows[0].end(), {"move ms", "fuse ms"});
+  rows[0].emplace_back("MB");
   for (const auto& run : result.runs) {
     const Evaluation& evaluation = Examined(result, *run);
     std::vector<std::string> row{run->Title()};
     for (const EvaluationColumn& column : EvaluationColumns()) {
       row.push_back(ColumnText(column, result.movers, evaluation));
     }
-    const nlohmann::json times = run->times.ToJson();
-    row.push_back(fmt::format("{:.1f}", MedianMs(times["update_poses"])));
-    row.push_back(fmt::format("{:.1f}", MedianMs(times["fuse"])));
+    if (timed) {
+      const nlohmann::json spread = run->times.ToJson();
+      row.push_back(fmt::format("{:.1f}", MedianMs(spread["update_poses"])));
+      row.push_back(fmt::format("{:.1f}", MedianMs(spread["fuse"])));
+    }
     row.push_back(
         fmt::format("{:.0f}", static_cast<double>(run->pipeline.map().Memory().bytes) / 1e6));
     rows.push_back(std::move(row));
@@ -104,7 +108,7 @@ std::vector<std::vector<std::string>> TableRows(const CompareResult& result) {
     for (const EvaluationColumn& column : EvaluationColumns()) {
       row.push_back(ColumnText(column, result.movers, evaluation));
     }
-    row.insert(row.end(), {"-", "-", "-"});  // its times and memory are another program's
+    row.resize(rows[0].size(), "-");  // its times and memory are another program's
     rows.push_back(std::move(row));
   }
   return rows;
@@ -163,12 +167,14 @@ std::string FrontTable(const CompareResult& result) {
          Aligned(rows);
 }
 
-std::string SummaryTable(const CompareResult& result) {
+std::string SummaryTable(const CompareResult& result, Times times) {
   std::string text = fmt::format(
       "{} at frame {}, the table after removing {} moving objects; threshold one voxel\n",
       result.info.name, result.reveal_frame.value_or(result.last_frame), result.movers.size());
-  text += Aligned(TableRows(result));
-  for (const std::string& line : AdapterLines(result)) text += line + "\n";
+  text += Aligned(TableRows(result, times));
+  if (times == Times::kShown) {
+    for (const std::string& line : AdapterLines(result)) text += line + "\n";
+  }
   if (!result.config.truth_note.empty()) text += result.config.truth_note + "\n";
   return text;
 }

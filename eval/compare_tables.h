@@ -15,8 +15,10 @@ const Evaluation& Examined(const CompareResult& result, const CompareRun& run);
 // "open3d", or "open3d (any label)" where it tells no objects apart. It must have evaluations.
 std::string TitleOf(const AdapterRun& run);
 
+enum class Times { kShown, kLeftOut };
+
 // Every column of every map and adapter; titles first, "-" where a value is undefined.
-std::vector<std::vector<std::string>> TableRows(const CompareResult& result);
+std::vector<std::vector<std::string>> TableRows(const CompareResult& result, Times times);
 
 // A line an adapter: what it cost, or why it failed; and its remarks.
 std::vector<std::string> AdapterLines(const CompareResult& result);
@@ -24,7 +26,8 @@ std::vector<std::string> AdapterLines(const CompareResult& result);
 // The main figures: a row a method, the truncation profiles side by side. Adapters are not in it.
 std::string FrontTable(const CompareResult& result);
 
-// TableRows and AdapterLines.
-std::string SummaryTable(const CompareResult& result);
+// TableRows; and AdapterLines, which say what an adapter took, where times are shown. Without times
+// the same maps of the same frames have the same text.
+std::string SummaryTable(const CompareResult& result, Times times = Times::kShown);
 
 }  // namespace tsdfpp

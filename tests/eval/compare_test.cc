@@ -176,8 +176,8 @@ TEST(Compare, WritesItsFilesAndEqualsTheWayOverDisk) {
     EXPECT_EQ(rows[2 + 2 * r][0], "40");
     EXPECT_EQ(rows[1 + 2 * r][1], kMethodNames[r]);
   }
-  std::set<std::string> expected{"frames.csv", "report.html", "summary.json",
-                                 "figure-close-gt.png"};
+  std::set<std::string> expected{"frames.csv", "report.html", "summary.json", "figure-close-gt.png",
+                                 "table.txt"};
   for (const std::string& run : kFolders) {
     for (const char* file : {"mesh/background-0.ply", "mesh/house-2.ply", "mesh/scene.ply",
                              "trajectories/car-1.txt", "trajectories/house-2.txt"}) {
@@ -235,7 +235,7 @@ TEST(Compare, TwiceTheSameWhateverTheThreads) {
     EXPECT_EQ(RowsWithoutTimes(folder / other), rows) << other;
     ASSERT_EQ(FilesBelow(folder / other), files) << other;
     for (const std::string& file : files) {
-      // Meshes, trajectories and pictures; the rest holds times.
+      // Meshes, trajectories, pictures and the table; the rest holds times.
       if (file == "frames.csv" || file == "summary.json" || file == "report.html") continue;
       EXPECT_TRUE(BytesOf(folder / other / file) == BytesOf(folder / "first" / file))
           << other << ": " << file;

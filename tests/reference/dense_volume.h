@@ -23,6 +23,8 @@ class BlockSet {
   // Frees the blocks none of whose voxels are `held`.
   void FreeUnless(const std::function<bool(const Eigen::Vector3i&)>& held);
   std::size_t size() const { return blocks_.size(); }
+  // As (z, y, x).
+  const std::set<std::array<int, 3>>& blocks() const { return blocks_; }
 
   template <typename Function>
   void ForEachVoxelOfBlocks(Function&& function) const {

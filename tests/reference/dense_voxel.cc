@@ -56,6 +56,8 @@ std::optional<Seen> View::Look(const Eigen::Vector3i& voxel) const {
   const float ray = std::sqrt((p_C[0] * p_C[0] + p_C[1] * p_C[1]) + p_C[2] * p_C[2]);
   seen.pixel = row * frame_.intrinsics.width + column;
   seen.s = (z - p_C[2]) * (ray * iz);
+  seen.surface_z = z;
+  seen.voxel_z = p_C[2];
   const auto& rgb = frame_.colour.at<cv::Vec3b>(row, column);
   seen.colour = {rgb[0], rgb[1], rgb[2]};
   return seen;

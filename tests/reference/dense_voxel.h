@@ -23,7 +23,9 @@ struct DenseVoxel {
 
 // What a frame says about a voxel in view.
 struct Seen {
-  float s = 0;  // metres along the ray, positive in front of the surface
+  float s = 0;          // metres along the ray, positive in front of the surface
+  float surface_z = 0;  // metres along the optical axis: of the surface that the pixel shows
+  float voxel_z = 0;    // and of the voxel
   InstanceId label = kNoInstance;
   Colour colour{};
   int pixel = 0;  // row-major
