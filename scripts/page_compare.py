@@ -78,7 +78,12 @@ def read(text):
             while i < len(lines) and len(page_text.cells_of(lines[i])) == len(rows[0]):
                 rows.append(page_text.cells_of(lines[i]))
                 i += 1
-            tables.append(Table(rows[0], rows[1:]))
+            if page_text.is_row_of_figures(rows[0]) and rows[0][0]:
+                rows.insert(0, [""] * len(rows[0]))  # its titles stand too near to each other to be told apart
+            if len(rows) > 1:
+                tables.append(Table(rows[0], rows[1:]))
+            else:
+                sentences.append(line.strip())
         elif not fenced and is_row(line) and i < len(lines) and is_rule(lines[i]):
             header, rows = cells_of_row(line), []
             i += 1

@@ -160,7 +160,7 @@ def tables_of(text):
             fenced = not fenced
         elif fenced:
             cells = page_text.cells_of(line)
-            if sum(is_figure(cell) for cell in cells[1:]) > 1:
+            if page_text.is_row_of_figures(cells):
                 yield lines[i - 1].strip(), ["| " + " | ".join(cells)], i + 1
         elif page_compare.is_rule(line) and i > 0 and page_compare.is_row(lines[i - 1]):
             end = i + 1
@@ -169,13 +169,8 @@ def tables_of(text):
             yield lines[i - 1].strip(), lines[i + 1:end], i
 
 
-def is_figure(cell):
-    """It begins with a number, and beyond numbers has no more than a unit."""
-    return re.match(r"[-+]?\d", cell.strip("`* ")) is not None and len(re.findall(r"[^\W\d_]", cell)) <= 8
-
-
 def has_figures(rows):
-    return any(is_figure(cell) for row in rows for cell in page_compare.cells_of_row(row)[1:])
+    return any(page_text.is_figure(cell) for row in rows for cell in page_compare.cells_of_row(row)[1:])
 
 
 def faults_of_page(registry, page, whole_pages, hand_used):

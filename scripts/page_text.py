@@ -31,6 +31,15 @@ def cells_of(line):
     return re.split(r"\s{2,}", line.strip())
 
 
+def is_figure(cell):
+    """It begins with a number, and beyond numbers has no more than a unit."""
+    return re.match(r"[-+]?\d", cell.strip("`* ")) is not None and len(re.findall(r"[^\W\d_]", cell)) <= 8
+
+
+def is_row_of_figures(cells):
+    return sum(map(is_figure, cells[1:])) > 1
+
+
 def parts_of(path):
     """The tables of compare's table.txt; the front table comes first, and a blank line behind each."""
     parts = path.read_text().strip("\n").split("\n\n", 1)

@@ -335,6 +335,14 @@ class Texts(unittest.TestCase):
         self.assertEqual([(d.row, d.column) for d in differences if d.judged], [("tsdf", "error mm")])
         self.assertEqual(len(differences), 5)  # of the sentence two
 
+    def test_aligned_columns_whose_titles_touch(self):
+        text = "            share   ratio + taking    ratio\ntsdf        0.991     1.04   291.06     1.34\nvolumes     0.990     0.95   180.01     1.2\n"
+        said = self.made("mesh.txt", text, "fenced")
+        differences, _ = page_compare.compare(said, said.replace("291", "292").replace("0.95", "0.96"), page_compare.Judge())
+        self.assertEqual([(d.judged, d.row, d.said) for d in differences], [(True, "tsdf", "291.06"), (True, "volumes", "0.95")])
+        differences, _ = page_compare.compare(said, said.replace("291", "292"), page_compare.Judge("timed", judged=["triangles"]))
+        self.assertEqual([d.judged for d in differences], [False])
+
     def test_a_csv_without_its_times(self):
         self.assertEqual(self.made("a.csv", "map,kept,s\nx,1,2\n", None, without=["s"]), "map,kept\nx,1\n")
         with self.assertRaisesRegex(ValueError, "has no column t"):
