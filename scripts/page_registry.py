@@ -99,8 +99,8 @@ class Registry:
         """By name, or by what is in them."""
         chosen = []
         for name in names:
-            if name in ("all", "scored", "timed"):
-                chosen += [c for c in self.commands.values() if name == "all" or is_scored(c) == (name == "scored")]
+            if name in GROUPS:
+                chosen += filter(GROUPS[name], self.commands.values())
             elif name in self.commands:
                 chosen.append(self.commands[name])
             else:
@@ -119,6 +119,14 @@ def judge_of(entry):
 
 def is_scored(command):
     return any(judge_of(entry).judges_any() for entry in command["table"] + command["file"])
+
+
+def is_timed(command):
+    return any(entry["kind"] == "timed" for entry in command["table"] + command["file"])
+
+
+# Some commands are of both kinds.
+GROUPS = {"all": lambda command: True, "scored": is_scored, "timed": is_timed}
 
 
 def places_of(root, page):

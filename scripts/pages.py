@@ -25,7 +25,7 @@ import sys
 sys.dont_write_bytecode = True  # the scripts' folder stays as it is
 import page_compare  # noqa: E402
 import page_text  # noqa: E402
-from page_registry import MARKER, Fault, Registry, faults_of, is_scored, judge_of, place_of, places_of  # noqa: E402
+from page_registry import GROUPS, MARKER, Fault, Registry, faults_of, judge_of, place_of, places_of  # noqa: E402
 
 LINES = 60  # that check prints of a table's differences, those that are judged first
 
@@ -140,7 +140,7 @@ def relative(root, path):
 def make(registry, names, options, run):
     root, status = registry.root, 0
     commands = registry.chosen(names)
-    if options and len(commands) > 1 and set(names) & {"all", "scored", "timed"}:
+    if options and len(commands) > 1 and set(names) & set(GROUPS):
         raise Fault("options are those of one program, and cannot go to all of them")
     if run:
         build(root, commands)
@@ -238,8 +238,8 @@ def check_registry(registry):
 
 def show(registry, names):
     for command in registry.chosen(names or ["all"]):
-        kind = "scored" if is_scored(command) else "timed" if command["table"] + command["file"] else "pictures"
-        print(f"{command['name']}: {kind}, some {command['minutes']:g} min, into {command['out']}")
+        kinds = [name for name, fits in GROUPS.items() if name != "all" and fits(command)]
+        print(f"{command['name']}: {' and '.join(kinds)}, some {command['minutes']:g} min, into {command['out']}")
         for line in command["run"] + command.get("draw", []):
             print(f"  $ {line}")
         for table in command["table"]:
@@ -248,6 +248,7 @@ def show(registry, names):
             print(f"  {entry['path']} ({entry['kind']})")
         for picture in command.get("pictures", []):
             print(f"  {picture} (picture)")
+    print(f"some {sum(command['minutes'] for command in registry.chosen(names or ['all'])):g} min in all")
     return 0
 
 
