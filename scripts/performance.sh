@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Measures mapping beside Open3D and puts the tables into docs/performance.md and README.md; some 12 minutes on two cores, which
-# must have nothing else to do. Usage: bash scripts/performance.sh [--no-pages] [OPTIONS OF tsdfpp_bench side-by-side];
-# --no-pages leaves the tables in out/performance alone, which is what a trial is for (--runs 1 --cases 1cm --frames 16).
+# must have nothing else to do. Usage: bash scripts/performance.sh [--to OUT] [OPTIONS OF tsdfpp_bench side-by-side];
+# with --to the tables are in OUT alone, which is what a trial is for (--runs 1 --cases 1cm --frames 16).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-pages=yes
-if [ "${1:-}" = "--no-pages" ]; then pages=no; shift; fi
-out=out/performance
+if [ "${1:-}" != "--to" ]; then exec /usr/bin/python3 scripts/pages.py make performance -- "$@"; fi
+out=$2
+shift 2
 bash scripts/build.sh --target tsdfpp_bench
 build/release/tsdfpp_bench side-by-side --out "$out" "$@"
 
@@ -25,4 +25,3 @@ cat >> "$out/measured.md" <<END
 Its library is \`$file\`, $from: parallel by $parallel; $wide of its instructions are AVX ones (objdump), so it computes in
 $([ "$wide" = 0 ] && echo "SSE2 alone" || echo "AVX where it has them"). Ours picks the widest vectors that the processor has when it runs.
 END
-if [ "$pages" = yes ]; then /usr/bin/python3 scripts/fill_page.py "$out" docs/performance.md README.md; fi

@@ -1,16 +1,14 @@
 #!/usr/bin/python3
-"""Draws the plots of experiments (`tsdfpp sweep`) and, asked to, puts their paragraphs or tables into a page.
+"""Draws the plots of experiments (`tsdfpp sweep`).
 
-Usage: plot_experiment.py FOLDER PICTURES [PAGE]
-FOLDER holds results.json and results.csv. PICTURES gets experiment-NAME.svg and .png. In PAGE, what stands between
-`<!-- text: NAME -->` or `<!-- table: NAME -->` and the next `<!-- end -->` is replaced.
+Usage: plot_experiment.py FOLDER PICTURES
+FOLDER holds results.json and results.csv. PICTURES gets experiment-NAME.svg and .png.
 Colours are Okabe and Ito's, and every line has a marker and a dash of its own, so that neither colour-blind readers nor a
 black-and-white printer lose one. Bands and bars are the experiment's confidence intervals.
 """
 import csv
 import json
 import os
-import re
 import sys
 import textwrap
 
@@ -29,6 +27,8 @@ matplotlib.rcParams.update({
 import matplotlib.pyplot as plt  # noqa: E402
 import matplotlib.ticker  # noqa: E402
 
+from experiment_text import number, title_of  # noqa: E402
+
 STYLES = {
     "tsdf": ("#000000", "s", "-"),
     "tsdf/min": ("#999999", "D", "--"),
@@ -43,15 +43,6 @@ STYLES = {
 }
 # A second line of one method, of another setting.
 SECOND = {"tsdf++": ("#56B4E9", "h", "--")}
-
-
-def number(value):
-    return value if isinstance(value, (int, float)) else None
-
-
-def title_of(results, metric):
-    words = results["metrics"][metric]
-    return words["words"] + (f", {words['unit']}" if words["unit"] else "")
 
 
 def save(figure, folder, name):
@@ -268,58 +259,10 @@ def plot_frames(results, rows, folder):
     panels.finish(folder, results["experiment"]["name"])
 
 
-def text_of(results):
-    """The question, the experiment's first two metrics, and the verdicts; summary.txt has all metrics."""
-    lines = results["text"].rstrip("\n").split("\n")
-    others = [results["metrics"][m]["words"] + ":" for m in results["experiment"]["metrics"][2:]]
-    kept = [line for line in lines[2:] if not any(other in line.split(" tsdf")[0] for other in others)]
-    return "\n\n".join(lines[:2]) + "\n\n" + "".join("- " + line + "\n" for line in kept)
-
-
-def cell_text(results, figure, metric):
-    mean = number(figure["mean"])
-    if mean is None:
-        return "-"
-    decimals = results["metrics"][metric]["decimals"]
-    text = f"{mean:.{decimals}f}"
-    if "low" in figure:
-        text += f" [{figure['low']:.{decimals}f}, {figure['high']:.{decimals}f}]"
-    return text
-
-
-def table_of(results):
-    """A row a condition and method, a column a metric of the experiment."""
-    metrics = results["experiment"]["metrics"]
-    # A grid has one scene, and says so.
-    varied = [axis for axis in results["varied"] if axis != "scene"]
-    titles = ["grid"] + varied + ["runs", "method"] + [title_of(results, m) for m in metrics]
-    rows = [titles, ["---"] * len(titles)]
-    for condition in results["conditions"]:
-        for method in condition["methods"]:
-            rows.append([condition["grid"]] + [f"{condition['settings'][a]}" for a in varied] +
-                        [str(condition["replicates"]), f"`{method}`"] +
-                        [cell_text(results, condition["means"][method][m], m) for m in metrics])
-    made = results["experiment"]
-    return "".join("| " + " | ".join(row) + " |\n" for row in rows) + (
-        f"\nMade by tsdfpp {results['program']} with {results['renderer']}; images of {made['scale']} times the scenes' "
-        f"size, stride {made['stride']}.\n")
-
-
-def fill_page(results, page):
-    name = results["experiment"]["name"]
-    with open(page) as file:
-        text = file.read()
-    made = {"text": text_of, "table": table_of}
-    text = re.sub(r"(<!-- (text|table): " + re.escape(name) + r" -->\n).*?(<!-- end -->)",
-                  lambda match: match[1] + made[match[2]](results) + match[3], text, flags=re.S)
-    with open(page, "w") as file:
-        file.write(text)
-
-
 def main():
-    if len(sys.argv) not in (3, 4):
+    if len(sys.argv) != 3:
         sys.exit(__doc__)
-    folder, pictures = sys.argv[1:3]
+    folder, pictures = sys.argv[1:]
     with open(os.path.join(folder, "results.json")) as file:
         results = json.load(file)
     if "plot" in results:
@@ -333,8 +276,6 @@ def main():
             plot_methods(results, pictures)
         else:
             plot_conditions(results, pictures)
-    if len(sys.argv) == 4:
-        fill_page(results, sys.argv[3])
 
 
 if __name__ == "__main__":

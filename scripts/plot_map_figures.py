@@ -1,14 +1,12 @@
 #!/usr/bin/python3
-"""Draws the plots of docs/map-figures.md and docs/map.md from the tables of `tsdfpp_bench figures`, and puts the tables into
-the page, each between its `<!-- table: NAME -->` and the next `<!-- end -->`.
+"""Draws the plots of docs/map-figures.md and docs/map.md from the tables of `tsdfpp_bench figures`.
 
-Usage: plot_map_figures.py TABLES PICTURES [PAGE]
+Usage: plot_map_figures.py TABLES PICTURES
 Colours are Okabe and Ito's, and every line has a marker of its own, so that neither colour-blind readers nor a
 black-and-white printer lose one.
 """
 import csv
 import os
-import re
 import sys
 
 import matplotlib
@@ -172,38 +170,15 @@ def slice_picture(tables, pictures):
     save(figure, pictures, "map-slice", "png")  # thousands of squares: an SVG would be ten times as large
 
 
-def markdown(tables, name):
-    with open(os.path.join(tables, name + ".csv"), newline="") as file:
-        lines = list(csv.reader(file))
-    rows = [lines[0], ["---"] * len(lines[0])] + lines[1:]
-    return "".join("| " + " | ".join(row) + " |\n" for row in rows)
-
-
-def fill_page(tables, page):
-    """Tables that are not there leave what the page has."""
-    with open(page) as file:
-        text = file.read()
-
-    def filled(match):
-        is_there = os.path.exists(os.path.join(tables, match[2] + ".csv"))
-        return match[1] + markdown(tables, match[2]) + match[3] if is_there else match[0]
-
-    text = re.sub(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", filled, text, flags=re.S)
-    with open(page, "w") as file:
-        file.write(text)
-
-
 def main():
     """Draws the plots whose tables are there."""
-    if len(sys.argv) not in (3, 4):
+    if len(sys.argv) != 3:
         sys.exit(__doc__)
-    tables, pictures = sys.argv[1:3]
+    tables, pictures = sys.argv[1:]
     os.makedirs(pictures, exist_ok=True)
     for name, draw in (("decay", decay), ("sweep", sweep), ("slice", slice_picture)):
         if os.path.exists(os.path.join(tables, name + ".csv")):
             draw(tables, pictures)
-    if len(sys.argv) == 4:
-        fill_page(tables, sys.argv[3])
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Draws the plots of docs/scaling.md from the tables of `tsdfpp_bench scaling`, and puts the tables into the page.
+"""Draws the plots of docs/scaling.md from the tables of `tsdfpp_bench scaling`, and adds one to them, surface_fit.csv.
 
-Usage: plot_scaling_figures.py TABLES PICTURES [PAGE]
+Usage: plot_scaling_figures.py TABLES PICTURES
 """
 import os
 import sys
 
-from plot_map_figures import STYLES, fill_page, plt, rows_of, save
+from plot_map_figures import STYLES, plt, rows_of, save
 
 STYLES.update({
     "volumes": ("#009E73", "X", "-"),
@@ -100,15 +100,13 @@ def ids(tables, pictures):
 
 def main():
     """Draws the plots whose tables are there."""
-    if len(sys.argv) not in (3, 4):
+    if len(sys.argv) != 3:
         sys.exit(__doc__)
-    tables, pictures = sys.argv[1:3]
+    tables, pictures = sys.argv[1:]
     os.makedirs(pictures, exist_ok=True)
     for name, plot in (("frames", frames), ("surface", surface), ("ids", ids)):
         if os.path.exists(os.path.join(tables, name + ".csv")):
             plot(tables, pictures)
-    if len(sys.argv) == 4:
-        fill_page(tables, sys.argv[3])
 
 
 if __name__ == "__main__":

@@ -3,6 +3,4 @@
 # (--parts, --frames, --runs) go to the bench.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-bash scripts/build.sh --target tsdfpp_bench
-build/release/tsdfpp_bench scaling --out docs/scaling "$@"
-/usr/bin/python3 scripts/plot_scaling_figures.py docs/scaling docs/pictures docs/scaling.md
+exec /usr/bin/python3 scripts/pages.py make scaling -- "$@"

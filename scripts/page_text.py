@@ -1,0 +1,142 @@
+"""What a page shows of a command's output, as Markdown: one function a kind of output (docs/tables.toml, `as`)."""
+import csv
+import json
+import pathlib
+import re
+
+import experiment_text
+
+
+def markdown(rows):
+    """A header and rows of cells."""
+    lines = [rows[0], ["---"] * len(rows[0])] + rows[1:]
+    return "".join("| " + " | ".join(row) + " |\n" for row in lines)
+
+
+def of_csv(path):
+    with open(path, newline="") as file:
+        return markdown(list(csv.reader(file)))
+
+
+def as_it_is(path):
+    return path.read_text()
+
+
+def fenced(path):
+    return "```\n" + path.read_text().rstrip("\n") + "\n```\n"
+
+
+def cells_of(line):
+    """Of a table of aligned columns: they stand at least two blanks apart."""
+    return re.split(r"\s{2,}", line.strip())
+
+
+def is_figure(cell):
+    """It begins with a number, and beyond numbers has no more than a unit."""
+    return re.match(r"[-+]?\d", cell.strip("`* ")) is not None and len(re.findall(r"[^\W\d_]", cell)) <= 8
+
+
+def is_row_of_figures(cells):
+    return sum(map(is_figure, cells[1:])) > 1
+
+
+def parts_of(path):
+    """The tables of compare's table.txt; the front table comes first, and a blank line behind each."""
+    parts = path.read_text().strip("\n").split("\n\n", 1)
+    if len(parts) != 2:
+        raise ValueError(f"{path} has no blank line between the front table and the whole one")
+    return parts
+
+
+def front(path):
+    rows = [cells for cells in map(cells_of, parts_of(path)[0].splitlines()) if len(cells) > 2]  # without the title
+    if len(rows) < 2 or len({len(row) for row in rows}) != 1:
+        raise ValueError(f"{path} begins with rows of different lengths, expected the front table of tsdfpp compare")
+    return markdown([rows[0]] + [[f"`{row[0]}`"] + row[1:] for row in rows[1:]])
+
+
+def whole(path):
+    return "```\n" + parts_of(path)[1].strip("\n") + "\n```\n"
+
+
+FIGURES = (("kept", "table_preservation_behind_other"), ("retention", "table_retention_behind_other"),
+           ("visible", "visible_completion"), ("movers", "movers_completion"), ("sane", "sanity_all"),
+           ("sane least", "sanity_least"))
+
+
+def maps_of(path):
+    """Rows of frames.csv by the map's title, in their order."""
+    maps = {}
+    with open(path, newline="") as file:
+        for row in csv.DictReader(file):
+            maps.setdefault(", ".join(filter(None, (row["method"], row["profile"]))), []).append(row)
+    return maps
+
+
+def least(path):
+    """Of frames.csv: the least value of each figure over the evaluated frames."""
+    rows = [["map"] + [title for title, _ in FIGURES]]
+    for title, frames in maps_of(path).items():
+        values = [[float(row[column]) for row in frames if row[column]] for _, column in FIGURES]
+        rows.append([title] + [f"{min(of):.3f}" if of else "-" for of in values])
+    return markdown(rows)
+
+
+def tracks(path):
+    """Of summary.json, frames.csv beside it: figures at the examined frame, errors of the objects' trajectories."""
+    summary = json.loads(path.read_text())
+    examined = summary["last_frame"] if summary["reveal_frame"] is None else summary["reveal_frame"]
+    maps = maps_of(path.with_name("frames.csv"))
+    ids = [str(one) for one in summary["removed"]]
+    names = {str(one["id"]): one["name"] for one in summary["runs"][0]["examined"]["objects"]}
+    rows = [["map"] + [title for title, _ in FIGURES] +
+            [f"{names.get(one, one)}, {unit}" for one in ids for unit in ("mm", "deg")]]
+    for run in summary["runs"]:
+        title = f"{run['method']}, {run['profile']}"
+        frames = {int(row["frame"]): row for row in maps[title]}
+        row = frames.get(examined, maps[title][-1])
+        cells = [title] + [f"{float(row[column]):.3f}" if row[column] else "-" for _, column in FIGURES]
+        for one in ids:
+            scores = (run["trajectories"] or {}).get(one, {})
+            for key, scale in (("ate_rmse_m", 1000), ("rotation_rmse_deg", 1)):
+                value = scores.get(key)
+                value = value.get("value") if isinstance(value, dict) else value
+                cells.append("-" if value is None else f"{scale * value:.1f}")
+        rows.append(cells)
+    return markdown(rows)
+
+
+def experiment(make):
+    return lambda path: make(json.loads(path.read_text()))
+
+
+KINDS = {
+    "csv": of_csv,
+    "text": as_it_is,
+    "fenced": fenced,
+    "front": front,
+    "whole": whole,
+    "least": least,
+    "tracks": tracks,
+    "sentences": experiment(experiment_text.text_of),
+    "conditions": experiment(experiment_text.table_of),
+}
+
+
+def csv_without(path, columns):
+    """A CSV file's text without some columns."""
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    missing = [column for column in columns if column not in rows[0]]
+    if missing:
+        raise ValueError(f"{path} has no column {missing[0]}")
+    kept = [i for i, title in enumerate(rows[0]) if title not in columns]
+    return "".join(",".join(row[i] for i in kept) + "\n" for row in rows)
+
+
+def text_of(source, kind=None, without=()):
+    """What is made of the file `source`; kind: a name in KINDS, by default the file's own text."""
+    source = pathlib.Path(source)
+    if without:
+        return csv_without(source, without)
+    return KINDS[kind or "text"](source)
