@@ -1,6 +1,7 @@
 #include "eval/sabotage.h"
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 
 namespace tsdfpp {
 namespace {
@@ -15,9 +16,13 @@ constexpr Named kNamed[] = {
     {Sabotage::kObjectPose, "object-pose",
      "poses of the moving objects are 5 mm off from one third of the sequence on"},
     {Sabotage::kMasksSwapped, "masks-swapped", "two objects have each other's mask"},
+    {Sabotage::kMaskDilated, "mask-dilated",
+     "the mask of one moving object is a pixel larger all around"},
     {Sabotage::kPrincipalPoint, "principal-point", "the principal point is off by one pixel"},
     {Sabotage::kTruncationHalved, "truncation-halved", "the truncation is half as wide"},
     {Sabotage::kFrozenObject, "frozen-object", "objects keep the pose of the first frame"},
+    {Sabotage::kObjectLate, "object-late",
+     "poses of the moving objects are one recorded frame late"},
     {Sabotage::kInactiveDropped, "inactive-dropped", "a removal uncovers nothing"},
     {Sabotage::kDepthScale, "depth-scale", "depth is multiplied by 1.005"},
     {Sabotage::kTruthShifted, "truth-shifted", "the true surfaces are one voxel too high"},
@@ -70,6 +75,15 @@ cv::Mat Swapped(const cv::Mat& mask, InstanceId a, InstanceId b) {
     }
   }
   return swapped;
+}
+
+// The object's mask and the pixels beside it, corners too.
+cv::Mat Dilated(const cv::Mat& mask, InstanceId id) {
+  cv::Mat larger;
+  cv::dilate(mask == id, larger, cv::Mat());
+  cv::Mat dilated = mask.clone();
+  dilated.setTo(cv::Scalar(id), larger);
+  return dilated;
 }
 
 // These objects' ids in a circle; the background keeps its own.
@@ -142,8 +156,10 @@ bool IsOfSequence(Sabotage sabotage) {
   switch (sabotage) {
     case Sabotage::kObjectPose:
     case Sabotage::kFrozenObject:
+    case Sabotage::kObjectLate:
     case Sabotage::kStalePose:
     case Sabotage::kMasksSwapped:
+    case Sabotage::kMaskDilated:
     case Sabotage::kPrincipalPoint:
     case Sabotage::kDepthScale:
     case Sabotage::kTruthShifted:
@@ -157,6 +173,10 @@ Expected<void> FrameSabotage::Prepare(FrameSource& source, int index) {
   if (sabotage_ == Sabotage::kFrozenObject && first_T_WO_.empty()) {
     TSDFPP_ASSIGN(const Frame first, source.Read(frames_.front()));
     first_T_WO_ = {first.T_WO.begin(), first.T_WO.end()};
+  }
+  if (sabotage_ == Sabotage::kObjectLate && index > 0) {
+    TSDFPP_ASSIGN(const Frame before, source.Read(index - 1));
+    late_T_WO_ = {before.T_WO.begin(), before.T_WO.end()};
   }
   const std::size_t middle = frames_.size() / 2;
   if (sabotage_ == Sabotage::kStalePose && middle > 0 && index == frames_[middle] && !stale_) {
@@ -184,6 +204,12 @@ void FrameSabotage::Apply(const SequenceInfo& info, Frame& frame) const {
         }
       }
       return;
+    case Sabotage::kObjectLate:
+      for (auto& [id, T_WO] : frame.T_WO) {
+        const auto late = late_T_WO_.find(id);
+        if (IsMover(info, id) && late != late_T_WO_.end()) T_WO = late->second;
+      }
+      return;
     case Sabotage::kStalePose:
       if (!stale_ || frame.index != frames_[frames_.size() / 2]) return;
       frame.T_WC = stale_->T_WC;
@@ -194,6 +220,9 @@ void FrameSabotage::Apply(const SequenceInfo& info, Frame& frame) const {
       frame.mask = Swapped(frame.mask, a, b);
       return;
     }
+    case Sabotage::kMaskDilated:
+      frame.mask = Dilated(frame.mask, TwoObjects(info).first);
+      return;
     case Sabotage::kPrincipalPoint:
       frame.intrinsics.cx += 1;
       return;

@@ -18,8 +18,10 @@ enum class Sabotage {
   // What the mapper is given; what it is scored against stays true.
   kObjectPose,      // from one third of the sequence on, poses of the moving objects are 5 mm off
   kFrozenObject,    // objects keep the pose of the first frame
+  kObjectLate,      // poses of the moving objects are those of one recorded frame before
   kStalePose,       // the middle frame has the poses, camera's too, of the frame before
   kMasksSwapped,    // two objects have each other's mask
+  kMaskDilated,     // a moving object's mask is a pixel larger all around
   kPrincipalPoint,  // off by one pixel
   kDepthScale,      // depth times 1.005
   // The map.
@@ -68,6 +70,8 @@ class FrameSabotage {
   std::vector<int> frames_;
   std::map<InstanceId, Pose> first_T_WO_;
   std::optional<Frame> stale_;  // the frame before the middle one
+  // kObjectLate: of the recorded frame before the one that comes.
+  std::map<InstanceId, Pose> late_T_WO_;
 };
 
 // Breaks the map's settings.

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/files.h"
+#include "eval/sabotage.h"
 #include "tests/core/temp_folder.h"
 
 namespace tsdfpp {
@@ -176,6 +179,39 @@ TEST_F(GateConfigTest, AWrongExperimentIsNamedByItsOwnFile) {
   ASSERT_FALSE(parsed.has_value());
   EXPECT_NE(parsed.error().message.find("small.toml:1: 'name' is an integer"), std::string::npos)
       << parsed.error().message;
+}
+
+// Of the project's own gates: each thing that can be broken has a gate that must notice, and no
+// baseline can get worse (or better) unseen, which would move a claim against it.
+TEST(OwnGates, EverySabotageAndEveryBaselineHasAGate) {
+  const auto config =
+      GatesConfig::Load(std::filesystem::path(TSDFPP_SOURCE_DIR) / "results" / "gates.toml");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  for (const Sabotage sabotage : Sabotages()) {
+    EXPECT_TRUE(std::any_of(config->sabotages.begin(), config->sabotages.end(),
+                            [&](const auto& of) { return of.name == SabotageName(sabotage); }))
+        << SabotageName(sabotage);
+  }
+  const auto two_sided = [&](const std::string& experiment, const std::string& metric,
+                             const std::string& method, const std::string& profile) {
+    const AxisChoice where{{"method", method}, {"profile", profile}};
+    return std::any_of(config->gates.begin(), config->gates.end(), [&](const Gate& gate) {
+      return gate.kind == Gate::Kind::kReference && gate.experiment == experiment &&
+             gate.metric == metric && gate.where == where;
+    });
+  };
+  for (const char* experiment : {"mini", "toycar3"}) {
+    for (const char* method : {"tsdf", "tsdf/guarded", "tsdf/static", "tsdf++", "volumes"}) {
+      for (const char* metric : {"table_preservation_behind_other", "movers_completion"}) {
+        EXPECT_TRUE(two_sided(experiment, metric, method, "paper"))
+            << experiment << " " << metric << " " << method;
+      }
+    }
+    for (const char* profile : {"paper", "close"}) {
+      EXPECT_TRUE(two_sided(experiment, "ghost_area_cm2", "tsdf++/anchored", profile))
+          << experiment << " " << profile;
+    }
+  }
 }
 
 }  // namespace

@@ -96,6 +96,28 @@ TEST(Sabotage, FrozenObject) {
   }
 }
 
+// The car has the true pose of the recorded frame before, not of the used one before, of which
+// there is one in four; what rests stays, and so does the first frame, before which there is none.
+TEST(Sabotage, ObjectLate) {
+  const Both both = ReadBoth(Sabotage::kObjectLate);
+  const auto variant = Variant(Sabotage::kNone);
+  auto source = VariantSource::Open(*variant);
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < both.plain.size(); ++i) {
+    const int before = std::max(0, both.plain[i].frame.index - 1);
+    const Frame truth = *source->source().Read(before);
+    EXPECT_EQ(both.broken[i].frame.T_WO.at(kCar).matrix(), truth.T_WO.at(kCar).matrix()) << i;
+    EXPECT_EQ(both.broken[i].frame.T_WO.at(kHouse).matrix(),
+              both.plain[i].frame.T_WO.at(kHouse).matrix());
+    if (both.differences[i] == "objects ")
+      ++moved;
+    else
+      EXPECT_EQ(both.differences[i], "") << i;
+  }
+  EXPECT_EQ(both.differences.front(), "");
+  EXPECT_GE(moved, both.plain.size() / 2) << "the car drives for most of the sequence";
+}
+
 TEST(Sabotage, StalePose) {
   const Both both = ReadBoth(Sabotage::kStalePose);
   const std::size_t middle = both.plain.size() / 2;
@@ -114,6 +136,32 @@ TEST(Sabotage, MasksSwapped) {
     EXPECT_EQ(cv::countNonZero(plain == kCar), cv::countNonZero(broken == kHouse));
     EXPECT_EQ(cv::countNonZero((plain == kHouse) & (broken != kCar)), 0);
     EXPECT_EQ(cv::countNonZero((plain == kBackground) & (broken != kBackground)), 0);
+  }
+}
+
+// Pixel by pixel: the car's where it or one of the eight pixels beside it was the car's.
+TEST(Sabotage, MaskDilated) {
+  const Both both = ReadBoth(Sabotage::kMaskDilated);
+  for (std::size_t i = 0; i < both.plain.size(); ++i) {
+    EXPECT_EQ(both.differences[i], "mask ") << i;
+    const cv::Mat& plain = both.plain[i].frame.mask;
+    const cv::Mat& broken = both.broken[i].frame.mask;
+    int wrong = 0;
+    for (int v = 0; v < plain.rows; ++v) {
+      for (int u = 0; u < plain.cols; ++u) {
+        bool beside = false;
+        for (int dv = -1; dv <= 1; ++dv) {
+          for (int du = -1; du <= 1; ++du) {
+            const cv::Point p(u + du, v + dv);
+            if (!cv::Rect(0, 0, plain.cols, plain.rows).contains(p)) continue;
+            beside = beside || plain.at<std::uint16_t>(p) == kCar;
+          }
+        }
+        const int expected = beside ? kCar : plain.at<std::uint16_t>(v, u);
+        if (broken.at<std::uint16_t>(v, u) != expected) ++wrong;
+      }
+    }
+    EXPECT_EQ(wrong, 0) << i;
   }
 }
 
@@ -188,7 +236,7 @@ TEST(Sabotage, Meshes) {
 }
 
 TEST(Sabotage, NamesComeBack) {
-  EXPECT_EQ(Sabotages().size(), 13U);
+  EXPECT_EQ(Sabotages().size(), 15U);
   for (const Sabotage sabotage : Sabotages()) {
     EXPECT_EQ(*SabotageFromName(SabotageName(sabotage)), sabotage);
     EXPECT_FALSE(SabotageWords(sabotage).empty());
