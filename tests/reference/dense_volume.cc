@@ -208,13 +208,13 @@ cv::Mat AtOutlines(const Frame& frame, const cv::Mat& labels, const MapConfig& c
       if (!ends_at(v, u - 1) && !ends_at(v, u + 1) && !ends_at(v - 1, u) && !ends_at(v + 1, u)) {
         continue;
       }
-      const double reach = std::ceil(2 * config.voxel_m * f / frame.depth.at<float>(v, u));
-      for (int row = 0; row < labels.rows; ++row) {
-        for (int column = 0; column < labels.cols; ++column) {
-          const bool is_near = std::abs(row - v) <= reach && std::abs(column - u) <= reach;
-          if (is_near && labels.at<std::uint16_t>(row, column) == label) {
+      const int reach =
+          static_cast<int>(std::ceil(2 * config.voxel_m * f / frame.depth.at<float>(v, u)));
+      for (int row = std::max(0, v - reach); row <= std::min(labels.rows - 1, v + reach); ++row) {
+        const int last = std::min(labels.cols - 1, u + reach);
+        for (int column = std::max(0, u - reach); column <= last; ++column) {
+          if (labels.at<std::uint16_t>(row, column) == label)
             near.at<std::uint8_t>(row, column) = 1;
-          }
         }
       }
     }
