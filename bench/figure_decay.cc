@@ -20,11 +20,14 @@ struct Way {
   Method method;
   Resampling resampling;
 };
-constexpr std::array<Way, 5> kWays{
+constexpr std::array<Way, 8> kWays{
     {{"tsdf", Method::kTsdf, Resampling::kAll},
+     {"tsdf observed", Method::kTsdf, Resampling::kObserved},
+     {"tsdf nearest", Method::kTsdf, Resampling::kNearest},
      {"tsdf++/literal", Method::kTsdfppLiteral, Resampling::kAll},
      {"tsdf++", Method::kTsdfpp, Resampling::kAll},
      {"tsdf++ observed", Method::kTsdfpp, Resampling::kObserved},
+     {"tsdf++ nearest", Method::kTsdfpp, Resampling::kNearest},
      {"tsdf++/anchored", Method::kTsdfppAnchored, Resampling::kAll}}};
 
 using Rgb = Eigen::Vector3d;

@@ -332,6 +332,7 @@ nlohmann::json ToJson(const ObjectScores& scores) {
 
 nlohmann::json ToJson(const SeamScore& score) {
   return {{"share", tsdfpp::ToJson(score.share)},
+          {"in_front", tsdfpp::ToJson(score.in_front)},
           {"area_cm2", 1e4 * score.area_m2},
           {"asked_area_cm2", 1e4 * score.asked_area_m2}};
 }

@@ -84,6 +84,8 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
          return Measured::Of(1e4 * e.seams.beside_objects.area_m2);
        },
        1},
+      {"bulge", "bulge_share",
+       [](const Movers&, const Evaluation& e) { return e.seams.beside_objects.in_front; }, 4},
       {"kept any label", "table_preservation_any_label",
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.by_cause.front().any_label;

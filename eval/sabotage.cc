@@ -28,6 +28,7 @@ constexpr Named kNamed[] = {
     {Sabotage::kTruthShifted, "truth-shifted", "the true surfaces are one voxel too high"},
     {Sabotage::kNearestResampling, "nearest-resampling",
      "values move to the nearest voxel and are not interpolated"},
+    {Sabotage::kRimsOff, "rims-off", "cubes at a mask's outline are not completed"},
     {Sabotage::kStalePose, "stale-pose", "the middle frame has the poses of the frame before"},
     {Sabotage::kContradictionOff, "contradiction-off",
      "pixels of other objects do not clear what an object wrongly claims"},
@@ -245,6 +246,8 @@ void SabotageMap(Sabotage sabotage, PipelineConfig& config) {
     config.map.contradiction = false;
   } else if (sabotage == Sabotage::kNearestResampling) {
     config.map.resampling = Resampling::kNearest;
+  } else if (sabotage == Sabotage::kRimsOff) {
+    config.map.rims = false;
   }
 }
 

@@ -28,6 +28,7 @@ enum class Sabotage {
   kTruncationHalved,
   kContradictionOff,
   kNearestResampling,
+  kRimsOff,
   // What is scored.
   kInactiveDropped,  // a removal uncovers nothing: the visible scene less the removed faces
   kLabelsPermuted,   // the ids of the meshes' faces

@@ -55,6 +55,11 @@ class SurfaceOfPixels {
   double jump_m_;
 };
 
+Measured ShareOfAsked(int pixels, int asked) {
+  if (asked == 0) return Measured::Undefined("no mapped background beside an edge");
+  return Measured::Of(static_cast<double>(pixels) / asked);
+}
+
 }  // namespace
 
 SeamScores ScoreSeams(const cv::Mat& depth, const std::deque<Frame>& recent, double voxel_m) {
@@ -68,6 +73,7 @@ SeamScores ScoreSeams(const cv::Mat& depth, const std::deque<Frame>& recent, dou
   std::array<SeamScore*, 2> by_kind{&scores.elsewhere, &scores.beside_objects};
   std::array<int, 2> asked{};
   std::array<int, 2> seams{};
+  std::array<int, 2> hidden{};
   for (int v = 0; v < now.depth.rows; ++v) {
     for (int u = 0; u < now.depth.cols; ++u) {
       if (candidates.at<std::uint8_t>(v, u) == 0) continue;
@@ -82,6 +88,7 @@ SeamScores ScoreSeams(const cv::Mat& depth, const std::deque<Frame>& recent, dou
       ++asked[kind];
       by_kind[kind]->asked_area_m2 += area_m2;
       const double hit = depth.at<float>(v, u);
+      if (hit > 0 && hit < z - voxel_m) ++hidden[kind];
       if (hit > 0 && hit <= z + voxel_m) continue;
       ++seams[kind];
       by_kind[kind]->area_m2 += area_m2;
@@ -89,9 +96,8 @@ SeamScores ScoreSeams(const cv::Mat& depth, const std::deque<Frame>& recent, dou
     }
   }
   for (std::size_t kind = 0; kind < by_kind.size(); ++kind) {
-    by_kind[kind]->share = asked[kind] == 0
-                               ? Measured::Undefined("no mapped background beside an edge")
-                               : Measured::Of(static_cast<double>(seams[kind]) / asked[kind]);
+    by_kind[kind]->share = ShareOfAsked(seams[kind], asked[kind]);
+    by_kind[kind]->in_front = ShareOfAsked(hidden[kind], asked[kind]);
   }
   return scores;
 }

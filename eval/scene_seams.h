@@ -12,6 +12,7 @@ namespace tsdfpp {
 
 struct SeamScore {
   Measured share;            // of the pixels asked, those that are seams
+  Measured in_front;         // those that something hides
   double area_m2 = 0;        // of true surface that the seams' pixels see
   double asked_area_m2 = 0;  // that all pixels asked see
 };
@@ -27,7 +28,8 @@ struct SeamScores {
 // Asked are the pixels of the last frame that lie in EdgeBorder(), show the background, are in
 // SeenByAll() and are seen at less than the steepest incidence at which a sample counts as seen. A
 // pixel is a *seam* where the cast hits nothing, or something more than a voxel behind the true
-// depth.
+// depth; it is hidden (`in_front`) where the cast hits something more than a voxel in front of it,
+// such as an object that is too large, or a background that goes on too far.
 // A pixel (x, y) at depth z sees z^2 / (fx fy |n d|) of the surface's plane, with n its unit normal
 // and d = ((x - cx) / fx, (y - cy) / fy, 1): the pixel's footprint over the cosine of incidence. n
 // comes from the differences of the neighbouring points; across an edge of id, or of depth by two

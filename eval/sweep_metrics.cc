@@ -30,6 +30,7 @@ constexpr Words kEvaluationWords[] = {
     {"sanity_least", "right pixels of the worst object", "", Better::kHigher},
     {"seam_share", "missing background beside objects", "", Better::kLower},
     {"seam_area_cm2", "ring of missing background around objects", "cm²", Better::kLower},
+    {"bulge_share", "background beside objects hidden by bulges", "", Better::kLower},
     {"table_preservation_any_label", "hidden table kept under any label", "", Better::kHigher},
     {"table_label_purity", "purity of the table", "", Better::kHigher},
 };

@@ -14,6 +14,7 @@
 #include "mapper/mesh_tools.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
+#include "mapper/rims.h"
 #include "mapper/scene_parts.h"
 
 namespace tsdfpp {
@@ -76,6 +77,7 @@ void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
         }
       },
       tbb::simple_partitioner());
+  if (rule_ == FieldRule::kGuarded && config_.rims) CompleteRims(view);
   // A frame makes no voxel unobserved; it may have made blocks in vain.
   FreeEmpty(EmptyFrom(field_, blocks_before, [](const TsdfBlock& b) { return !b.AnyObserved(); }));
   CheckInDebugBuilds(*this);
@@ -100,6 +102,29 @@ void SingleFieldMap::FuseBlock(const FrameView& frame, const BlockPlace& place, 
   if (!votes.any_label_changed) return;
   for (const InstanceId id : labels.id) {
     if (id != kNoInstance) labels.ever |= EverBit(id);
+  }
+}
+
+void SingleFieldMap::CompleteRims(const FrameView& frame) {
+  const auto field_of = [&](InstanceId) -> std::optional<RimVolume> {
+    return RimVolume{&field_, Pose::Identity(), true};
+  };
+  const auto is_own = [&](InstanceId id, const Index3& voxel) {
+    const LabelBlock* labels = labels_.Find(BlockOf(voxel));
+    return labels != nullptr && labels->id[At(PlaceInBlock(voxel))] == id;
+  };
+  for (const RimBlock& rim : FindRims(frame, config_, field_of, is_own)) {
+    TsdfBlock& block = field_.FindOrAdd(rim.index);
+    LabelBlock& labels = labels_.FindOrAdd(rim.index);
+    for (const RimValue& value : rim.voxels) {
+      const std::size_t i = At(value.place);
+      if (block.weight[i] > 0) continue;  // an object before this one has completed it
+      FuseRim(frame, config_, value, block);
+      labels.id[i] = rim.id;
+      labels.confidence[i] = 1;
+    }
+    labels.ever |= EverBit(rim.id);
+    block.UpdateMasks(config_.back());
   }
 }
 

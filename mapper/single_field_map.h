@@ -16,7 +16,8 @@ namespace tsdfpp {
 enum class FieldRule {
   kOverwrite,   // moved values replace what is at their destination
   kKeepNearer,  // they do where their magnitude is the smaller one
-  kGuarded,     // as kOverwrite; and labels guard their surfaces from what is fused behind others
+  kGuarded,     // as kOverwrite; labels guard their surfaces from what is fused behind others, and
+                // rims are completed
   kStatic,      // poses move nothing
 };
 
@@ -72,6 +73,8 @@ class SingleFieldMap final : public MapRepresentation {
   // `next` as FuseVoxels() takes it.
   void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
                  const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
+  // Rims of one field (docs/map.md, `tsdf/guarded`).
+  void CompleteRims(const FrameView& frame);
   // Gives the label of the voxel nearest to a point (metres), the background's where it has none.
   VoxelLabels LabelOfVoxels() const;
   // Makes the object's voxels unlabelled, and unobserved or free; returns their blocks.

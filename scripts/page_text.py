@@ -118,7 +118,7 @@ KINDS = {
     "whole": whole,
     "least": least,
     "tracks": tracks,
-    "sentences": experiment(experiment_text.text_of),
+    "comparison": experiment(experiment_text.comparison_of),
     "conditions": experiment(experiment_text.table_of),
 }
 

@@ -33,7 +33,9 @@ STYLES = {
     "tsdf++ observed": ("#56B4E9", "P", "--"),
     "tsdf++/literal": ("#E69F00", "v", "-."),
     "tsdf++/anchored": ("#D55E00", "^", "-"),
-    "authors": ("#CC79A7", "*", ":"),
+    "tsdf observed": ("#666666", "d", "--"),
+    "tsdf nearest": ("#CC79A7", "*", ":"),
+    "tsdf++ nearest": ("#009E73", "X", ":"),
 }
 
 
@@ -42,9 +44,9 @@ def rows_of(folder, name):
         return list(csv.DictReader(file))
 
 
-def draw_line(axes, name, x, y, label=None):
+def draw_line(axes, name, x, y):
     colour, marker, line = STYLES[name]
-    axes.plot(x, y, color=colour, marker=marker, linestyle=line, markersize=4.5, linewidth=1.4, label=label or name,
+    axes.plot(x, y, color=colour, marker=marker, linestyle=line, markersize=4.5, linewidth=1.4, label=name,
               clip_on=False, zorder=3)
 
 
@@ -55,8 +57,6 @@ def save(figure, folder, name, kind="svg"):
 
 
 def decay(tables, pictures):
-    # Measured on the authors' code by its own scene and settings: facts/peers.md.
-    authors = {0: 63, 1: 52, 3: 30, 5: 16, 7: 4, 10: 0}
     # tsdf++/literal resamples as tsdf++ does: one line for both.
     rows = [row for row in rows_of(tables, "decay") if row["moves"].isdigit() and row["map"] != "tsdf++/literal"]
     shown = sorted({int(row["moves"]) for row in rows})
@@ -70,8 +70,6 @@ def decay(tables, pictures):
                     if row["map"] == name and row[column]]
             draw_line(axes, name, *zip(*line))
         if column == "surface left":
-            draw_line(axes, "authors", [shown.index(n) for n in authors],
-                      [share / authors[0] for share in authors.values()], "authors' code, of its first 63 %")
             axes.set_ylim(0, 1.02)
         elif column == "distance error mm":
             axes.set_yscale("log")

@@ -203,7 +203,7 @@ TEST(Sabotage, MapSettings) {
     SabotageMap(sabotage, config);
     const bool of_map = sabotage == Sabotage::kTruncationHalved ||
                         sabotage == Sabotage::kContradictionOff ||
-                        sabotage == Sabotage::kNearestResampling;
+                        sabotage == Sabotage::kNearestResampling || sabotage == Sabotage::kRimsOff;
     EXPECT_EQ(config.map == plain.map, !of_map) << SabotageName(sabotage);
     CellSettings settings;
     const std::string key = MapKey(settings);
@@ -236,7 +236,7 @@ TEST(Sabotage, Meshes) {
 }
 
 TEST(Sabotage, NamesComeBack) {
-  EXPECT_EQ(Sabotages().size(), 15U);
+  EXPECT_EQ(Sabotages().size(), 16U);
   for (const Sabotage sabotage : Sabotages()) {
     EXPECT_EQ(*SabotageFromName(SabotageName(sabotage)), sabotage);
     EXPECT_FALSE(SabotageWords(sabotage).empty());

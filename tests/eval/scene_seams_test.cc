@@ -97,6 +97,26 @@ TEST(SeamsOfDepth, BeginAVoxelBehindAndNotInFront) {
   EXPECT_EQ(share(0.9), 0.0);
   EXPECT_EQ(share(1.1), 1.0);
   EXPECT_EQ(share(-5), 0.0);
+  const auto in_front = [&](double voxels) {
+    const cv::Mat cast = frame.depth + voxels * kSeamVoxel_m;
+    return ScoreSeams(cast, {frame}, kSeamVoxel_m).beside_objects.in_front.value.value();
+  };
+  EXPECT_EQ(in_front(-0.9), 0.0);
+  EXPECT_EQ(in_front(-1.1), 1.0);
+  EXPECT_EQ(in_front(5), 0.0);
+}
+
+// One column of the border's bulges, another is missing, and what bulges elsewhere does not count.
+TEST(SeamsOfDepth, AreNotWhatBulges) {
+  const WallOf wall;
+  const Frame frame = wall.Seen();
+  const int border = wall.BorderColumns();
+  cv::Mat cast = Columns(frame.depth, kFirstOfObject - 1, kFirstOfObject - 1, 0.5);
+  cast = Columns(cast, kFirstOfObject - 2, kFirstOfObject - 2, 0.0);
+  cast = Columns(cast, 0, kFirstOfObject - border - 1, 0.5);
+  const SeamScore score = ScoreSeams(cast, {frame}, kSeamVoxel_m).beside_objects;
+  EXPECT_DOUBLE_EQ(score.in_front.value.value(), 1.0 / border);
+  EXPECT_DOUBLE_EQ(score.share.value.value(), 1.0 / border);
 }
 
 TEST(SeamsOfDepth, AreAskedOfWhatEachFrameSaw) {

@@ -1,6 +1,7 @@
 // docs/map.md, "`tsdf`: one field", and its variants `tsdf/min`, `tsdf/guarded` and `tsdf/static`.
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "tests/reference/dense_map.h"
@@ -36,6 +37,7 @@ class DenseTsdf : public DenseMap {
       const bool votes = std::abs(seen->s) <= config_.vote_band();
       if (votes && InBand(seen->s, config_)) Vote(seen->label, owners_.At(v));
     });
+    if (method_ == Method::kTsdfGuarded && config_.rims) CompleteFieldRims(frame, labels);
     field_.FreeEmptyBlocks();
   }
 
@@ -94,6 +96,31 @@ class DenseTsdf : public DenseMap {
     const InstanceId owner = owners_(v).label;
     const bool is_another = owner != kNoInstance && owner != seen.label;
     return is_another && field_.grid(v).distance <= config_.voxel() && seen.s < 0;
+  }
+
+  // Every object's rims go on from what is labelled so before any of them; the least id is first.
+  void CompleteFieldRims(const Frame& frame, const cv::Mat& labels) {
+    std::set<InstanceId> ids;
+    for (int v = 0; v < labels.rows; ++v) {
+      for (int u = 0; u < labels.cols; ++u) ids.insert(labels.at<std::uint16_t>(v, u));
+    }
+    ids.erase(kNoInstance);
+    const auto is_free = [&](const Eigen::Vector3i& v) { return !field_.grid(v).observed(); };
+    std::vector<std::pair<InstanceId, RimVoxel>> rims;
+    for (const InstanceId id : ids) {
+      DenseGrid<DenseVoxel> own(field_.grid.box());
+      for (const Eigen::Vector3i& v : ObservedVoxels(id)) own.At(v) = field_.grid(v);
+      for (const RimVoxel& rim :
+           RimsOf(id, frame, labels, Pose::Identity(), config_, own, is_free)) {
+        rims.emplace_back(id, rim);
+      }
+    }
+    for (const auto& [id, rim] : rims) {
+      if (!is_free(rim.voxel)) continue;
+      field_.grid.At(rim.voxel) = rim.value;
+      field_.blocks.AddBlockOf(rim.voxel);
+      owners_.At(rim.voxel) = {id, 1};
+    }
   }
 
   void Vote(InstanceId m, Ownership& owner) const {

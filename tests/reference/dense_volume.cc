@@ -242,17 +242,15 @@ std::optional<float> GoneOn(const DenseGrid<DenseVoxel>& grid, const Eigen::Vect
 
 }  // namespace
 
-void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, const Pose& T_WL,
-                  const MapConfig& config, DenseVolume& volume) {
+std::vector<RimVoxel> RimsOf(InstanceId id, const Frame& frame, const cv::Mat& labels,
+                             const Pose& T_WL, const MapConfig& config,
+                             const DenseGrid<DenseVoxel>& grid,
+                             const std::function<bool(const Eigen::Vector3i&)>& is_free) {
   const float h = config.voxel();
   const cv::Mat near = AtOutlines(frame, labels, config);
   const Pose T_LC = T_WL.inverse() * frame.T_WC;
   const View view(frame, labels, T_WL, config);
-  struct Rim {
-    Eigen::Vector3i voxel;
-    DenseVoxel value;
-  };
-  std::map<std::array<int, 3>, std::optional<Rim>> rims;
+  std::map<std::array<int, 3>, std::optional<RimVoxel>> rims;
   for (int v = 0; v < labels.rows; ++v) {
     for (int u = 0; u < labels.cols; ++u) {
       if (near.at<std::uint8_t>(v, u) == 0 || labels.at<std::uint16_t>(v, u) != id) continue;
@@ -265,15 +263,15 @@ void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, cons
       const Eigen::Vector3i cube = q.array().floor().matrix().cast<int>();
       for (int i = 0; i < 8; ++i) {
         const Eigen::Vector3i corner = CubeCorner(cube, i);
-        if (volume.grid(corner).observed()) continue;
+        if (!is_free(corner)) continue;
         const auto [place, first] =
             rims.try_emplace(std::array{corner.x(), corner.y(), corner.z()});
         if (!first) continue;
-        std::optional<float> distance = GoneOn(volume.grid, corner, h);
+        std::optional<float> distance = GoneOn(grid, corner, h);
         const std::optional<Seen> seen = view.Look(corner);
         if (!distance) continue;
         if (seen && seen->s > 0) distance = std::max(*distance, std::min(seen->s, h));
-        Rim& rim = place->second.emplace();
+        RimVoxel& rim = place->second.emplace();
         rim.voxel = corner;
         rim.value.distance = Kept(std::clamp(*distance, -config.back(), config.front()));
         rim.value.weight = 1;
@@ -285,10 +283,19 @@ void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, cons
       }
     }
   }
+  std::vector<RimVoxel> found;
   for (const auto& [place, rim] : rims) {
-    if (!rim) continue;
-    volume.grid.At(rim->voxel) = rim->value;
-    volume.blocks.AddBlockOf(rim->voxel);
+    if (rim) found.push_back(*rim);
+  }
+  return found;
+}
+
+void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, const Pose& T_WL,
+                  const MapConfig& config, DenseVolume& volume) {
+  const auto is_free = [&](const Eigen::Vector3i& v) { return !volume.grid(v).observed(); };
+  for (const RimVoxel& rim : RimsOf(id, frame, labels, T_WL, config, volume.grid, is_free)) {
+    volume.grid.At(rim.voxel) = rim.value;
+    volume.blocks.AddBlockOf(rim.voxel);
   }
 }
 

@@ -78,7 +78,18 @@ DenseVolume Resample(const DenseVolume& old, const Pose& T_rel, const MapConfig&
 void FuseObject(InstanceId id, const View& view, const MapConfig& config, DenseVolume& volume,
                 DenseGrid<std::uint8_t>* votes);
 
-// docs/map.md, "Rims", of one object, after FuseObject of the same frame.
+// docs/map.md, "Rims", of one object, after FuseObject of the same frame: the voxels that it
+// completes and their values. `grid` holds the object's voxels alone, and `is_free` says where a
+// value may be put.
+struct RimVoxel {
+  Eigen::Vector3i voxel;
+  DenseVoxel value;
+};
+std::vector<RimVoxel> RimsOf(InstanceId id, const Frame& frame, const cv::Mat& labels,
+                             const Pose& T_WL, const MapConfig& config,
+                             const DenseGrid<DenseVoxel>& grid,
+                             const std::function<bool(const Eigen::Vector3i&)>& is_free);
+// Puts them into the object's volume.
 void CompleteRims(InstanceId id, const Frame& frame, const cv::Mat& labels, const Pose& T_WL,
                   const MapConfig& config, DenseVolume& volume);
 
