@@ -110,6 +110,7 @@ void AddMesh(CLI::App& app, Chosen& chosen) {
     AddCount(command, "--threads", options->threads, "Number of threads", 1, 1024);
   }
   AddProfile(mesh, options->profile);
+  AddCount(grid, "--block-side", options->block_side, "Voxels along a block's side", 1, 64);
   mesh->callback([=, &chosen] { chosen = [=] { return RunMeshBench(*options); }; });
   grid->callback([=, &chosen] { chosen = [=] { return RunVoxelBlockGrid(*options); }; });
 }

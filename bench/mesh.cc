@@ -22,8 +22,9 @@
 namespace tsdfpp {
 namespace {
 
-constexpr int kRepeats = 5;        // of a mesh from scratch at the end
-constexpr int kSmallChanges = 15;  // at the end
+constexpr int kRepeats = 5;                       // of a mesh from scratch at the end
+constexpr int kSmallChanges = 15;                 // at the end
+constexpr std::array<int, 2> kBlockSides{8, 16};  // of VoxelBlockGrid, voxels
 
 template <typename Function>
 double MillisecondsOf(const Function& function) {
@@ -54,8 +55,7 @@ struct KeptTimes {
   std::vector<double> all_ratio;
 
   void Measure(const MapRepresentation& map, bool also_whole);
-  // `peer_ms` is a quarter of what Open3D takes for a whole mesh, where that is of the same map.
-  void Print(const std::string& name, std::optional<double> peer_ms) const;
+  void Print(const std::string& name) const;
 };
 
 void KeptTimes::Measure(const MapRepresentation& map, bool also_whole) {
@@ -74,13 +74,11 @@ void KeptTimes::Measure(const MapRepresentation& map, bool also_whole) {
   all_ratio.push_back(all_ms.back() / fair_ms);
 }
 
-void KeptTimes::Print(const std::string& name, std::optional<double> peer_ms) const {
-  std::printf("%-16s %8.3f %8.1f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f", name.c_str(),
+void KeptTimes::Print(const std::string& name) const {
+  std::printf("%-16s %8.3f %8.1f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f\n", name.c_str(),
               Median(share), Median(whole_ms), Median(index_ms), Median(update_ms),
               Median(update_ratio), Median(changes_ms), Median(changes_ratio), Median(all_ms),
               Median(all_ratio));
-  if (peer_ms) std::printf(" %13.2f", Median(changes_ms) / (*peer_ms * Median(share)));
-  std::printf("\n");
 }
 
 // One method's map and what was measured of it.
@@ -110,6 +108,7 @@ cv::Mat LargestObjectAlone(const Frame& frame) {
 
 // The child prints "milliseconds triangles bytes growth_mb" of VoxelBlockGrid.
 struct ChildResult {
+  std::string name;
   double mesh_ms = 0;
   double triangles = 0;
   double bytes = 0;
@@ -117,17 +116,18 @@ struct ChildResult {
   bool finished = false;
 };
 
-ChildResult AskChild(const MeshBenchOptions& options) {
+ChildResult AskChild(const MeshBenchOptions& options, int block_side) {
   constexpr int kLimit_s = 600;
   std::array<char, 4096> self{};
   const ssize_t length = readlink("/proc/self/exe", self.data(), self.size() - 1);
   ChildResult result;
+  result.name = fmt::format("Open3D VoxelBlockGrid {}", block_side);
   if (length <= 0) return result;
   const std::string command = fmt::format(
       "timeout {} '{}' voxel-block-grid --scene '{}' --open3d-band {} --voxel {} --frames {} "
-      "--threads {} 2>/dev/null",
+      "--threads {} --block-side {} 2>/dev/null",
       kLimit_s, self.data(), options.scene, options.open3d_band, options.voxel_m, options.frames,
-      options.threads);
+      options.threads, block_side);
   FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return result;
   const int read = std::fscanf(pipe, "%lf %lf %lf %lf", &result.mesh_ms, &result.triangles,
@@ -138,49 +138,50 @@ ChildResult AskChild(const MeshBenchOptions& options) {
 
 void PrintMeshing(const std::vector<Run>& runs, const std::vector<double>& final_ms,
                   const std::vector<std::size_t>& triangles, const Open3dVolume::Mesh& scalable,
-                  const ChildResult& grid) {
+                  const std::vector<ChildResult>& grids) {
   std::printf("\nvisible scene from scratch, the last frame\n%-28s %10s %10s %12s\n", "",
               "triangles", "ms", "over Open3D");
-  const double peer_ms = 1e3 * scalable.seconds;
+  const double scalable_ms = 1e3 * scalable.seconds;
+  double peer_ms = scalable_ms;  // the fastest
+  for (const ChildResult& grid : grids) {
+    if (grid.finished) peer_ms = std::min(peer_ms, grid.mesh_ms);
+  }
   std::printf("%-28s %10zu %10.1f %12.3f\n", "Open3D ScalableTSDFVolume", scalable.triangles,
-              peer_ms, 1.0);
-  if (grid.finished) {
-    std::printf("%-28s %10.0f %10.1f %12.3f\n", "Open3D VoxelBlockGrid", grid.triangles,
-                grid.mesh_ms, grid.mesh_ms / peer_ms);
-  } else {
-    std::printf("%-28s %10s\n", "Open3D VoxelBlockGrid", "aborted");
+              scalable_ms, scalable_ms / peer_ms);
+  for (const ChildResult& grid : grids) {
+    if (grid.finished) {
+      std::printf("%-28s %10.0f %10.1f %12.3f\n", grid.name.c_str(), grid.triangles, grid.mesh_ms,
+                  grid.mesh_ms / peer_ms);
+    } else {
+      std::printf("%-28s %10s\n", grid.name.c_str(), "aborted");
+    }
   }
   for (std::size_t m = 0; m < runs.size(); ++m) {
     std::printf("%-28s %10zu %10.1f %12.3f\n", runs[m].name.c_str(), triangles[m], final_ms[m],
                 final_ms[m] / peer_ms);
   }
-  const auto print_kept = [&](const char* title, KeptTimes Run::*times,
-                              std::optional<double> quarter_ms) {
+  const auto print_kept = [&](const char* title, KeptTimes Run::*times) {
     std::printf(
         "\nkept meshes, %s; ms, medians; ratios are over (from scratch x share of changed blocks)\n"
-        "%-16s %8s %8s %8s %8s %8s %8s %8s %8s %8s",
+        "%-16s %8s %8s %8s %8s %8s %8s %8s %8s %8s\n",
         title, "", "share", "scratch", "index", "update", "ratio", "+ taking", "ratio", "+ joining",
         "ratio");
-    if (quarter_ms) std::printf(" %13s", "over Open3D/4");
-    std::printf("\n");
-    for (const Run& run : runs) (run.*times).Print(run.name, quarter_ms);
+    for (const Run& run : runs) (run.*times).Print(run.name);
   };
-  print_kept("frame by frame", &Run::frames, {});
-  const double faster_ms = grid.finished ? std::min(peer_ms, grid.mesh_ms) : peer_ms;
-  print_kept("the last frame's largest object observed alone", &Run::small, faster_ms / 4);
-  std::printf(
-      "(taking: of the parts that changed. over Open3D/4: that, over a quarter of the faster "
-      "Open3D's time x share)\n");
+  print_kept("frame by frame", &Run::frames);
+  print_kept("the last frame's largest object observed alone", &Run::small);
+  std::printf("(taking: of the parts that changed)\n");
 }
 
 void PrintMemory(const std::vector<Run>& runs, const Open3dVolume& peer, double peer_growth_mb,
-                 const ChildResult& grid) {
+                 const std::vector<ChildResult>& grids) {
   std::printf("\nmemory, MB\n%-28s %14s %10s %10s\n", "", "occupied blocks", "growth", "meshes");
   std::printf("%-28s %14.1f %10.1f %10s\n", "Open3D ScalableTSDFVolume",
               static_cast<double>(peer.OccupiedBytes()) / 1e6, peer_growth_mb, "-");
-  if (grid.finished) {
-    std::printf("%-28s %14.1f %10.1f %10s\n", "Open3D VoxelBlockGrid", grid.bytes / 1e6,
-                grid.growth_mb, "-");
+  for (const ChildResult& grid : grids) {
+    if (!grid.finished) continue;
+    std::printf("%-28s %14.1f %10.1f %10s\n", grid.name.c_str(), grid.bytes / 1e6, grid.growth_mb,
+                "-");
   }
   for (const Run& run : runs) {
     const MapMemory memory = run.pipeline->map().Memory();
@@ -259,19 +260,19 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
   scalable.seconds = Median(peer_ms);
   std::vector<double> final_ms;
   for (const auto& times : whole_ms) final_ms.push_back(Median(times));
-  const ChildResult grid = AskChild(options);
-  PrintMeshing(runs, final_ms, triangles, scalable, grid);
-  PrintMemory(runs, peer, peer_growth_mb, grid);
+  std::vector<ChildResult> grids;
+  for (const int side : kBlockSides) grids.push_back(AskChild(options, side));
+  PrintMeshing(runs, final_ms, triangles, scalable, grids);
+  PrintMemory(runs, peer, peer_growth_mb, grids);
   return {};
 }
 
 Expected<void> RunVoxelBlockGrid(const MeshBenchOptions& options) {
-  constexpr int kBlockSide_voxels = 16;  // Open3D's own default
   TSDFPP_ASSIGN(auto source, OpenSource(options.scene));
   const SequenceInfo& info = source->info();
   SetOpen3dThreads(options.threads);
   VoxelBlockGridPeer peer(options.voxel_m, options.open3d_band * options.voxel_m,
-                          kBlockSide_voxels);
+                          options.block_side);
   double growth_mb = 0;
   const int count = std::min(info.frame_count, options.frames);
   for (int i = 0; i < count; ++i) {

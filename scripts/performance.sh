@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures mapping beside Open3D and puts the tables into docs/performance.md and README.md; some 12 minutes on two cores, which
+# Measures mapping beside Open3D and puts the tables into docs/performance.md and README.md; some 21 minutes on two cores, which
 # must have nothing else to do. Usage: bash scripts/performance.sh [--to OUT] [OPTIONS OF tsdfpp_bench side-by-side];
 # with --to the tables are in OUT alone, which is what a trial is for (--runs 1 --cases 1cm --frames 16).
 set -euo pipefail
