@@ -28,12 +28,22 @@ def difference_text(results, condition, method, metric):
     return "" if paired is None else cell_text(results, paired, metric, "mean_difference", "+")
 
 
+def axes_shown(results):
+    """Those that vary inside a grid; what a grid fixes its name says."""
+    def varies(axis):
+        values = {}
+        for condition in results["conditions"]:
+            values.setdefault(condition["grid"], set()).add(f"{condition['settings'][axis]}")
+        return len(values) == 1 or any(len(of_grid) > 1 for of_grid in values.values())
+    return [axis for axis in results["varied"] if axis != "scene" and varies(axis)]
+
+
 def comparison_of(results):
     """The question; a row a condition and method: of the first metrics mean and paired difference to the baseline with
     their intervals, of the others the mean; and where a method is not ahead of the baseline in the first metric."""
     metrics = results["experiment"]["metrics"]
     baseline = results["experiment"]["baseline"]
-    varied = [axis for axis in results["varied"] if axis != "scene"]
+    varied = axes_shown(results)
     has_grids = len({condition["grid"] for condition in results["conditions"]}) > 1
     titles = (["grid"] if has_grids else []) + varied + ["method"]
     for i, metric in enumerate(metrics):
@@ -54,19 +64,57 @@ def comparison_of(results):
             "".join("- " + line + "\n" for line in verdicts))
 
 
-def table_of(results):
-    """A row a condition and method, a column a metric of the experiment."""
-    metrics = results["experiment"]["metrics"]
-    # A grid has one scene, and says so.
-    varied = [axis for axis in results["varied"] if axis != "scene"]
-    titles = ["grid"] + varied + ["runs", "method"] + [title_of(results, m) for m in metrics]
-    rows = [titles, ["---"] * len(titles)]
+def scenes_of(results):
+    """For each profile and metric a table of means: a row a method, a column a grid, which is a scene."""
+    shown = {}
     for condition in results["conditions"]:
         for method in condition["methods"]:
-            rows.append([condition["grid"]] + [f"{condition['settings'][a]}" for a in varied] +
-                        [str(condition["replicates"]), f"`{method}`"] +
-                        [cell_text(results, condition["means"][method][m], m) for m in metrics])
+            shown[condition["settings"]["profile"], method, condition["grid"]] = condition["means"][method]
+    profiles, methods, grids = ([*dict.fromkeys(key[i] for key in shown)] for i in range(3))
+    text = ""
+    for profile in profiles:
+        for metric in results["experiment"]["metrics"]:
+            title = title_of(results, metric)
+            lines = [[f"`{profile}`: {title}"] + grids, ["---"] * (1 + len(grids))]
+            for method in methods:
+                means = [shown.get((profile, method, grid)) for grid in grids]
+                if any(means):
+                    lines.append([f"`{method}`"] + [cell_text(results, of[metric], metric, interval=False) if of else ""
+                                                    for of in means])
+            text += "".join("| " + " | ".join(line) + " |\n" for line in lines) + "\n"
     made = results["experiment"]
-    return "".join("| " + " | ".join(row) + " |\n" for row in rows) + (
-        f"\nMade by tsdfpp {results['program']} with {results['renderer']}; images of {made['scale']} times the scenes' "
-        f"size, stride {made['stride']}.\n")
+    return text + (f"Made by tsdfpp {results['program']} with {results['renderer']}; images of {made['scale']} times the "
+                   f"scenes' size, stride {made['stride']}.\n")
+
+
+def rules_of(results):
+    """Of grids named `SCENE` and `SCENE, RULE`: a row a rule and method, a column a profile and scene, each cell with the
+    means of the first two metrics; then the same with the others."""
+    metrics = results["experiment"]["metrics"]
+    cells, rows, columns = {}, [], []
+    for condition in results["conditions"]:
+        scene, _, rule = condition["grid"].partition(", ")
+        profile = condition["settings"]["profile"]
+        if (profile, scene) not in columns:
+            columns.append((profile, scene))
+        for method in condition["methods"]:
+            if (rule, method) not in rows:
+                rows.append((rule, method))
+            cells[rule, method, profile, scene] = condition["means"][method]
+    profiles, rules = [profile for profile, _ in columns], [rule for rule, _ in rows]
+    columns = sorted(columns, key=lambda column: profiles.index(column[0]))
+    rows = sorted(rows, key=lambda row: rules.index(row[0]))
+    parts = []
+    for shown in (metrics[:DIFFERENCES], metrics[DIFFERENCES:]):
+        lines = [["rule", "method"] + [f"{profile}: {scene}" for profile, scene in columns]]
+        lines.append(["---"] * len(lines[0]))
+        for rule, method in rows:
+            line = [rule or "as it is", f"`{method}`"]
+            for profile, scene in columns:
+                means = cells.get((rule, method, profile, scene))
+                line.append("" if means is None else " / ".join(
+                    cell_text(results, means[metric], metric, interval=False) for metric in shown))
+            lines.append(line)
+        words = " / ".join(title_of(results, metric) for metric in shown)
+        parts.append(f"{words[0].upper()}{words[1:]}:\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines))
+    return "\n".join(parts)

@@ -119,7 +119,8 @@ KINDS = {
     "least": least,
     "tracks": tracks,
     "comparison": experiment(experiment_text.comparison_of),
-    "conditions": experiment(experiment_text.table_of),
+    "scenes": experiment(experiment_text.scenes_of),
+    "rules": experiment(experiment_text.rules_of),
 }
 
 
