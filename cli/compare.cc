@@ -135,6 +135,11 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   const auto show = [&](int done, int total) { bar.Show(done, total); };
   TSDFPP_ASSIGN(const CompareResult result,
                 RunCompare(*source, config, options.out, command, show));
+  for (const auto& run : result.runs) {
+    for (const std::string& remark : run->pipeline.Remarks()) {
+      spdlog::warn("{}: {}", run->Title(), remark);
+    }
+  }
   return CommandResult{
       SummaryJson(result, command),
       FrontTable(result) + "\n" + SummaryTable(result) +

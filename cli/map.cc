@@ -116,7 +116,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
         return DataError("{}: frame {} has no mask and frame {} has one, expected masks for all",
                          options.source.path, index, info.first_index);
       }
-      times.Add(pipeline.Process(frame));
+      TSDFPP_ASSIGN(const StepTimes step, pipeline.Process(frame));
+      times.Add(step);
       T_WC = frame.T_WC;
       bar.Show(index - start.first + 1, frames);
     }
@@ -126,6 +127,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
                  options.source.path);
   }
+  const std::vector<std::string> remarks = pipeline.Remarks();
+  for (const std::string& remark : remarks) spdlog::warn("{}: {}", info.name, remark);
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
   TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out, mesh_format));
@@ -152,6 +155,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     stats["segmentation"] = "none";
     stats["remarks"] = {start.mask_remark};
   }
+  for (const std::string& remark : remarks) stats["remarks"].push_back(remark);
   if (!options.load.empty()) stats["loaded"] = options.load;
   if (!options.save.empty()) {
     const MappedRun run = RunOf(start, start.last);

@@ -191,7 +191,9 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     if (recorder) recorder->SeeFrame(true_frame ? *true_frame : frame);
     for (const auto& run : result.runs) {
       const std::int64_t before = ResidentBytes();
-      run->times.Add(run->pipeline.Process(frame));
+      const auto step = run->pipeline.Process(frame);
+      if (!step) return DataError("{}: {}", run->Title(), step.error().message);
+      run->times.Add(*step);
       run->process_growth_bytes += ResidentBytes() - before;
       if (recorder) recorder->SeeMap(*run);
       if (!evaluate) continue;

@@ -186,7 +186,11 @@ std::string Headline(const CompareResult& result) {
 
 nlohmann::json SummaryJson(const CompareResult& result, const std::string& command) {
   nlohmann::json runs = nlohmann::json::array();
-  for (const auto& run : result.runs) runs.push_back(RunJson(result, *run));
+  for (const auto& run : result.runs) {
+    runs.push_back(RunJson(result, *run));
+    const std::vector<std::string> remarks = run->pipeline.Remarks();
+    if (!remarks.empty()) runs.back()["remarks"] = remarks;
+  }
   nlohmann::json summary{{"schema", 1},
                          {"generator", "tsdfpp"},
                          {"version", TSDFPP_VERSION},

@@ -124,7 +124,7 @@ Expected<Seen> MapAgain(const ExperimentConfig& config, const CellSettings& sett
     if (index > last) break;
     TSDFPP_ASSIGN(VariantFrame both, source.Read(index));
     TSDFPP_RETURN_IF_ERROR(seen.truth->Observe(both.truth));
-    mapper.Process(both.frame);
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
     seen.frame = std::move(both.frame);
   }
   seen.movers = MoversNow(source.info(), *seen.truth);

@@ -165,7 +165,7 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   for (int i = 0; i < total; ++i) {
     const int index = variant.frames[static_cast<std::size_t>(i)];
     TSDFPP_ASSIGN(both, source.Read(index));
-    mapper.Process(both.frame);
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
     ++result.frames;
     if (index == result.compared_map_frame || index == options.frame) {
       scene = mapper.Meshes({}).scene;

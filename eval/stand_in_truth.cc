@@ -101,7 +101,11 @@ Expected<std::vector<TrueModel>> ReconstructTruth(
                   source.IsSensed() ? source.ReadTrue(index) : source.Read(index));
     if (frame.mask.empty()) return DataError("{}: frame {} has no mask", info.name, index);
     for (Alone& object : objects) {
-      if (const auto only = OnlyOf(frame, object.info)) object.pipeline->Process(*only);
+      if (const auto only = OnlyOf(frame, object.info)) {
+        const auto step = object.pipeline->Process(*only);
+        if (!step)
+          return DataError("{}: {}: {}", info.name, object.info.name, step.error().message);
+      }
     }
     if (progress) progress(i + 1, info.frame_count);
   }

@@ -43,7 +43,7 @@ std::string RunToBytes(const MappedRun& run) {
   return bytes;
 }
 
-Expected<MappedRun> RunFromBytes(std::string_view all) {
+Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range) {
   ByteReader bytes(all);
   MappedRun run;
   run.sequence = GetText(bytes);
@@ -63,7 +63,7 @@ Expected<MappedRun> RunFromBytes(std::string_view all) {
     const auto count = bytes.Get<std::uint32_t>();
     for (std::uint32_t k = 0; k < count && bytes.ok(); ++k) {
       const auto frame = bytes.Get<std::int32_t>();
-      TSDFPP_ASSIGN(poses[frame], LoadPose(bytes));
+      TSDFPP_ASSIGN(poses[frame], LoadPose(bytes, range));
     }
   }
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
@@ -131,7 +131,7 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
   const auto settings = SettingsFromText(*settings_text);
   if (!settings) return tl::unexpected(InSection(where, kConfigSection, settings.error()));
   if (const auto run_bytes = take(kRunSection)) {
-    auto run = RunFromBytes(*run_bytes);
+    auto run = RunFromBytes(*run_bytes, LatticeRange(settings->config.voxel_m));
     if (!run) return tl::unexpected(InSection(where, kRunSection, run.error()));
     loaded.run = std::move(*run);
   }

@@ -72,6 +72,8 @@ class CofusionSource : public FrameSource {
         return DataError("{}: the intrinsics differ from those in {}",
                          (folder_ / cofusion::kSequence).string(), cofusion::kCalibration);
       }
+      TSDFPP_RETURN_IF_ERROR(
+          CheckPossibleCamera(record.info.intrinsics, (folder_ / cofusion::kSequence).string()));
       return Adopt(record);
     }
     info_.name = fs::absolute(folder_ / "").lexically_normal().parent_path().filename().string();
