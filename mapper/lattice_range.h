@@ -3,20 +3,21 @@
 // Blocks are found by indices of 21 bits an axis (PackIndex). Content is kept to kFurthestBlock,
 // which leaves a margin that neighbours, boxes with margins and rounding never use up, so that no
 // index wraps and none is dropped:
-//  - Pipeline::Process, MapRepresentation::Add and the reader of map files refuse with a sentence
-//    what would lie further out, before they change anything; Fuse aborts, as it does for images of
-//    wrong sizes, and BlockGrid::Add aborts beyond kFurthestStored.
-//  - Therefore out of reach: wrapped keys in BlocksAlongRays, in GridMesh (its neighbours are
-//  packed
-//    as they are) and in FindRims; casts of coordinates to int in FloorOf, MovedBox, NearestAlong,
-//    FindLookUps, the look-ups of rays and BlocksTouchedBy, whose points are at most 4 ranges from
+//  - Pipeline::Process and MapRepresentation::Add refuse with a sentence what would lie further
+//    out, and leave the map as it was; so does the reader of map files. Fuse aborts, as it does for
+//    images of wrong sizes, and BlockGrid::Add aborts beyond kFurthestStored.
+//  - Therefore out of reach: wrapped keys in BlocksAlongRays, and in GridMesh, where neighbours are
+//    packed as they are; casts of coordinates to int in FloorOf, FindRims, MovedBox, NearestAlong,
+//    FindLookUps, the look-ups of rays and BlocksTouchedBy, whose points are at most 6 ranges from
 //    a lattice's origin, 2^26 voxels; the aborts of PullBackPoints and FrameView.
-//  - Right at the edge by themselves, as they are asked about places without content: PartsIn, the
-//    directory of blocks, MapQuery and VolumesMap::ListAt (nothing is there).
+//  - Right at the edge by themselves, because they are asked about places without content: PartsIn,
+//    the directory of blocks, MapQuery and VolumesMap::ListAt.
 #pragma once
 
 #include <Eigen/Geometry>
+#include <map>
 #include <string>
+#include <string_view>
 
 #include "core/error.h"
 #include "mapper/map_representation.h"
