@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/files.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace {
@@ -186,6 +187,7 @@ Expected<Header> ParseHeader(const std::string& file, const std::string& bytes) 
         if (index != header.regions.size()) {
           return DataError("{}: region comments are not numbered 0, 1, ...", file);
         }
+        TSDFPP_RETURN_IF_ERROR(CheckLabel(name, fmt::format("{}: region {}", file, index)));
         header.regions.push_back(name);
       }
     } else if (word == "element") {

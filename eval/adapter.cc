@@ -7,7 +7,10 @@
 #include <cmath>
 
 #include "core/files.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 #include "core/toml_reader.h"
+#include "eval/compare_names.h"
 #include "sequence/cofusion_writer.h"
 #include "sequence/export.h"
 
@@ -49,7 +52,16 @@ std::string Joined(const auto& numbers) { return fmt::format("{}", fmt::join(num
 
 Expected<void> AdapterConfig::Validate() const {
   if (name.empty() || name.find_first_of("/\\ \t\n,") != std::string::npos || name.front() == '.') {
-    return UsageError("name is '{}', expected a word without blanks, commas and slashes", name);
+    return UsageError("name is {}, expected a word without blanks, commas and slashes",
+                      Quoted(name));
+  }
+  // Its files go to a folder of this name among the comparison's own.
+  if (const auto named = CheckPlainName(name, "name"); !named) {
+    return UsageError("{}", named.error().message);
+  }
+  if (IsCompareName(name)) {
+    return UsageError("name is {}, which tsdfpp compare gives to a file or folder of its own",
+                      Quoted(name));
   }
   if (command.empty()) return UsageError("command is empty, expected a program and its arguments");
   if (layout != DatasetFormat::kCofusion && layout != DatasetFormat::kTum &&

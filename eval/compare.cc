@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "core/files.h"
+#include "eval/compare_names.h"
 #include "eval/compare_report.h"
 #include "eval/mesh_folder.h"
 #include "eval/pictures.h"
@@ -117,10 +118,7 @@ std::string CompareRun::Title() const {
 }
 
 std::string CompareRun::FolderName() const {
-  std::string name =
-      fmt::format("{}_{}_{}", MethodName(config.method), profile, PoseSourceName(config.poses));
-  std::replace(name.begin(), name.end(), '/', '-');
-  return name;
+  return RunFolderName(config.method, profile, config.poses);
 }
 
 bool IsEvaluated(const CompareResult& result, int frame) {

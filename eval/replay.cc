@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "eval/cell_run.h"
 #include "eval/map_slice.h"
@@ -62,6 +63,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     }
     Recorded recorded;
     TSDFPP_ASSIGN(recorded.id, FindCell(results->at("cells"), options.cell, where));
+    TSDFPP_RETURN_IF_ERROR(CheckPlainName(recorded.id, where + ": a cell"));
     const json& cell = results->at("cells").at(recorded.id);
     TSDFPP_ASSIGN(recorded.settings, SettingsFromJson(cell.at("settings")));
     const json& sequence = results->at("sequences").at(cell.at("sequence").get<std::string>());

@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "eval/recording.h"
 #include "eval/report_record.h"
 
@@ -151,6 +152,9 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   std::vector<Panel> panels{{"camera", "colour"}, {"objects", "mask"}, {"", ""}};
   for (const nlohmann::json& each : recording->json["runs"]) {
     panels.push_back({TitleOf(each), each["folder"].get<std::string>()});
+    // Part of the stills' file names.
+    TSDFPP_RETURN_IF_ERROR(
+        CheckPlainName(panels.back().still, fmt::format("'{}': a map's folder", run.string())));
   }
   const auto read = [&](int frame) -> Expected<std::vector<cv::Mat>> {
     std::vector<cv::Mat> images;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/bop_instances.h"
 #include "sequence/bop_layout.h"
@@ -86,7 +87,11 @@ class BopOpener {
           fmt::format("{}: no {}, objects are not known", sequence_.name, bop::kTruth));
     }
     if (options_.check) TSDFPP_RETURN_IF_ERROR(CheckObjectPoses());
-    objects_ = bop::AssignIds(images_);
+    auto objects = bop::AssignIds(images_);
+    if (!objects) {
+      return DataError("{}: {}", (scene_ / bop::kTruth).string(), objects.error().message);
+    }
+    objects_ = std::move(*objects);
     TSDFPP_RETURN_IF_ERROR(SetObjects());
     TSDFPP_RETURN_IF_ERROR(SetMasks());
     sequence_.truth = [objects = objects_, dataset = dataset_](const SequenceInfo& info) {
@@ -150,6 +155,10 @@ class BopOpener {
       const std::string where = fmt::format("{}: image {}", path.string(), number);
       if (image == images_.end()) return DataError("{} is not in {}", where, bop::kCamera);
       if (!list.is_array()) return DataError("{}: not a list of objects", where);
+      if (list.size() > bop::kMostInstances) {
+        return DataError("{}: lists {} objects, expected {} at most", where, list.size(),
+                         bop::kMostInstances);
+      }
       int place = 0;
       for (const nlohmann::json& json : list) {
         const std::string entry = fmt::format("{}, object {}", where, place);
@@ -219,6 +228,9 @@ class BopOpener {
         semantic_class = model->contains("class") && model->at("class").is_string()
                              ? model->at("class").get<std::string>()
                              : semantic_class;
+        const std::string what = fmt::format("{}: object {}", path.string(), obj_id);
+        TSDFPP_RETURN_IF_ERROR(CheckPlainName(name, what));
+        TSDFPP_RETURN_IF_ERROR(CheckLabel(semantic_class, what + ": the class"));
       }
       const int nth = ++instances[obj_id];
       if (nth > 1) name += fmt::format("_{}", nth);

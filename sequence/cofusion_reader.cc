@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/calibration.h"
 #include "sequence/cofusion_layout.h"
@@ -86,7 +87,7 @@ class CofusionSource : public FrameSource {
     TSDFPP_RETURN_IF_ERROR(
         CheckCamera(info_.intrinsics, (folder_ / cofusion::kCalibration).string()));
     NameObjects();
-    return {};
+    return CheckObjects(info_.objects, folder_.string());
   }
 
   const SequenceInfo& info() const override { return info_; }
@@ -187,6 +188,7 @@ class CofusionSource : public FrameSource {
             path.string());
       }
       if (object->id == kBackground && object->name == "cam") continue;
+      TSDFPP_RETURN_IF_ERROR(CheckPlainName(object->name, path.string()));
       TSDFPP_ASSIGN(Trajectory trajectory, ReadTrajectory(path));
       if (!objects_.emplace(object->id, std::move(trajectory)).second) {
         return DataError("{}: a second trajectory of object {}", path.string(), object->id);

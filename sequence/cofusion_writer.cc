@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/image_files.h"
@@ -82,10 +83,8 @@ Expected<void> CheckObjectsFit(const std::vector<ObjectInfo>& objects) {
       return UsageError("object '{}': id {}, a Co-Fusion mask holds 0 to {}", object.name,
                         object.id, cofusion::kMaxId);
     }
-    if (object.name.empty() ||
-        object.name.find_first_of(std::string("/\n\0", 3)) != object.name.npos) {
-      return UsageError("object {}: the name '{}' cannot be part of a file name", object.id,
-                        object.name);
+    if (auto named = CheckPlainName(object.name, fmt::format("object {}", object.id)); !named) {
+      return UsageError("{}", named.error().message);
     }
     if (object.id == kBackground && object.name == "cam") {
       return UsageError("object 0: the name 'cam' is the camera's in a Co-Fusion set");

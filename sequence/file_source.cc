@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/plain_name.h"
 #include "sequence/image_files.h"
 #include "sequence/integer_images.h"
 #include "sequence/plausibility.h"
@@ -227,6 +228,7 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
   if (sequence.objects.empty()) sequence.objects = NamedByIds(IdsIn(sequence));
   info.objects.push_back({kBackground, "background", "background"});
   for (const ObjectInfo& object : sequence.objects) info.objects.push_back(object);
+  TSDFPP_RETURN_IF_ERROR(CheckObjects(info.objects, sequence.name));
   if (!sequence.has_masks) notes.push_back(fmt::format("{}: no masks", sequence.name));
   return std::make_unique<FileSource>(std::move(sequence), std::move(info));
 }

@@ -179,6 +179,7 @@ class KlgSource : public DatasetSource {
     }
     ids.erase(kBackground);
     ids.erase(kNoInstance);
+    ids.erase(kNoInstance);
     return {ids.begin(), ids.end()};
   }
 

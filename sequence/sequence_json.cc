@@ -4,6 +4,8 @@
 #include <stdexcept>
 
 #include "core/files.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace {
@@ -109,7 +111,7 @@ std::string SequenceToJson(const SequenceRecord& record) {
   json["schema_version"] = kSchemaVersion;
   json["generator"] = kGenerator;
   json["version"] = generator.version;
-  json["scene"] = info.name;
+  json["scene"] = OneLine(info.name, kMostNameBytes);  // which the reader takes
   json["seed"] = generator.seed ? Json(*generator.seed) : Json(nullptr);
   json["intrinsics"] = {{"width", info.intrinsics.width}, {"height", info.intrinsics.height},
                         {"fx", info.intrinsics.fx},       {"fy", info.intrinsics.fy},
@@ -157,6 +159,8 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
       return DataError("{}: expected rate_hz and frame_count over 0 and first_index 0 or more",
                        file);
     }
+    TSDFPP_RETURN_IF_ERROR(CheckLabel(record.info.name, file + ": 'scene'"));
+    TSDFPP_RETURN_IF_ERROR(CheckObjects(record.info.objects, file));
     return record;
   } catch (const std::exception& exception) {
     return DataError("{}: a field is missing or of another type ({})", file, exception.what());

@@ -103,6 +103,30 @@ TEST_P(MapFile, ARunComesBack) {
   EXPECT_FALSE(Loaded(MapToBytes(*loaded.map)).run.has_value());
 }
 
+// Names become file names of what is written; the checksums of such a file are right.
+TEST(MapFileNames, ObjectsWithNamesThatEscapeAreRefused) {
+  const auto map = MakeMap(Method::kTsdf, ToyConfig());
+  const auto sentence = [&](const std::vector<ObjectInfo>& objects) {
+    MappedRun run = SomeRun();
+    run.objects = objects;
+    const auto loaded = MapFromBytes(MapToBytes(*map, &run), "map.tsdf");
+    return loaded ? std::string() : loaded.error().message;
+  };
+  EXPECT_EQ(sentence({{1, "brick", "toy"}}), "");
+  const std::string begin = "map.tsdf: section 'RUN ' is wrong: its list: object ";
+  EXPECT_EQ(
+      sentence({{1, "../../pwned", ""}}),
+      begin + "1: the name '../../pwned' holds a slash, expected one that can be a file's name");
+  for (const std::string& name :
+       {std::string(), std::string(".."), std::string("/x"), std::string("a\nb"),
+        std::string("\xff"), std::string("a\0b", 3), std::string(300, 'n')}) {
+    EXPECT_TRUE(sentence({{1, name, ""}}).starts_with(begin)) << name;
+  }
+  EXPECT_EQ(sentence({{1, "a", ""}, {1, "b", ""}}), begin + "1: its id is there twice");
+  EXPECT_EQ(sentence({{kNoInstance, "a", ""}}),
+            begin + "65535: the id 65535 stands for no object, expected one below");
+}
+
 // Every byte of a file is under a checksum, so a file that differs in one is refused.
 TEST_P(MapFile, EveryFlippedByteIsRefused) {
   const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1));

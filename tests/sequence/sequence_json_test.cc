@@ -80,5 +80,29 @@ TEST(SequenceJson, BadFilesAreNamed) {
   }
 }
 
+// Names become file names of what map and compare write.
+TEST(SequenceJson, NamesThatEscapeAreRefused) {
+  for (const auto& [name, fault] : {std::pair("../../../pwned", "holds a slash"),
+                                    {"/tmp/pwned", "holds a slash"},
+                                    {"..", "begins with a dot or a dash"},
+                                    {"", "is empty"},
+                                    {"a\\nb", "holds a control character"},
+                                    {"a\\u0001", "holds a control character"},
+                                    {"NUL", "is the name of a device"}}) {
+    const std::string sentence =
+        SentenceAfter("\"name\": \"car\"", fmt::format("\"name\": \"{}\"", name));
+    EXPECT_TRUE(sentence.starts_with("object 1: the name '")) << sentence;
+    EXPECT_NE(sentence.find(fault), std::string::npos) << sentence;
+    EXPECT_EQ(sentence.find('\n'), std::string::npos) << sentence;
+  }
+  const std::string long_name(300, 'n');
+  EXPECT_NE(SentenceAfter("\"name\": \"car\"", "\"name\": \"" + long_name + "\"")
+                .find("is longer than 100 bytes"),
+            std::string::npos);
+  EXPECT_EQ(SentenceAfter("\"id\": 1", "\"id\": 0"), "object 0: its id is there twice");
+  EXPECT_EQ(SentenceAfter("\"name\": \"car\"", "\"name\": \"background\""),
+            "object 1: its name 'background' is another object's too");
+}
+
 }  // namespace
 }  // namespace tsdfpp
