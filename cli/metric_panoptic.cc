@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "cli/metric.h"
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "eval/evaluation.h"
 #include "eval/label_image.h"
@@ -85,6 +86,8 @@ struct Totals {
 
 Expected<void> AddCoco(const MetricPanopticArguments& options, const Annotations& truth,
                        const Annotations& prediction, Totals& totals) {
+  const DataFolder truth_folder(options.truth);
+  const DataFolder predicted_folder(options.prediction);
   for (const auto& [file, segments] : truth.by_file) {
     const std::string& id = truth.id_of_file.at(file);
     const auto partner = prediction.file_of_id.find(id);
@@ -92,9 +95,11 @@ Expected<void> AddCoco(const MetricPanopticArguments& options, const Annotations
       return DataError("{}: has no prediction for image {}", options.prediction_json, id);
     }
     PanopticImage images[2];
-    TSDFPP_ASSIGN(images[0].ids, ReadNumbers(fs::path(options.truth) / file, true));
+    TSDFPP_ASSIGN(const fs::path true_image, truth_folder.Find(file));
+    TSDFPP_ASSIGN(images[0].ids, ReadNumbers(true_image, true));
     images[0].segments = segments;
-    TSDFPP_ASSIGN(images[1].ids, ReadNumbers(fs::path(options.prediction) / partner->second, true));
+    TSDFPP_ASSIGN(const fs::path predicted_image, predicted_folder.Find(partner->second));
+    TSDFPP_ASSIGN(images[1].ids, ReadNumbers(predicted_image, true));
     images[1].segments = prediction.by_file.at(partner->second);
     for (const PanopticImage& image : images) {
       for (const PanopticSegment& segment : image.segments) {
@@ -307,6 +312,7 @@ Run AddMetricPanoptic(CLI::App& app) {
                  "and STQ, the images being one sequence in order of their names");
   app.add_option("--gt-json", options->truth_json, "Of coco; GT_DIR.json by default");
   app.add_option("--pred-json", options->prediction_json, "Of coco; PRED_DIR.json by default");
+  AddFollowLinks(app);
   return [options] { return RunPanoptic(*options); };
 }
 

@@ -39,6 +39,7 @@ Run AddVerify(CLI::App& app, const CommonOptions& common) {
       app.add_option("--share", options->share, "Share of the frames that are compared with rays")
           ->check(Between(0, 1))
           ->capture_default_str();
+  AddFollowLinks(app);
   app.add_flag("--all", options->all, "Compare all frames with rays")->excludes(share);
   return [options, &common] { return RunVerify(*options, common); };
 }

@@ -36,7 +36,7 @@ Expected<toml::table> ParseToml(std::string_view text, std::string_view name) {
 }
 
 Expected<toml::table> ParseTomlFile(const std::filesystem::path& path) {
-  auto text = ReadFile(path);
+  auto text = ReadFile(path, &Limits::text_bytes);
   if (!text) return UsageError("{}", text.error().message);
   return ParseToml(*text, path.string());
 }

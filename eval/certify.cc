@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "eval/file_check.h"
 #include "eval/visibility_truth.h"
@@ -18,6 +19,7 @@
 #include "sequence/cofusion_reader.h"
 #include "sim/ray_scene.h"
 #include "sim/scene_builder.h"
+#include "sim/scene_inputs.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -91,6 +93,19 @@ bool SameModel(const TrueModel& a, const TrueModel& b) {
   return a.mesh_O.vertices == b.mesh_O.vertices && a.mesh_O.triangles == b.mesh_O.triangles;
 }
 
+// This scene is data, not what its user wrote: its files are those of the sequence.
+Expected<void> CheckInside(const SceneConfig& config, const fs::path& folder) {
+  TSDFPP_ASSIGN(const SceneInputs inputs, CollectInputs(config));
+  const DataFolder data(folder);
+  std::error_code code;
+  const fs::path root = fs::absolute(folder, code).lexically_normal();
+  for (const auto& [place, file] : inputs.files) {
+    const std::string relative = file.lexically_normal().lexically_relative(root).string();
+    TSDFPP_ASSIGN(const fs::path found, data.Find(relative));
+  }
+  return {};
+}
+
 // Composes the scene again and compares what comes out with the models on disk.
 void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
                 CertifyResult& result) {
@@ -99,8 +114,10 @@ void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
     return;
   }
   const auto config = LoadSceneConfig(folder / cofusion::kScene);
-  auto scene = config ? CompiledScene::Compile(*config)
-                      : Expected<CompiledScene>(tl::unexpected(config.error()));
+  const auto inside =
+      config ? CheckInside(*config, folder) : Expected<void>(tl::unexpected(config.error()));
+  auto scene = inside ? CompiledScene::Compile(*config)
+                      : Expected<CompiledScene>(tl::unexpected(inside.error()));
   if (!scene) {
     result.findings.push_back({"scene", cofusion::kScene, -1,
                                "the scene cannot be composed again: " + scene.error().message});
@@ -249,6 +266,7 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
     return DataError("{}: holds no {}, expected a sequence that tsdfpp generate made",
                      folder.string(), cofusion::kSequence);
   }
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   TSDFPP_ASSIGN(const SequenceRecord record, ReadSequenceJson(folder / cofusion::kSequence));
   CertifyResult result;
   result.sequence = record.info.name;

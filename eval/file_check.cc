@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "core/files.h"
+#include "core/data_folder.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/trajectory_file.h"
 
@@ -23,11 +23,13 @@ std::vector<Finding> CheckFiles(const fs::path& folder, const SequenceRecord& re
   const std::vector<std::pair<std::string, std::string>> listed(record.hashes.begin(),
                                                                 record.hashes.end());
   std::vector<std::string> wrong(listed.size());
+  const DataFolder data(folder);
   tbb::parallel_for(std::size_t{0}, listed.size(), [&](std::size_t i) {
     const auto& [file, hash] = listed[i];
-    const auto bytes = ReadFile(folder / file);
+    const auto bytes = data.Read(file);
     if (!bytes) {
-      wrong[i] = "is listed in sequence.json and cannot be read";
+      wrong[i] =
+          fmt::format("is listed in sequence.json and cannot be read ({})", bytes.error().message);
     } else if (const std::string found = HashText(*bytes); found != hash) {
       wrong[i] =
           fmt::format("its hash is {}, sequence.json says {}: the file was changed", found, hash);

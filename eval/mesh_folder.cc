@@ -6,6 +6,7 @@
 #include <charconv>
 #include <optional>
 
+#include "core/data_folder.h"
 #include "core/ply.h"
 #include "eval/surface_file.h"
 #include "metrics/mesh_tools.h"
@@ -145,6 +146,7 @@ ScenePart PartOfName(const std::string& stem) {
 }
 
 Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alone, double scale) {
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(given));
   TSDFPP_ASSIGN(const fs::path folder, FolderOf(given, frame, alone));
   std::vector<fs::path> scenes;
   std::vector<fs::path> others;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
@@ -67,7 +68,8 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     const json& cell = results->at("cells").at(recorded.id);
     TSDFPP_ASSIGN(recorded.settings, SettingsFromJson(cell.at("settings")));
     const json& sequence = results->at("sequences").at(cell.at("sequence").get<std::string>());
-    const fs::path scene = folder / sequence.at("scene").get<std::string>();
+    TSDFPP_ASSIGN(const fs::path scene,
+                  DataFolder(folder).Find(sequence.at("scene").get<std::string>()));
     SequenceVariant& variant = recorded.variant;
     TSDFPP_ASSIGN(variant.scene_text, ReadFile(scene));
     TSDFPP_ASSIGN(variant.scene,

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "eval/base64.h"
 #include "eval/recording.h"
@@ -93,6 +94,7 @@ Expected<void> AddPictures(Comparison& comparison) {
 }
 
 Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   Comparison comparison;
   comparison.folder = folder;
   const std::filesystem::path path = folder / "summary.json";

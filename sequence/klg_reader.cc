@@ -3,6 +3,7 @@
 #include <fstream>
 #include <set>
 
+#include "core/files.h"
 #include "sequence/calibration.h"
 #include "sequence/dataset_readers.h"
 #include "sequence/image_files.h"
@@ -24,6 +25,7 @@ class KlgSource : public DatasetSource {
  public:
   Expected<void> Open(const fs::path& file, const SequenceOptions& options, SequenceNotes& notes) {
     file_ = file;
+    TSDFPP_RETURN_IF_ERROR(CheckRegularFile(file));
     in_.open(file, std::ios::binary);
     TSDFPP_ASSIGN(KlgIndex index, ReadKlgIndex(file));
     if (index.bytes_after > 0) {

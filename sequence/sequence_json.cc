@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "core/one_line.h"
 #include "core/plain_name.h"
@@ -161,6 +162,9 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
     }
     TSDFPP_RETURN_IF_ERROR(CheckLabel(record.info.name, file + ": 'scene'"));
     TSDFPP_RETURN_IF_ERROR(CheckObjects(record.info.objects, file));
+    for (const auto& [listed, hash] : record.hashes) {
+      TSDFPP_RETURN_IF_ERROR(CheckRelativePath(listed, file + ": 'fnv1a64'"));
+    }
     return record;
   } catch (const std::exception& exception) {
     return DataError("{}: a field is missing or of another type ({})", file, exception.what());

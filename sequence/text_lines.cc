@@ -9,7 +9,7 @@ namespace tsdfpp {
 namespace fs = std::filesystem;
 
 Expected<std::vector<TextLine>> ReadTextLines(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::text_bytes));
   constexpr std::string_view kBlanks = " \t\r,";
   std::vector<TextLine> lines;
   std::string_view rest = text;

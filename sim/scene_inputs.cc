@@ -29,10 +29,10 @@ Expected<std::vector<fs::path>> Companions(const fs::path& mesh) {
   for (const Companion& companion : raw.companions) {
     std::error_code code;
     if (!fs::is_regular_file(companion.path, code)) continue;
-    if (fs::path(companion.name).is_absolute() || !IsText(companion.name)) {
+    if (!companion.inside || !IsText(companion.name)) {
       spdlog::warn(
-          "{}: refers to '{}', which a sequence cannot take along: rendered again elsewhere, the "
-          "mesh will lack it; expected a relative path in UTF-8",
+          "{}: refers to '{}', which a sequence cannot take along: the mesh lacks it; expected a "
+          "relative path in UTF-8 inside the folder above the mesh's",
           mesh.string(), companion.name);
       continue;
     }

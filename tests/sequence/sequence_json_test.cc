@@ -80,6 +80,20 @@ TEST(SequenceJson, BadFilesAreNamed) {
   }
 }
 
+// The list is read file by file when the sequence is verified.
+TEST(SequenceJson, ListedFilesAreInside) {
+  for (const auto& [file, fault] : {std::pair("/dev/zero", "is absolute"),
+                                    {"../../etc/passwd", "holds '..'"},
+                                    {"models/../../x", "holds '..'"},
+                                    {"", "is empty"}}) {
+    const std::string sentence =
+        SentenceAfter("\"colour/Color0001.png\"", fmt::format("\"{}\"", file));
+    EXPECT_EQ(sentence, fmt::format("'fnv1a64': the path '{}' {}, expected one inside the data's "
+                                    "folder",
+                                    file, fault));
+  }
+}
+
 // Names become file names of what map and compare write.
 TEST(SequenceJson, NamesThatEscapeAreRefused) {
   for (const auto& [name, fault] : {std::pair("../../../pwned", "holds a slash"),
