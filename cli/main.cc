@@ -9,6 +9,7 @@
 
 #include "cli/command.h"
 #include "cli/report.h"
+#include "core/json_text.h"
 
 namespace {
 
@@ -73,7 +74,7 @@ int RunCommand(int argc, char** argv) {
     std::fprintf(stderr, "tsdfpp: %s\n", result.error().message.c_str());
     return static_cast<int>(result.error().kind);
   }
-  const std::string text = common.json ? result->json.dump(2) + "\n" : result->text;
+  const std::string text = common.json ? tsdfpp::JsonText(result->json, 2) + "\n" : result->text;
   std::fputs(text.c_str(), stdout);
   return std::fflush(stdout) == 0 ? result->exit_code : static_cast<int>(ErrorKind::kEnvironment);
 }

@@ -2,11 +2,13 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
+#include <stdexcept>
 
 #include "cli/metric.h"
 #include "core/data_folder.h"
-#include "core/files.h"
+#include "core/json_text.h"
 #include "eval/evaluation.h"
 #include "eval/label_image.h"
 #include "metrics/segmentation.h"
@@ -51,25 +53,32 @@ struct Annotations {
   std::map<int, bool> is_thing;  // by category
 };
 
+// Throws where it is none: nlohmann's own conversion wraps what does not fit.
+int IdOf(const nlohmann::json& json) {
+  const auto id = WholeIn(json, 0, std::numeric_limits<int>::max());
+  if (!id) throw std::out_of_range(fmt::format("{} is no id", JsonShown(json)));
+  return static_cast<int>(*id);
+}
+
 Expected<Annotations> ReadAnnotations(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   Annotations out;
   try {
-    const auto json = nlohmann::json::parse(text);
     for (const auto& category : json.value("categories", nlohmann::json::array())) {
-      out.is_thing[category.at("id")] = category.value("isthing", 1) == 1;
+      out.is_thing[IdOf(category.at("id"))] = category.value("isthing", 1) == 1;
     }
     for (const auto& annotation : json.at("annotations")) {
       const std::string file = annotation.at("file_name");
-      const std::string id = annotation.at("image_id").dump();
+      const std::string id = JsonText(annotation.at("image_id"));
       std::vector<PanopticSegment>& segments = out.by_file[file];
       out.id_of_file[file] = id;
       out.file_of_id[id] = file;
       for (const auto& info : annotation.at("segments_info")) {
-        segments.push_back({info.at("id"), info.at("category_id"), info.value("iscrowd", 0) == 1});
+        segments.push_back(
+            {IdOf(info.at("id")), IdOf(info.at("category_id")), info.value("iscrowd", 0) == 1});
       }
     }
-  } catch (const nlohmann::json::exception& error) {
+  } catch (const std::exception& error) {
     return DataError("{}: is no panoptic JSON as COCO's: {}", path.string(), error.what());
   }
   if (out.by_file.empty()) return DataError("{}: has no annotations", path.string());

@@ -6,6 +6,7 @@
 #include "core/gltf.h"
 #include "core/gltf_document.h"
 #include "core/gltf_format.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -285,7 +286,7 @@ Expected<std::vector<NamedMesh>> GlbReader::Read(std::string bytes) {
   if (required != document_.root().end() && required->is_array() && !required->empty()) {
     const json& name = (*required)[0];
     return DataError("{}: it requires the extension {}, which is not understood", file(),
-                     name.dump(-1, ' ', false, json::error_handler_t::replace));
+                     JsonShown(name));
   }
   const auto nodes = document_.root().find("nodes");
   const std::size_t node_count =

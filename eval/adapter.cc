@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/one_line.h"
 #include "core/plain_name.h"
 #include "core/toml_reader.h"
@@ -194,12 +195,14 @@ Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task, const fs::pa
       {run.config.time_limit_s, static_cast<std::int64_t>(kBytes * run.config.memory_limit_mb)});
   run.failure = run.outcome.failure;
   if (run.failure || !fs::exists(out / kTiming, ignored)) return {};
-  const std::string text = ReadFile(out / kTiming).value_or("");
-  run.timing = nlohmann::json::parse(text, nullptr, false);
-  if (run.timing.is_discarded()) {
-    run.timing = nullptr;
-    run.failure = Error{ErrorKind::kData, fmt::format("{}: {} is no JSON", run.config.name,
-                                                      (out / kTiming).string())};
+  const auto text = ReadFile(out / kTiming, &Limits::json_bytes);
+  auto timing = text ? ParseJson(*text, (out / kTiming).string())
+                     : Expected<nlohmann::json>(tl::unexpected(text.error()));
+  if (timing) {
+    run.timing = std::move(*timing);
+  } else {
+    run.failure =
+        Error{timing.error().kind, fmt::format("{}: {}", run.config.name, timing.error().message)};
   }
   return {};
 }

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/sweep_metrics.h"
 #include "sequence/sequence_json.h"
 #include "sim/scene_builder.h"
@@ -203,18 +204,16 @@ json BenchResultJson(const BenchSet& set, const SweepResult& result, const std::
 }
 
 Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(file));
   const std::string where = file.string();
-  const json root = json::parse(text, nullptr, false);
-  if (!root.is_object()) return DataError("{}: is not JSON", where);
+  TSDFPP_ASSIGN(const json root, ReadJsonObject(file));
   if (root.value("kind", json()) != "tsdfpp bench result" ||
       root.value("schema", json()) != kBenchResultSchema) {
     return DataError("{}: is no benchmark result of schema {}", where, kBenchResultSchema);
   }
   if (root.value("bench_set", json()) != set.name || root.value("bench_hash", json()) != set.hash) {
     return DataError("{}: is of benchmark {} with hash {}, expected {} with {}", where,
-                     root.value("bench_set", json()).dump(),
-                     root.value("bench_hash", json()).dump(), set.name, set.hash);
+                     JsonShown(root.value("bench_set", json())),
+                     JsonShown(root.value("bench_hash", json())), set.name, set.hash);
   }
   BenchResult result;
   result.file = file.filename().string();
@@ -230,7 +229,7 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
     for (const json& entry : root.at("entries")) {
       auto& scores = result.scores[entry.at("sequence").get<std::string>()];
       if (!scores.empty()) {
-        return DataError("{}: sequence {} is there twice", where, entry.at("sequence").dump());
+        return DataError("{}: sequence {} is there twice", where, JsonShown(entry.at("sequence")));
       }
       for (const auto& [name, value] : entry.at("scores").items()) {
         scores[name] = value.is_number() ? Measured::Of(value.get<double>())

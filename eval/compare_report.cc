@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/base64.h"
 #include "eval/compare_tables.h"
 #include "eval/evaluation_columns.h"
@@ -220,7 +221,7 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
 Expected<void> WriteSummary(const CompareResult& result, const std::string& command,
                             const std::filesystem::path& out) {
   TSDFPP_RETURN_IF_ERROR(
-      WriteFile(out / "summary.json", SummaryJson(result, command).dump(1) + "\n"));
+      WriteFile(out / "summary.json", JsonText(SummaryJson(result, command), 1) + "\n"));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "frames.csv", Csv(result)));
   return WriteFile(out / "table.txt",
                    FrontTable(result) + "\n" + SummaryTable(result, Times::kLeftOut));

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/pose_text.h"
 
 namespace tsdfpp {
@@ -26,7 +27,7 @@ std::string ToJson(const JournalEntry& entry) {
   json["hashes"] = frame.hashes;
   json["visibility"] = entry.visibility;
   json["segments"] = entry.segments;
-  return json.dump() + "\n";
+  return JsonText(json) + "\n";
 }
 
 // Throws what nlohmann throws, and std::exception for a pose that is none.
@@ -66,9 +67,9 @@ Expected<void> FrameJournal::Add(const JournalEntry& entry) const {
 
 Expected<JournalEntry> FrameJournal::Read(int index) const {
   const fs::path path = notes_ / fmt::format("{:04d}.json", index);
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   try {
-    return FromJson(nlohmann::json::parse(text));
+    return FromJson(json);
   } catch (const std::exception& exception) {
     return DataError("{}: not a frame's entry ({})", path.string(), exception.what());
   }

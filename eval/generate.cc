@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/frame_journal.h"
 #include "eval/visibility_truth.h"
 #include "eval/workers.h"
@@ -79,7 +80,7 @@ Expected<void> MakeFrames(const SceneConfig& scene, const RenderOptions& render,
                              {"renderer", gl.renderer},
                              {"version", gl.version},
                              {"sequence", SequenceToJson(record)}};
-  parent.Send(hello.dump());
+  parent.Send(JsonText(hello));
   TSDFPP_ASSIGN(const std::vector<TrueModel> models, source->Truth());
   std::optional<VisibilityTruth> visibility;
   while (const auto order = parent.Receive()) {
@@ -197,7 +198,7 @@ class Generator {
 
   // The first hello tells what was rendered before and can be kept.
   Expected<void> TakeHello(const std::string& line, bool first) {
-    const nlohmann::json hello = nlohmann::json::parse(line, nullptr, false);
+    TSDFPP_ASSIGN(const nlohmann::json hello, ParseJsonObject(line, "a worker process"));
     const GlInfo gl{hello.at("backend"), hello.at("platform"), hello.at("renderer"),
                     hello.at("version")};
     if (!first) {

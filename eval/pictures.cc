@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
+#include "core/limits.h"
 #include "eval/rasteriser.h"
 
 namespace tsdfpp {
@@ -128,8 +129,11 @@ cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, doubl
   }
   if (bounds.isEmpty()) return {};
   const auto pixel = static_cast<float>(pixel_m);
-  const int width = static_cast<int>(std::ceil(bounds.sizes().x() / pixel)) + 1;
-  const int height = static_cast<int>(std::ceil(bounds.sizes().y() / pixel)) + 1;
+  const Eigen::Vector2f sides = (bounds.sizes() / pixel).array().ceil();
+  const auto most = static_cast<float>(CurrentLimits().image_side - 1);
+  if (!(sides.maxCoeff() < most)) return {};  // no table that is looked at from above
+  const int width = static_cast<int>(sides.x()) + 1;
+  const int height = static_cast<int>(sides.y()) + 1;
   cv::Mat image(height, width, CV_8UC3, cv::Scalar(150, 150, 150));
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!on_top(i)) continue;

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -131,12 +132,10 @@ Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& fo
   const std::filesystem::path path = folder / "record" / "record.json";
   if (!std::filesystem::exists(path)) return std::nullopt;
   Recording recording;
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  recording.json = json::parse(text, nullptr, false);
-  if (!recording.json.is_object()) return DataError("{} is no JSON object", path.string());
+  TSDFPP_ASSIGN(recording.json, ReadJsonObject(path));
   if (recording.json.value("schema", json()) != 1) {
     return DataError("{}: schema is {}, expected 1", path.string(),
-                     recording.json.value("schema", json()).dump());
+                     JsonShown(recording.json.value("schema", json())));
   }
   TSDFPP_ASSIGN(recording.bytes, ReadFile(folder / "record" / "record.bin"));
   if (!HasForm(recording.json)) {
@@ -149,7 +148,7 @@ Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& fo
         range->second <= recording.bytes.size() - range->first) {
       return true;
     }
-    outside = place.dump();
+    outside = JsonShown(place);
     return false;
   });
   if (!outside.empty()) {

@@ -4,6 +4,7 @@
 
 #include "core/data_folder.h"
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
 #include "eval/cell_run.h"
@@ -27,13 +28,6 @@ struct Recorded {
   json cell;  // its file
 };
 
-Expected<json> ReadResult(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  json parsed = json::parse(text, nullptr, false);
-  if (!parsed.is_object()) return DataError("{}: is not JSON", path.string());
-  return parsed;
-}
-
 Expected<std::string> FindCell(const json& cells, const std::string& wanted,
                                const std::string& where) {
   std::vector<std::string> found;
@@ -55,7 +49,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
       fs::is_directory(options.result, ignored) ? options.result / "results.json" : options.result;
   const std::string where = file.string();
   const fs::path folder = file.parent_path();
-  auto results = ReadResult(file);
+  auto results = ReadJsonObject(file);
   if (!results) return UsageError("{}, expected an experiment's folder", results.error().message);
   try {
     if (results->value("kind", "") != "tsdfpp experiment" ||
@@ -81,7 +75,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     variant.object_error = sequence.at("object_error");
     recorded.program = fmt::format("{}, {}", results->at("program").get<std::string>(),
                                    results->at("renderer").get<std::string>());
-    TSDFPP_ASSIGN(recorded.cell, ReadResult(folder / "cells" / (recorded.id + ".json")));
+    TSDFPP_ASSIGN(recorded.cell, ReadJsonObject(folder / "cells" / (recorded.id + ".json")));
     return recorded;
   } catch (const json::exception& error) {
     return DataError("{}: a field is missing or wrong ({})", where, error.what());
@@ -202,7 +196,7 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
                   {"program", ProgramIdentity()},
                   {"image_digest", result.image_digest},
                   {"map_digest", result.map_digest}};
-  TSDFPP_RETURN_IF_ERROR(WriteFile(options.out / "replay.json", note.dump(1) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(options.out / "replay.json", JsonText(note, 1) + "\n"));
   for (const auto& entry : fs::recursive_directory_iterator(options.out)) {
     if (entry.is_regular_file()) {
       result.files.push_back(entry.path().lexically_relative(options.out).string());

@@ -6,6 +6,7 @@
 
 #include "core/data_folder.h"
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/base64.h"
 #include "eval/recording.h"
 #include "eval/report_gates.h"
@@ -33,18 +34,11 @@ std::string NameOf(const std::filesystem::path& folder) {
   return whole.filename().string();
 }
 
-Expected<json> ReadJson(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  json parsed = json::parse(text, nullptr, false);
-  if (!parsed.is_object()) return DataError("{} is no JSON object", path.string());
-  return parsed;
-}
-
 // What the page reads of a summary without asking whether it is there.
 Expected<void> CheckSummary(const json& summary, const std::filesystem::path& path) {
   if (summary.value("schema", json()) != 1) {
     return DataError("{}: schema is {}, expected 1", path.string(),
-                     summary.value("schema", json()).dump());
+                     JsonShown(summary.value("schema", json())));
   }
   for (const char* name : {"sequence", "command", "version", "generator"}) {
     if (!summary.contains(name) || !summary[name].is_string()) {
@@ -102,7 +96,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
     return DataError("'{}' has no summary.json, expected a folder that tsdfpp compare wrote",
                      folder.string());
   }
-  TSDFPP_ASSIGN(comparison.summary, ReadJson(path));
+  TSDFPP_ASSIGN(comparison.summary, ReadJsonObject(path));
   TSDFPP_RETURN_IF_ERROR(CheckSummary(comparison.summary, path));
   TSDFPP_ASSIGN(comparison.csv, ReadFile(folder / "frames.csv"));
   if (!comparison.csv.starts_with("frame,method,profile,poses,")) {
@@ -126,7 +120,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
 // JSON that can stand inside <script>: no '<' can end it or begin a comment. Bytes that are no
 // UTF-8 become U+FFFD.
 std::string ScriptText(const json& value) {
-  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  const std::string text = JsonText(value);
   std::string safe;
   safe.reserve(text.size());
   for (const char c : text) {

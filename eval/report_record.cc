@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/pictures.h"
 #include "eval/record_images.h"
 #include "metrics/mesh_tools.h"
@@ -386,7 +387,7 @@ Expected<void> ReportRecorder::Write() {
                         {"stills", stills_},
                         {"runs", runs_}};
   TSDFPP_RETURN_IF_ERROR(WriteFile(out_ / "record" / "record.bin", bytes_));
-  return WriteFile(out_ / "record" / "record.json", record.dump() + "\n");
+  return WriteFile(out_ / "record" / "record.json", JsonText(record) + "\n");
 }
 
 }  // namespace tsdfpp

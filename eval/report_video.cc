@@ -3,11 +3,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "core/files.h"
+#include "core/decode_image.h"
+#include "core/json_text.h"
 #include "core/plain_name.h"
 #include "eval/recording.h"
 #include "eval/report_record.h"
@@ -94,11 +94,7 @@ class Film {
 };
 
 Expected<cv::Mat> ReadStill(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-  const std::vector<std::uint8_t> encoded(bytes.begin(), bytes.end());
-  cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
-  if (image.empty()) return DataError("{} is no image", path.string());
-  return image;
+  return ReadImageFile(path, DecodeAs::kColour);
 }
 
 cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
@@ -116,11 +112,12 @@ Expected<std::vector<cv::Mat>> AfterRemoval(const Recording& recording,
     const nlohmann::json& keys = runs[r]["key_frames"];
     if (keys.empty() || !keys.back().contains("picture_after")) continue;
     const nlohmann::json& place = keys.back()["picture_after"];
-    const auto start = recording.bytes.begin() + place[0].get<std::ptrdiff_t>();
-    const std::vector<std::uint8_t> encoded(start, start + place[1].get<std::ptrdiff_t>());
-    cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
-    if (image.empty()) return DataError("a picture after the removal is no image");
-    images[kColumns + r] = image;
+    // ReadRecording has made sure of the place.
+    const std::string_view encoded =
+        std::string_view(recording.bytes)
+            .substr(place[0].get<std::size_t>(), place[1].get<std::size_t>());
+    TSDFPP_ASSIGN(images[kColumns + r],
+                  DecodeImage(encoded, "a picture after the removal", DecodeAs::kColour));
   }
   return images;
 }
@@ -145,7 +142,7 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   for (const nlohmann::json& still : recording->json["stills"]) {
     if (!still.is_number_integer()) {
       return DataError("'{}': a still is {}, expected a frame's number", run.string(),
-                       still.dump());
+                       JsonShown(still));
     }
     stills.push_back(still.get<int>());
   }
@@ -167,7 +164,7 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
     return images;
   };
   TSDFPP_ASSIGN(std::vector<cv::Mat> images, read(stills.front()));
-  const Film film(panels, {kCellWidth, kCellWidth * images[0].rows / images[0].cols});
+  const Film film(panels, {kCellWidth, std::max(1, kCellWidth * images[0].rows / images[0].cols)});
 
   // OpenCV names the format by the file's end, so the temporary file has it as well.
   std::error_code failure;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/files.h"
+#include "core/json_text.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/bop_instances.h"
@@ -52,9 +52,7 @@ Expected<Pose> PoseOf(const nlohmann::json& json, const char* rotation, const ch
 
 // A file's members by image number.
 Expected<std::map<int, nlohmann::json>> ReadByImage(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object()) return DataError("{}: not a JSON object", path.string());
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   std::map<int, nlohmann::json> images;
   for (const auto& [key, value] : json.items()) {
     const auto number = ParseWholeNumber(key);
@@ -212,9 +210,7 @@ class BopOpener {
     const fs::path path = dataset_ / bop::kModelsInfo;
     nlohmann::json models = nlohmann::json::object();
     if (Exists(path)) {
-      TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-      models = nlohmann::json::parse(text, nullptr, false);
-      if (!models.is_object()) return DataError("{}: not a JSON object", path.string());
+      TSDFPP_ASSIGN(models, ReadJsonObject(path));
     }
     std::map<int, int> instances;  // by obj_id
     for (const auto& [id, obj_id] : objects_) {

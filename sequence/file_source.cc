@@ -136,7 +136,8 @@ double RateOf(const std::vector<double>& times_s) {
   if (steps.empty()) return kUsualRate_hz;
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
-  return 1 / *middle;
+  const double rate_hz = 1 / *middle;
+  return std::isfinite(rate_hz) ? rate_hz : kUsualRate_hz;
 }
 
 Pose MirroredInY(const Pose& T_WC) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/ply.h"
 #include "eval/adapters/open3d_peer.h"
 #include "eval/adapters/voxel_block_grid.h"
@@ -80,7 +81,7 @@ Expected<void> Map(const Arguments& arguments) {
         WritePly(arguments.out / "meshes" / fmt::format("{:06d}", index) / "scene.ply",
                  scalable ? scalable->Triangles() : grid->Triangles()));
   }
-  return WriteFile(arguments.out / "timing.json", timing.dump() + "\n");
+  return WriteFile(arguments.out / "timing.json", JsonText(timing) + "\n");
 }
 
 int Run(int argc, char** argv) {

@@ -244,7 +244,7 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
       {"half", "scene.ply"},
       {"silent", "meshes: no such folder"},
       {"late", "holds nothing for frame 3"},
-      {"talks", "timing.json is no JSON"},
+      {"talks", "timing.json: not JSON"},
       {"lost", "left-3.txt"}};
   const std::string table = SummaryTable(*result);
   const nlohmann::json summary = SummaryJson(*result, "the command");

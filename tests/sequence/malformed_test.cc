@@ -223,7 +223,7 @@ TEST(Malformed, Replica) {
           {Text("cam_params.json", "{\"camera\": {\"w\": 64}}"),
            "@/cam_params.json: expected numbers w h fx fy cx cy scale"},
           {Json("cam_params.json", [](nlohmann::json& json) { json["camera"]["scale"] = 0; }),
-           "@/cam_params.json: w, h and scale must be over 0"},
+           "@/cam_params.json: w, h and scale must be over 0, w and h whole numbers"},
           {Json("cam_params.json", [](nlohmann::json& json) { json["camera"]["w"] = 60; }),
            "@/results/depth000000.png: the image is 64x48, expected 60x48 (cam_params.json)"},
           // Metres where the file says millimetres.

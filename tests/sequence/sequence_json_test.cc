@@ -80,6 +80,42 @@ TEST(SequenceJson, BadFilesAreNamed) {
   }
 }
 
+// Copying or printing it as deep as this overflows the stack.
+TEST(SequenceJson, DepthAndNumbersAreLimited) {
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  for (const char* field : {"\"schema_version\": 2", "\"seed\": 7", "\"rate_hz\": 12.5"}) {
+    const std::string name(field, std::string(field).find(':'));
+    std::string text = SequenceToJson(SomeRecord());
+    const std::size_t at = text.find(name);
+    ASSERT_NE(at, std::string::npos) << name;
+    text.replace(at + name.size() + 2, text.find('\n', at) - at - name.size() - 3, deep);
+    const TempFolder folder;
+    ASSERT_TRUE(WriteFile(folder / "s.json", text).has_value());
+    const auto read = ReadSequenceJson(folder / "s.json");
+    ASSERT_FALSE(read.has_value());
+    EXPECT_NE(read.error().message.find("lists and objects within one another, over the limit"),
+              std::string::npos)
+        << read.error().message;
+  }
+  for (const auto& [count, words] :
+       {std::pair("2147483647", "frame_count is 2147483647, expected a whole number from 0 to"),
+        {"4294967297", "frame_count is 4294967297"},
+        {"1e300", "frame_count is 1e+300"},
+        {"-1", "frame_count is -1"},
+        {"\"4\"", "frame_count is \"4\""}}) {
+    const std::string sentence =
+        SentenceAfter("\"frame_count\": 4", fmt::format("\"frame_count\": {}", count));
+    EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
+    EXPECT_LT(sentence.size(), 300U);
+  }
+  EXPECT_NE(SentenceAfter("\"width\": 13", "\"width\": 1").find("width is 1, expected a whole"),
+            std::string::npos);
+  EXPECT_NE(SentenceAfter("\"width\": 13", "\"width\": 30000").find("width is 30000"),
+            std::string::npos);
+  EXPECT_NE(SentenceAfter("\"fx\": 564.3", "\"fx\": 0.0").find("expected finite intrinsics"),
+            std::string::npos);
+}
+
 // The list is read file by file when the sequence is verified.
 TEST(SequenceJson, ListedFilesAreInside) {
   for (const auto& [file, fault] : {std::pair("/dev/zero", "is absolute"),
