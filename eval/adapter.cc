@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "core/one_line.h"
 #include "core/plain_name.h"
@@ -117,7 +118,7 @@ Expected<AdapterConfig> ReadAdapter(const fs::path& file) {
     return UsageError("{}: match is '{}', expected names or overlap", file.string(), match);
   }
   config.match = *mode;
-  config.folder = fs::absolute(file).parent_path();
+  config.folder = AbsolutePath(file).parent_path();
   const auto valid = config.Validate();
   if (!valid) return UsageError("{}: {}", file.string(), valid.error().message);
   return config;
@@ -145,8 +146,8 @@ Expected<AdapterConfig> FindAdapter(const std::string& name) {
 Expected<std::vector<std::string>> CommandOf(const AdapterConfig& config, const AdapterTask& task,
                                              const fs::path& out) {
   const std::map<std::string, std::string> words{
-      {"sequence", fs::absolute(task.sequence).string()},
-      {"out", fs::absolute(out).string()},
+      {"sequence", AbsolutePath(task.sequence).string()},
+      {"out", AbsolutePath(out).string()},
       {"adapter", config.folder.string()},
       {"programs", ProgramFolder().string()},
       {"first", fmt::format("{}", task.first_frame)},
@@ -191,7 +192,7 @@ Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task, const fs::pa
   run.folder = out;
   constexpr double kBytes = 1e6;
   run.outcome = RunChildProcess(
-      run.config.name, command, out, fs::absolute(out / kLog),
+      run.config.name, command, out, AbsolutePath(out / kLog),
       {run.config.time_limit_s, static_cast<std::int64_t>(kBytes * run.config.memory_limit_mb)});
   run.failure = run.outcome.failure;
   if (run.failure || !fs::exists(out / kTiming, ignored)) return {};

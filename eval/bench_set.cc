@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/sweep_metrics.h"
 #include "sequence/sequence_json.h"
@@ -82,9 +83,9 @@ Expected<BenchSet> BenchSet::Load(const fs::path& folder, const std::string& nam
   std::error_code code;
   if (!fs::exists(set.file, code)) {
     std::string known;
-    for (const auto& entry : fs::directory_iterator(folder, code)) {
-      if (!fs::exists(entry.path() / "set.toml", code)) continue;
-      known += (known.empty() ? "" : ", ") + entry.path().filename().string();
+    for (const fs::path& entry : EntriesOf(folder)) {
+      if (!IsThere(entry / "set.toml")) continue;
+      known += (known.empty() ? "" : ", ") + entry.filename().string();
     }
     return UsageError("there is no benchmark '{}' in {}, expected one of: {}", name,
                       folder.string(), known.empty() ? "none is there" : known);
@@ -266,9 +267,8 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
 
 Expected<std::string> Leaderboard(const BenchSet& set, const fs::path& folder) {
   std::vector<fs::path> files;
-  std::error_code code;
-  for (const auto& entry : fs::directory_iterator(folder, code)) {
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  for (const fs::path& entry : EntriesOf(folder)) {
+    if (entry.extension() == ".json") files.push_back(entry);
   }
   if (files.empty()) {
     return UsageError("{}: holds no result, expected a folder of *.json", folder.string());

@@ -13,6 +13,7 @@
 
 #include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
 #include "eval/file_check.h"
 #include "eval/visibility_truth.h"
 #include "sequence/cofusion_layout.h"
@@ -97,8 +98,7 @@ bool SameModel(const TrueModel& a, const TrueModel& b) {
 Expected<void> CheckInside(const SceneConfig& config, const fs::path& folder) {
   TSDFPP_ASSIGN(const SceneInputs inputs, CollectInputs(config));
   const DataFolder data(folder);
-  std::error_code code;
-  const fs::path root = fs::absolute(folder, code).lexically_normal();
+  const fs::path root = AbsolutePath(folder).lexically_normal();
   for (const auto& [place, file] : inputs.files) {
     const std::string relative = file.lexically_normal().lexically_relative(root).string();
     TSDFPP_ASSIGN(const fs::path found, data.Find(relative));
@@ -109,7 +109,7 @@ Expected<void> CheckInside(const SceneConfig& config, const fs::path& folder) {
 // Composes the scene again and compares what comes out with the models on disk.
 void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
                 CertifyResult& result) {
-  if (!fs::exists(folder / cofusion::kScene)) {
+  if (!IsThere(folder / cofusion::kScene)) {
     result.notes.emplace_back("scene.toml is not there: the scene was not composed again");
     return;
   }

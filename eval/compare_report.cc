@@ -213,6 +213,13 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
       summary["adapters"].push_back(std::move(one));
     }
   }
+  for (const FailedRun& run : result.failed) {
+    summary["failed"].push_back({{"title", run.title},
+                                 {"folder", run.folder},
+                                 {"frame", run.frame},
+                                 {"failure", run.error.message}});
+  }
+  if (result.stopped) summary["stopped"] = result.stopped->message;
   summary["reveal_frame"] =
       result.reveal_frame ? nlohmann::json(*result.reveal_frame) : nlohmann::json(nullptr);
   return summary;
@@ -271,6 +278,9 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       "all and of the worst object. Times are medians a frame on this machine.</p>\n";
   if (!result.config.truth_note.empty()) {
     html += fmt::format("<p>{}</p>\n", Escaped(result.config.truth_note));
+  }
+  for (const std::string& line : FailureLines(result)) {
+    html += fmt::format("<p>{}</p>\n", Escaped(line));
   }
   for (const std::string& line : AdapterLines(result)) {
     html += fmt::format("<p>{}</p>\n", Escaped(line));

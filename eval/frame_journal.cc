@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "core/pose_text.h"
 
@@ -77,11 +78,10 @@ Expected<JournalEntry> FrameJournal::Read(int index) const {
 
 std::map<int, JournalEntry> FrameJournal::ReadSound() const {
   std::map<int, JournalEntry> entries;
-  std::error_code code;
-  for (const auto& file : fs::directory_iterator(notes_, code)) {
-    if (file.path().extension() != ".json") continue;
+  for (const fs::path& file : EntriesOf(notes_)) {
+    if (file.extension() != ".json") continue;
     // A damaged entry is none: its frame is rendered again.
-    auto entry = Read(std::atoi(file.path().stem().c_str()));
+    auto entry = Read(std::atoi(file.stem().c_str()));
     if (!entry) continue;
     const auto& hashes = entry->frame.hashes;
     const bool sound = std::all_of(hashes.begin(), hashes.end(), [&](const auto& item) {

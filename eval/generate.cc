@@ -168,7 +168,9 @@ class Generator {
       if (!next) {
         // A worker that was killed leaves sound frames behind; a scene that cannot be rendered
         // none.
-        const bool died = next.error().message.starts_with("a worker process");
+        const bool died = next.error().message.starts_with("a worker process") ||
+                          next.error().message.starts_with("out of memory") ||
+                          next.error().kind == ErrorKind::kInternal;
         if (died && greeted == jobs) staging_.Keep();
         return tl::unexpected(next.error());
       }

@@ -243,9 +243,17 @@ Expected<void> PictureMaker::Finish() {
         cells.push_back(row);
         table_cells.back().push_back(tables_.at(run));
       };
-      for (const auto& run : result_.runs) {
-        if (run->profile != profile || run->config.poses != poses) continue;
-        add(run.get(), std::string(MethodName(run->config.method)));
+      for (const Method method : result_.config.methods) {
+        const auto run = std::find_if(
+            result_.runs.begin(), result_.runs.end(), [&](const std::unique_ptr<CompareRun>& each) {
+              return each->config.method == method && each->profile == profile &&
+                     each->config.poses == poses;
+            });
+        if (run != result_.runs.end()) {
+          add(run->get(), std::string(MethodName(method)));
+        } else {  // it failed
+          table_cells.back().emplace_back();
+        }
       }
       // An adapter has no profile; it stands beside each.
       for (const auto& run : result_.adapters) {

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 
 namespace tsdfpp {
@@ -130,7 +131,7 @@ void Recording::DropKeyFrame(int frame) {
 
 Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / "record" / "record.json";
-  if (!std::filesystem::exists(path)) return std::nullopt;
+  if (!IsThere(path)) return std::nullopt;
   Recording recording;
   TSDFPP_ASSIGN(recording.json, ReadJsonObject(path));
   if (recording.json.value("schema", json()) != 1) {

@@ -4,6 +4,7 @@
 
 #include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
@@ -77,7 +78,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
                                    results->at("renderer").get<std::string>());
     TSDFPP_ASSIGN(recorded.cell, ReadJsonObject(folder / "cells" / (recorded.id + ".json")));
     return recorded;
-  } catch (const json::exception& error) {
+  } catch (const std::exception& error) {
     return DataError("{}: a field is missing or wrong ({})", where, error.what());
   }
 }
@@ -197,10 +198,9 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
                   {"image_digest", result.image_digest},
                   {"map_digest", result.map_digest}};
   TSDFPP_RETURN_IF_ERROR(WriteFile(options.out / "replay.json", JsonText(note, 1) + "\n"));
-  for (const auto& entry : fs::recursive_directory_iterator(options.out)) {
-    if (entry.is_regular_file()) {
-      result.files.push_back(entry.path().lexically_relative(options.out).string());
-    }
+  TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(options.out));
+  for (const fs::path& file : written) {
+    result.files.push_back(file.lexically_relative(options.out).string());
   }
   std::sort(result.files.begin(), result.files.end());
   return result;

@@ -6,6 +6,7 @@
 
 #include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/base64.h"
 #include "eval/recording.h"
@@ -28,11 +29,7 @@ struct Comparison {
 };
 
 // A name for people: the folder's own, even where it is given as "." or with a slash at its end.
-std::string NameOf(const std::filesystem::path& folder) {
-  std::filesystem::path whole = std::filesystem::absolute(folder).lexically_normal();
-  if (whole.filename().empty()) whole = whole.parent_path();
-  return whole.filename().string();
-}
+std::string NameOf(const std::filesystem::path& folder) { return OwnName(folder); }
 
 // What the page reads of a summary without asking whether it is there.
 Expected<void> CheckSummary(const json& summary, const std::filesystem::path& path) {
@@ -65,9 +62,8 @@ Expected<void> CheckSummary(const json& summary, const std::filesystem::path& pa
 
 Expected<void> AddPictures(Comparison& comparison) {
   std::set<std::string> names;
-  std::error_code failure;
-  for (const auto& entry : std::filesystem::directory_iterator(comparison.folder, failure)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::filesystem::path& entry : EntriesOf(comparison.folder)) {
+    const std::string name = entry.filename().string();
     if (!name.ends_with(".png")) continue;
     // With a recording the page makes the figure itself, sharper and for each frame.
     if (name.starts_with("table-") || (name.starts_with("figure-") && !comparison.recording)) {
@@ -92,7 +88,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
   Comparison comparison;
   comparison.folder = folder;
   const std::filesystem::path path = folder / "summary.json";
-  if (!std::filesystem::exists(path)) {
+  if (!IsThere(path)) {
     return DataError("'{}' has no summary.json, expected a folder that tsdfpp compare wrote",
                      folder.string());
   }
@@ -107,7 +103,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
   TSDFPP_RETURN_IF_ERROR(AddPictures(comparison));
   for (const char* name : {"summary.json", "frames.csv", "record/record.bin"}) {
     const std::filesystem::path file = folder / name;
-    if (!std::filesystem::exists(file)) continue;
+    if (!IsThere(file)) continue;
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(file));
     comparison.files.push_back(
         {{"name", name}, {"bytes", bytes.size()}, {"hash", HashText(bytes)}});

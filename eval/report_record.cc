@@ -303,6 +303,10 @@ std::size_t ReportRecorder::IndexOf(const CompareRun& run) const {
   return r;
 }
 
+void ReportRecorder::Forget(const CompareRun& run) {
+  runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(IndexOf(run)));
+}
+
 nlohmann::json ReportRecorder::TruthJson() {
   nlohmann::json truth = nlohmann::json::array();
   for (std::size_t i = 0; i < result_.truth->trackers().size(); ++i) {

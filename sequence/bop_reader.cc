@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
@@ -67,7 +68,7 @@ class BopOpener {
   BopOpener(fs::path scene, const SequenceOptions& options, SequenceNotes& notes)
       : scene_(std::move(scene)), options_(options), notes_(notes) {
     sequence_.format = DatasetFormat::kBop;
-    const fs::path absolute = fs::absolute(scene_ / "").lexically_normal().parent_path();
+    const fs::path absolute = AbsolutePath(scene_ / "").lexically_normal().parent_path();
     sequence_.size_source = "as the first depth image";
     sequence_.rate_hz = kUsualRate_hz;
     dataset_ = Exists(scene_ / "models") ? scene_ : absolute.parent_path().parent_path();

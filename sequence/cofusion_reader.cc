@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/calibration.h"
@@ -28,11 +29,7 @@ bool Exists(const fs::path& path) {
 // The sorted names of the files in a folder; none where it is not one.
 std::vector<std::string> FileNames(const fs::path& folder) {
   std::vector<std::string> names;
-  std::error_code code;
-  for (const auto& entry : fs::directory_iterator(folder, code)) {
-    names.push_back(entry.path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
+  for (const fs::path& entry : EntriesOf(folder)) names.push_back(entry.filename().string());
   return names;
 }
 
@@ -75,7 +72,7 @@ class CofusionSource : public FrameSource {
       }
       return Adopt(record);
     }
-    info_.name = fs::absolute(folder_ / "").lexically_normal().parent_path().filename().string();
+    info_.name = OwnName(folder_);
     info_.intrinsics = camera;
     TSDFPP_ASSIGN(std::tie(info_.first_index, info_.frame_count), NumbersOfImages(folder_));
     if (camera.width == 0) {

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/cofusion_layout.h"
@@ -57,10 +58,10 @@ class HashingWriter {
 Expected<void> RemoveStrangers(const fs::path& folder, const SequenceRecord& record) {
   std::vector<fs::path> strangers;
   std::error_code code;
-  for (const auto& entry : fs::recursive_directory_iterator(folder, code)) {
-    const std::string file = entry.path().lexically_relative(folder).string();
-    if (entry.is_directory() || file == "lock" || record.hashes.contains(file)) continue;
-    strangers.push_back(entry.path());
+  TSDFPP_ASSIGN(const std::vector<fs::path> there, ListFilesBelow(folder));
+  for (const fs::path& path : there) {
+    const std::string file = path.lexically_relative(folder).string();
+    if (file != "lock" && !record.hashes.contains(file)) strangers.push_back(path);
   }
   for (const fs::path& stranger : strangers) {
     fs::remove(stranger, code);

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "sequence/calibration.h"
 #include "sequence/dataset_readers.h"
 #include "sequence/image_files.h"
@@ -32,7 +33,7 @@ class KlgSource : public DatasetSource {
       notes.push_back(fmt::format("{}: {} bytes follow the last of its {} frames", file.string(),
                                   index.bytes_after, index.entries.size()));
     }
-    const fs::path folder = fs::absolute(file).parent_path();
+    const fs::path folder = AbsolutePath(file).parent_path();
     TSDFPP_RETURN_IF_ERROR(SetCamera(folder, options, notes));
     TSDFPP_RETURN_IF_ERROR(SetPoses(folder, index, options, notes));
     if (entries_.empty()) {

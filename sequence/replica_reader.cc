@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/dataset_readers.h"
@@ -44,7 +45,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
   std::error_code code;
   fs::path params = folder / "cam_params.json";
   if (!fs::exists(params, code)) {
-    params = fs::absolute(folder / "").lexically_normal().parent_path().parent_path() /
+    params = AbsolutePath(folder / "").lexically_normal().parent_path().parent_path() /
              "cam_params.json";
   }
   ReplicaCamera camera;

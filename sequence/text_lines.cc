@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "core/files.h"
+#include "core/folders.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -64,16 +65,10 @@ Expected<std::vector<double>> ReadNumbers(const fs::path& path) {
 
 std::vector<std::string> NamesIn(const fs::path& folder) {
   std::vector<std::string> names;
-  std::error_code code;
-  for (fs::directory_iterator at(folder, code), end; !code && at != end; at.increment(code)) {
-    names.push_back(at->path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
+  for (const fs::path& entry : EntriesOf(folder)) names.push_back(entry.filename().string());
   return names;
 }
 
-std::string NameOfFolder(const fs::path& folder) {
-  return fs::absolute(folder / "").lexically_normal().parent_path().filename().string();
-}
+std::string NameOfFolder(const fs::path& folder) { return OwnName(folder); }
 
 }  // namespace tsdfpp

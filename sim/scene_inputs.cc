@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/toml_reader.h"
 #include "sim/mesh_files.h"
 
@@ -74,7 +75,7 @@ class Collector {
  private:
   // Where the file will be.
   Expected<std::string> Take(const fs::path& named) {
-    const fs::path file = fs::absolute(named).lexically_normal();
+    const fs::path file = AbsolutePath(named).lexically_normal();
     if (const auto taken = taken_.find(file); taken != taken_.end()) return taken->second;
     std::vector<fs::path> group{file};
     TSDFPP_ASSIGN(const std::vector<fs::path> companions, Companions(file));

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/files.h"
+#include "core/guard.h"
 #include "core/json_text.h"
 #include "core/ply.h"
 #include "eval/adapters/open3d_peer.h"
@@ -88,11 +89,13 @@ int Run(int argc, char** argv) {
   const auto arguments = Parse(argc, argv);
   const Expected<void> done = arguments ? Map(*arguments) : tl::unexpected(arguments.error());
   if (done) return 0;
-  std::fprintf(stderr, "tsdfpp_open3d: %s\n", done.error().message.c_str());
+  PrintError("tsdfpp_open3d", done.error().message);
   return static_cast<int>(done.error().kind);
 }
 
 }  // namespace
 }  // namespace tsdfpp
 
-int main(int argc, char** argv) { return tsdfpp::Run(argc, argv); }
+int main(int argc, char** argv) {
+  return tsdfpp::GuardedMain("tsdfpp_open3d", [&] { return tsdfpp::Run(argc, argv); });
+}
