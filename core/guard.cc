@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <new>
 #include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
 #include <string>
 
 #include "core/limits.h"
@@ -62,6 +63,8 @@ void PrintError(std::string_view program, std::string_view message) {
 int GuardedMain(std::string_view program, const std::function<int()>& body) {
   NameOfProgram() = program;
   std::set_terminate(SayAndAbort);
+  // Its warnings would stand before our sentence.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   const auto code = Guarded([&]() -> Expected<int> {
     TSDFPP_RETURN_IF_ERROR(SetLimitsFromEnvironment());
     return body();

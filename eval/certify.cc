@@ -14,6 +14,7 @@
 #include "core/data_folder.h"
 #include "core/files.h"
 #include "core/folders.h"
+#include "core/one_line.h"
 #include "eval/file_check.h"
 #include "eval/visibility_truth.h"
 #include "sequence/cofusion_layout.h"
@@ -318,7 +319,8 @@ std::string FindingText(const Finding& finding) {
   std::string where = finding.subject;
   if (finding.frame >= 0)
     where += fmt::format("{}frame {}", where.empty() ? "" : ", ", finding.frame);
-  return where.empty() ? finding.sentence : where + ": " + finding.sentence;
+  // Names of files on disk may hold anything.
+  return OneLine(where.empty() ? finding.sentence : where + ": " + finding.sentence);
 }
 
 std::string CertifyText(const CertifyResult& result) {

@@ -74,6 +74,7 @@ bool HasForm(const json& recording) {
   const auto object_has_form = [](const json& object) {
     return object.is_object() && object.value("id", json()).is_number_unsigned() &&
            object.value("name", json()).is_string() &&
+           object.value("removed", json(false)).is_boolean() &&
            NumbersOfLength(object.value("colour", json()), 3);
   };
   const auto frame_has_form = [](const json& frame) {
@@ -81,9 +82,10 @@ bool HasForm(const json& recording) {
            NumbersOfLength(frame.value("T_WC", json()), 7) &&
            frame.value("T_WO", json()).is_object();
   };
-  return number("error_step_m") && number("age_step_frames") && list("objects") && list("frames") &&
-         list("key_frames") && list("runs") && recording.contains("grid") &&
-         recording.contains("intrinsics") && recording.contains("truth") &&
+  return recording.value("sequence", json("")).is_string() && number("error_step_m") &&
+         number("age_step_frames") && list("objects") && list("frames") && list("key_frames") &&
+         list("runs") && recording.contains("grid") && recording.contains("intrinsics") &&
+         recording.contains("truth") &&
          NumbersOfLength(recording.value("depth_range_m", json()), 2) &&
          std::all_of(recording["objects"].begin(), recording["objects"].end(), object_has_form) &&
          std::all_of(recording["frames"].begin(), recording["frames"].end(), frame_has_form);

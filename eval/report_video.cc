@@ -9,6 +9,7 @@
 #include "core/decode_image.h"
 #include "core/json_text.h"
 #include "core/plain_name.h"
+#include "core/quiet_stderr.h"
 #include "eval/recording.h"
 #include "eval/report_record.h"
 
@@ -171,8 +172,12 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failure);
   const Temporary part{file.parent_path() /
                        fmt::format(".{}.{}.mp4", file.filename().string(), getpid())};
-  cv::VideoWriter writer(part.path.string(), cv::CAP_FFMPEG,
-                         cv::VideoWriter::fourcc('a', 'v', 'c', '1'), kRate_hz, film.size());
+  cv::VideoWriter writer;
+  {
+    const QuietStderr quiet;  // the encoder prints what it chose
+    writer.open(part.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
+                kRate_hz, film.size());
+  }
   if (!writer.isOpened()) {
     return EnvironmentError(
         "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",

@@ -73,7 +73,7 @@ class BopOpener {
     sequence_.rate_hz = kUsualRate_hz;
     dataset_ = Exists(scene_ / "models") ? scene_ : absolute.parent_path().parent_path();
     // A scene's own name is a number only.
-    sequence_.name = absolute.filename().string();
+    sequence_.name = NameOfFolder(absolute);
     if (dataset_ != scene_) sequence_.name = NameOfFolder(dataset_) + "-" + sequence_.name;
   }
 

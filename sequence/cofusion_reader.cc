@@ -15,6 +15,7 @@
 #include "sequence/image_files.h"
 #include "sequence/plausibility.h"
 #include "sequence/sequence_json.h"
+#include "sequence/text_lines.h"
 #include "sequence/trajectory_file.h"
 
 namespace tsdfpp {
@@ -72,7 +73,7 @@ class CofusionSource : public FrameSource {
       }
       return Adopt(record);
     }
-    info_.name = OwnName(folder_);
+    info_.name = NameOfFolder(folder_);
     info_.intrinsics = camera;
     TSDFPP_ASSIGN(std::tie(info_.first_index, info_.frame_count), NumbersOfImages(folder_));
     if (camera.width == 0) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/limits.h"
 #include "core/plain_name.h"
 #include "sequence/image_files.h"
 #include "sequence/integer_images.h"
@@ -188,6 +189,8 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
                                                         SequenceNotes& notes) {
   auto& frames = sequence.frames;
   if (frames.empty()) return DataError("{}: no frames", sequence.name);
+  TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::frames, static_cast<std::int64_t>(frames.size()),
+                                    sequence.name, "frames"));
   // Names sort otherwise where their numbers have no leading zeros.
   std::stable_sort(frames.begin(), frames.end(),
                    [](const FrameFiles& a, const FrameFiles& b) { return a.number < b.number; });

@@ -5,6 +5,9 @@
 
 #include "core/files.h"
 #include "core/folders.h"
+#include "core/limits.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 #include "sequence/calibration.h"
 #include "sequence/dataset_readers.h"
 #include "sequence/image_files.h"
@@ -29,6 +32,8 @@ class KlgSource : public DatasetSource {
     TSDFPP_RETURN_IF_ERROR(CheckRegularFile(file));
     in_.open(file, std::ios::binary);
     TSDFPP_ASSIGN(KlgIndex index, ReadKlgIndex(file));
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(
+        &Limits::frames, static_cast<std::int64_t>(index.entries.size()), file.string(), "frames"));
     if (index.bytes_after > 0) {
       notes.push_back(fmt::format("{}: {} bytes follow the last of its {} frames", file.string(),
                                   index.bytes_after, index.entries.size()));
@@ -40,7 +45,7 @@ class KlgSource : public DatasetSource {
       return DataError("{}: no frame of {} is within its times",
                        (folder / "groundtruth.txt").string(), file.filename().string());
     }
-    info_.name = file.stem().string();
+    info_.name = OneLine(file.stem().string(), kMostNameBytes);
     info_.first_index = 0;
     info_.frame_count = static_cast<int>(entries_.size());
     std::vector<double> times;

@@ -5,6 +5,8 @@
 
 #include "core/files.h"
 #include "core/folders.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -69,6 +71,8 @@ std::vector<std::string> NamesIn(const fs::path& folder) {
   return names;
 }
 
-std::string NameOfFolder(const fs::path& folder) { return OwnName(folder); }
+std::string NameOfFolder(const fs::path& folder) {
+  return OneLine(OwnName(folder), kMostNameBytes);
+}
 
 }  // namespace tsdfpp
