@@ -92,11 +92,14 @@ Expected<void> CheckLinksBelow(const fs::path& folder) {
   if (CurrentLinkPolicy() == LinkPolicy::kAnywhere) return {};
   std::vector<fs::path> links;
   std::error_code code;
-  for (fs::recursive_directory_iterator at(folder, code), end; !code && at != end;
-       at.increment(code)) {
+  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, code);
+  if (code) return {};  // whoever reads it says why it cannot be
+  for (const fs::recursive_directory_iterator end; !code && at != end; at.increment(code)) {
     std::error_code ignored;
     if (at->is_symlink(ignored)) links.push_back(at->path());
   }
+  if (code)
+    return DataError("{}: cannot be read as a folder ({})", folder.string(), code.message());
   std::sort(links.begin(), links.end());
   const DataFolder data(folder);
   for (const fs::path& link : links) TSDFPP_RETURN_IF_ERROR(data.CheckLinks(link));

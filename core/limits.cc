@@ -13,9 +13,9 @@ namespace {
 constexpr std::int64_t kAnySize = std::numeric_limits<std::int64_t>::max() / 4;
 // A reader keeps a place on the stack for each level.
 constexpr std::int64_t kMostNesting = 1000;
-// OpenCV's own bounds, and what 32 bits can count the bytes of a row of.
+// OpenCV's own bound, and what 32 bits can count the bytes of three channels of.
 constexpr std::int64_t kMostSide = 1 << 20;
-constexpr std::int64_t kMostPixels = 1 << 30;
+constexpr std::int64_t kMostPixels = 500'000'000;
 // Numbers of frames are 32-bit.
 constexpr std::int64_t kMostFrames = 1'000'000'000;
 // Vertices are counted in 32 bits.

@@ -8,6 +8,7 @@
 #include "core/files.h"
 #include "core/limits.h"
 #include "eval/rasteriser.h"
+#include "eval/record_images.h"
 
 namespace tsdfpp {
 namespace {
@@ -26,7 +27,10 @@ Expected<void> SavePng(const std::filesystem::path& path, const cv::Mat& rgb) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
+  if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9})) {
+    return EnvironmentError("{}: a picture of {}x{} cannot be encoded", path.string(), bgr.cols,
+                            bgr.rows);
+  }
   return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -103,9 +107,7 @@ cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, con
       }
     }
   }
-  cv::Mat small;
-  cv::resize(image, small, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
-  return small;
+  return Scaled(image, 1 / scale, cv::INTER_AREA);
 }
 
 cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, double pixel_m) {
@@ -194,7 +196,7 @@ Expected<void> PictureMaker::Take(const void* run, const Evaluation& evaluation,
   const std::vector<int> columns = Columns();
   if (std::find(columns.begin(), columns.end(), frame.index) != columns.end()) {
     cells_[run][frame.index] = DrawScene(evaluation.scene, frame.intrinsics, frame.T_WC, scale);
-    cv::resize(frame.colour, camera_[frame.index], {}, 1 / scale, 1 / scale, cv::INTER_AREA);
+    camera_[frame.index] = Scaled(frame.colour, 1 / scale, cv::INTER_AREA);
   }
   if (frame.index != ExaminedFrame()) return {};
   after_removal_[run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, scale);
