@@ -141,7 +141,7 @@ TEST(SequenceJson, NamesThatEscapeAreRefused) {
                                     {"NUL", "is the name of a device"}}) {
     const std::string sentence =
         SentenceAfter("\"name\": \"car\"", fmt::format("\"name\": \"{}\"", name));
-    EXPECT_TRUE(sentence.starts_with("object 1: the name '")) << sentence;
+    EXPECT_TRUE(sentence.starts_with("object 2: the name '")) << sentence;
     EXPECT_NE(sentence.find(fault), std::string::npos) << sentence;
     EXPECT_EQ(sentence.find('\n'), std::string::npos) << sentence;
   }
@@ -151,7 +151,7 @@ TEST(SequenceJson, NamesThatEscapeAreRefused) {
             std::string::npos);
   EXPECT_EQ(SentenceAfter("\"id\": 1", "\"id\": 0"), "object 0: its id is there twice");
   EXPECT_EQ(SentenceAfter("\"name\": \"car\"", "\"name\": \"background\""),
-            "object 1: its name 'background' is another object's too");
+            "object 2: its name 'background' is another object's too");
 }
 
 }  // namespace
