@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "cli/command.h"
+#include "core/json_text.h"
 #include "sim/gl_context.h"
 
 namespace tsdfpp {
@@ -33,7 +34,7 @@ Run AddDoctor(CLI::App&, const CommonOptions& common) {
     if (!gl) {
       // The rest of what is known is worth printing, and then the fault decides the exit code.
       json["gl"] = nullptr;
-      std::fputs(common.json ? (json.dump(2) + "\n").c_str() : text.c_str(), stdout);
+      std::fputs(common.json ? (JsonText(json, 2) + "\n").c_str() : text.c_str(), stdout);
       return tl::unexpected(gl.error());
     }
     const GlInfo& info = (*gl)->info();

@@ -7,6 +7,7 @@
 #include "cli/map_start.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/map_output.h"
 #include "eval/map_views.h"
 #include "eval/open_source.h"
@@ -165,7 +166,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
                       {"bytes", std::filesystem::file_size(options.save, ignored)}};
   }
   TSDFPP_RETURN_IF_ERROR(
-      WriteFile(std::filesystem::path(options.out) / "stats.json", stats.dump(2) + "\n"));
+      WriteFile(std::filesystem::path(options.out) / "stats.json", JsonText(stats, 2) + "\n"));
   const std::string fusion = frames == 0
                                  ? ""
                                  : fmt::format("; fusion median {:.1f} ms a frame",

@@ -7,7 +7,12 @@
 #include <cmath>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 #include "core/toml_reader.h"
+#include "eval/compare_names.h"
 #include "sequence/cofusion_writer.h"
 #include "sequence/export.h"
 
@@ -49,7 +54,16 @@ std::string Joined(const auto& numbers) { return fmt::format("{}", fmt::join(num
 
 Expected<void> AdapterConfig::Validate() const {
   if (name.empty() || name.find_first_of("/\\ \t\n,") != std::string::npos || name.front() == '.') {
-    return UsageError("name is '{}', expected a word without blanks, commas and slashes", name);
+    return UsageError("name is {}, expected a word without blanks, commas and slashes",
+                      Quoted(name));
+  }
+  // Its files go to a folder of this name among the comparison's own.
+  if (const auto named = CheckPlainName(name, "name"); !named) {
+    return UsageError("{}", named.error().message);
+  }
+  if (IsCompareName(name)) {
+    return UsageError("name is {}, which tsdfpp compare gives to a file or folder of its own",
+                      Quoted(name));
   }
   if (command.empty()) return UsageError("command is empty, expected a program and its arguments");
   if (layout != DatasetFormat::kCofusion && layout != DatasetFormat::kTum &&
@@ -104,7 +118,7 @@ Expected<AdapterConfig> ReadAdapter(const fs::path& file) {
     return UsageError("{}: match is '{}', expected names or overlap", file.string(), match);
   }
   config.match = *mode;
-  config.folder = fs::absolute(file).parent_path();
+  config.folder = AbsolutePath(file).parent_path();
   const auto valid = config.Validate();
   if (!valid) return UsageError("{}: {}", file.string(), valid.error().message);
   return config;
@@ -132,8 +146,8 @@ Expected<AdapterConfig> FindAdapter(const std::string& name) {
 Expected<std::vector<std::string>> CommandOf(const AdapterConfig& config, const AdapterTask& task,
                                              const fs::path& out) {
   const std::map<std::string, std::string> words{
-      {"sequence", fs::absolute(task.sequence).string()},
-      {"out", fs::absolute(out).string()},
+      {"sequence", AbsolutePath(task.sequence).string()},
+      {"out", AbsolutePath(out).string()},
       {"adapter", config.folder.string()},
       {"programs", ProgramFolder().string()},
       {"first", fmt::format("{}", task.first_frame)},
@@ -178,16 +192,18 @@ Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task, const fs::pa
   run.folder = out;
   constexpr double kBytes = 1e6;
   run.outcome = RunChildProcess(
-      run.config.name, command, out, fs::absolute(out / kLog),
+      run.config.name, command, out, AbsolutePath(out / kLog),
       {run.config.time_limit_s, static_cast<std::int64_t>(kBytes * run.config.memory_limit_mb)});
   run.failure = run.outcome.failure;
   if (run.failure || !fs::exists(out / kTiming, ignored)) return {};
-  const std::string text = ReadFile(out / kTiming).value_or("");
-  run.timing = nlohmann::json::parse(text, nullptr, false);
-  if (run.timing.is_discarded()) {
-    run.timing = nullptr;
-    run.failure = Error{ErrorKind::kData, fmt::format("{}: {} is no JSON", run.config.name,
-                                                      (out / kTiming).string())};
+  const auto text = ReadFile(out / kTiming, &Limits::json_bytes);
+  auto timing = text ? ParseJson(*text, (out / kTiming).string())
+                     : Expected<nlohmann::json>(tl::unexpected(text.error()));
+  if (timing) {
+    run.timing = std::move(*timing);
+  } else {
+    run.failure =
+        Error{timing.error().kind, fmt::format("{}: {}", run.config.name, timing.error().message)};
   }
   return {};
 }

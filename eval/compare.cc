@@ -8,6 +8,8 @@
 #include <fstream>
 
 #include "core/files.h"
+#include "core/guard.h"
+#include "eval/compare_names.h"
 #include "eval/compare_report.h"
 #include "eval/mesh_folder.h"
 #include "eval/pictures.h"
@@ -102,6 +104,81 @@ void ScoreTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
   }
 }
 
+// A frame as the sensor gave it and, where that differs, as it was.
+struct SeenFrames {
+  Frame given;
+  std::optional<Frame> true_frame;
+};
+
+// Reads a frame and lets the truth see it.
+Expected<SeenFrames> SeeFrame(FrameSource& source, int index, SceneTruth& truth) {
+  SeenFrames frames;
+  TSDFPP_ASSIGN(frames.given, source.Read(index));
+  if (source.IsSensed()) {
+    TSDFPP_ASSIGN(frames.true_frame, source.ReadTrue(index));
+  }
+  if (frames.given.mask.empty()) {
+    return DataError("{}: frame {} has no mask", source.info().name, index);
+  }
+  TSDFPP_RETURN_IF_ERROR(truth.Observe(frames.true_frame ? *frames.true_frame : frames.given));
+  return frames;
+}
+
+// What pictures needed of an evaluation.
+void DropMeshes(Evaluation& evaluation) {
+  evaluation.scene = {};
+  evaluation.revealed = {};
+  evaluation.table_reconstructed = {};
+}
+
+// Evaluates a map at a frame and writes what is to be seen of it.
+Expected<void> EvaluateRun(CompareRun& run, const Frame& frame,
+                           const std::vector<ObjectInfo>& names, const std::filesystem::path& out,
+                           const CompareResult& result, PictureMaker& pictures,
+                           std::optional<ReportRecorder>& recorder) {
+  const int index = frame.index;
+  SceneMeshes meshes = MeshesOf(run.pipeline.map(), result.movers);
+  if (result.config.keep_meshes) {
+    TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run.FolderName() / "frames", index));
+  }
+  run.evaluations.push_back(EvaluateMeshes(std::move(meshes), *result.truth, names, result.movers,
+                                           run.config.map.voxel_m, run.last_seen));
+  Evaluation& evaluation = run.evaluations.back();
+  run.times.mesh_s.push_back(evaluation.mesh_s);
+  TSDFPP_RETURN_IF_ERROR(pictures.Take(&run, evaluation, frame));
+  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(run, evaluation, frame));
+  const bool examined = index == result.reveal_frame.value_or(result.last_frame);
+  if (examined) {
+    auto copy = run.pipeline.map().Clone();
+    for (const InstanceId id : result.movers) copy->Remove(id);
+    TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, result.info, out / run.FolderName()));
+  }
+  DropMeshes(evaluation);
+  return {};
+}
+
+// Where no map and no adapter is left.
+Error NothingLeft(const CompareResult& result) {
+  const FailedRun& first = result.failed.front();
+  return {first.error.kind,
+          fmt::format("{}, at frame {}: {}{}", first.title, first.frame, first.error.message,
+                      result.failed.size() > 1 ? "; and the others too" : "")};
+}
+
+// The last frame at which all that is left was evaluated; before the first where there is none.
+int LastEvaluated(const CompareResult& result) {
+  int last = result.info.first_index - 1;
+  for (const auto& run : result.runs) {
+    if (!run->evaluations.empty()) last = std::max(last, run->evaluations.back().frame);
+  }
+  for (const auto& run : result.adapters) {
+    if (!run->failure && !run->evaluations.empty()) {
+      last = std::max(last, run->evaluations.back().frame);
+    }
+  }
+  return last;
+}
+
 }  // namespace
 
 CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profile_name,
@@ -117,10 +194,7 @@ std::string CompareRun::Title() const {
 }
 
 std::string CompareRun::FolderName() const {
-  std::string name =
-      fmt::format("{}_{}_{}", MethodName(config.method), profile, PoseSourceName(config.poses));
-  std::replace(name.begin(), name.end(), '/', '-');
-  return name;
+  return RunFolderName(config.method, profile, config.poses);
 }
 
 bool IsEvaluated(const CompareResult& result, int frame) {
@@ -175,65 +249,71 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   PictureMaker pictures(result, out);
   std::optional<ReportRecorder> recorder;
   if (config.record) recorder.emplace(result, out);
-  for (int index = first; index <= result.last_frame; ++index) {
+  const int planned = result.last_frame;
+  for (int index = first; index <= planned; ++index) {
     const auto read_start = std::chrono::steady_clock::now();
-    TSDFPP_ASSIGN(const Frame frame, source.Read(index));
-    std::optional<Frame> true_frame;
-    if (source.IsSensed()) {
-      TSDFPP_ASSIGN(true_frame, source.ReadTrue(index));
-    }
+    auto frames = Guarded([&] { return SeeFrame(source, index, *result.truth); });
     result.read_s += since(read_start);
-    if (frame.mask.empty()) return DataError("{}: frame {} has no mask", result.info.name, index);
-    TSDFPP_RETURN_IF_ERROR(result.truth->Observe(true_frame ? *true_frame : frame));
-    camera[index] = true_frame ? true_frame->T_WC : frame.T_WC;
-    const bool reveal = index == result.reveal_frame;
+    if (!frames) {
+      result.stopped = std::move(frames.error());
+      break;
+    }
+    const Frame& frame = frames->given;
+    const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
+    camera[index] = true_frame.T_WC;
     const bool evaluate = IsEvaluated(result, index);
-    if (recorder) recorder->SeeFrame(true_frame ? *true_frame : frame);
-    for (const auto& run : result.runs) {
-      const std::int64_t before = ResidentBytes();
-      const auto step = run->pipeline.Process(frame);
-      if (!step) return DataError("{}: {}", run->Title(), step.error().message);
-      run->times.Add(*step);
-      run->process_growth_bytes += ResidentBytes() - before;
-      if (recorder) recorder->SeeMap(*run);
-      if (!evaluate) continue;
-      SceneMeshes meshes = MeshesOf(run->pipeline.map(), result.movers);
-      if (config.keep_meshes) {
-        TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run->FolderName() / "frames", index));
+    if (recorder) recorder->SeeFrame(true_frame);
+    for (std::size_t r = 0; r < result.runs.size();) {
+      CompareRun& run = *result.runs[r];
+      const auto mapped = Guarded([&]() -> Expected<void> {
+        const std::int64_t before = ResidentBytes();
+        TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
+        run.times.Add(step);
+        run.process_growth_bytes += ResidentBytes() - before;
+        if (recorder) recorder->SeeMap(run);
+        if (!evaluate) return {};
+        return EvaluateRun(run, frame, names, out, result, pictures, recorder);
+      });
+      if (mapped) {
+        ++r;
+        continue;
       }
-      run->evaluations.push_back(EvaluateMeshes(std::move(meshes), *result.truth, names,
-                                                result.movers, run->config.map.voxel_m,
-                                                run->last_seen));
-      Evaluation& evaluation = run->evaluations.back();
-      run->times.mesh_s.push_back(evaluation.mesh_s);
-      TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
-      if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(*run, evaluation, frame));
-      const bool examined = reveal || (!result.reveal_frame && index == result.last_frame);
-      if (examined) {
-        const std::filesystem::path folder = out / run->FolderName();
-        auto copy = run->pipeline.map().Clone();
-        for (const InstanceId id : result.movers) copy->Remove(id);
-        TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run->pipeline, result.info, folder));
-      }
-      evaluation.scene = {};
-      evaluation.revealed = {};
-      evaluation.table_reconstructed = {};
+      result.failed.push_back({run.Title(), run.FolderName(), index, mapped.error()});
+      if (recorder) recorder->Forget(run);
+      result.runs.erase(result.runs.begin() + static_cast<std::ptrdiff_t>(r));
     }
     for (const auto& run : result.adapters) {
       if (!evaluate) continue;
-      EvaluateAdapter(*run, *result.truth, names, task);
-      if (run->failure) continue;
-      Evaluation& evaluation = run->evaluations.back();
-      TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
-      evaluation.scene = {};
-      evaluation.revealed = {};
-      evaluation.table_reconstructed = {};
+      const auto scored = Guarded([&]() -> Expected<void> {
+        EvaluateAdapter(*run, *result.truth, names, task);
+        if (run->failure) return {};
+        Evaluation& evaluation = run->evaluations.back();
+        TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
+        DropMeshes(evaluation);
+        return {};
+      });
+      if (!scored)
+        run->failure = Error{scored.error().kind, run->config.name + ": " + scored.error().message};
     }
     if (progress) progress(index - first + 1, total);
+    const bool any_adapter = std::any_of(result.adapters.begin(), result.adapters.end(),
+                                         [](const auto& run) { return !run->failure.has_value(); });
+    if (result.runs.empty() && !any_adapter && !result.failed.empty()) {
+      return tl::unexpected(NothingLeft(result));
+    }
+  }
+  if (result.stopped) {
+    const int seen = LastEvaluated(result);
+    if (seen < first) return tl::unexpected(*result.stopped);
+    result.last_frame = seen;
+    if (result.reveal_frame && *result.reveal_frame > seen) result.reveal_frame.reset();
   }
   for (const auto& run : result.adapters) ScoreTrajectories(*run, names, *result.truth, camera);
-  TSDFPP_RETURN_IF_ERROR(pictures.Finish());
-  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Write());
+  // Figures and the recording are of all frames that were planned, or not at all.
+  if (!result.stopped) {
+    TSDFPP_RETURN_IF_ERROR(Guarded([&] { return pictures.Finish(); }));
+    if (recorder) TSDFPP_RETURN_IF_ERROR(Guarded([&] { return recorder->Write(); }));
+  }
   result.total_s = since(start);
   TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
   TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -313,7 +314,8 @@ std::string GateMarkdown(const GateRun& run, const GateExplanations& explanation
 
 Expected<void> WriteGateReports(const GateRun& run, const GateExplanations& explanations,
                                 const std::filesystem::path& out) {
-  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.json", GateJson(run, explanations).dump(1) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(
+      WriteFile(out / "gates.json", JsonText(GateJson(run, explanations), 1) + "\n"));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.junit.xml", GateJUnit(run)));
   return WriteFile(out / "gates.md", GateMarkdown(run, explanations));
 }

@@ -6,6 +6,9 @@
 
 namespace tsdfpp {
 
+// The image with its sides times `scale`, each one pixel at least.
+cv::Mat Scaled(const cv::Mat& image, double scale, int interpolation);
+
 // `width` pixels wide, or as it is where it is not wider.
 cv::Mat Smaller(const cv::Mat& image, double width, int interpolation);
 

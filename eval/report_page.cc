@@ -4,7 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
 #include "eval/base64.h"
 #include "eval/recording.h"
 #include "eval/report_gates.h"
@@ -26,24 +29,13 @@ struct Comparison {
 };
 
 // A name for people: the folder's own, even where it is given as "." or with a slash at its end.
-std::string NameOf(const std::filesystem::path& folder) {
-  std::filesystem::path whole = std::filesystem::absolute(folder).lexically_normal();
-  if (whole.filename().empty()) whole = whole.parent_path();
-  return whole.filename().string();
-}
-
-Expected<json> ReadJson(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  json parsed = json::parse(text, nullptr, false);
-  if (!parsed.is_object()) return DataError("{} is no JSON object", path.string());
-  return parsed;
-}
+std::string NameOf(const std::filesystem::path& folder) { return OwnName(folder); }
 
 // What the page reads of a summary without asking whether it is there.
 Expected<void> CheckSummary(const json& summary, const std::filesystem::path& path) {
   if (summary.value("schema", json()) != 1) {
     return DataError("{}: schema is {}, expected 1", path.string(),
-                     summary.value("schema", json()).dump());
+                     JsonShown(summary.value("schema", json())));
   }
   for (const char* name : {"sequence", "command", "version", "generator"}) {
     if (!summary.contains(name) || !summary[name].is_string()) {
@@ -70,9 +62,8 @@ Expected<void> CheckSummary(const json& summary, const std::filesystem::path& pa
 
 Expected<void> AddPictures(Comparison& comparison) {
   std::set<std::string> names;
-  std::error_code failure;
-  for (const auto& entry : std::filesystem::directory_iterator(comparison.folder, failure)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::filesystem::path& entry : EntriesOf(comparison.folder)) {
+    const std::string name = entry.filename().string();
     if (!name.ends_with(".png")) continue;
     // With a recording the page makes the figure itself, sharper and for each frame.
     if (name.starts_with("table-") || (name.starts_with("figure-") && !comparison.recording)) {
@@ -93,14 +84,15 @@ Expected<void> AddPictures(Comparison& comparison) {
 }
 
 Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   Comparison comparison;
   comparison.folder = folder;
   const std::filesystem::path path = folder / "summary.json";
-  if (!std::filesystem::exists(path)) {
+  if (!IsThere(path)) {
     return DataError("'{}' has no summary.json, expected a folder that tsdfpp compare wrote",
                      folder.string());
   }
-  TSDFPP_ASSIGN(comparison.summary, ReadJson(path));
+  TSDFPP_ASSIGN(comparison.summary, ReadJsonObject(path));
   TSDFPP_RETURN_IF_ERROR(CheckSummary(comparison.summary, path));
   TSDFPP_ASSIGN(comparison.csv, ReadFile(folder / "frames.csv"));
   if (!comparison.csv.starts_with("frame,method,profile,poses,")) {
@@ -111,7 +103,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
   TSDFPP_RETURN_IF_ERROR(AddPictures(comparison));
   for (const char* name : {"summary.json", "frames.csv", "record/record.bin"}) {
     const std::filesystem::path file = folder / name;
-    if (!std::filesystem::exists(file)) continue;
+    if (!IsThere(file)) continue;
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(file));
     comparison.files.push_back(
         {{"name", name}, {"bytes", bytes.size()}, {"hash", HashText(bytes)}});
@@ -124,7 +116,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
 // JSON that can stand inside <script>: no '<' can end it or begin a comment. Bytes that are no
 // UTF-8 become U+FFFD.
 std::string ScriptText(const json& value) {
-  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  const std::string text = JsonText(value);
   std::string safe;
   safe.reserve(text.size());
   for (const char c : text) {

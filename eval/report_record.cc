@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/pictures.h"
 #include "eval/record_images.h"
 #include "metrics/mesh_tools.h"
@@ -302,6 +303,10 @@ std::size_t ReportRecorder::IndexOf(const CompareRun& run) const {
   return r;
 }
 
+void ReportRecorder::Forget(const CompareRun& run) {
+  runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(IndexOf(run)));
+}
+
 nlohmann::json ReportRecorder::TruthJson() {
   nlohmann::json truth = nlohmann::json::array();
   for (std::size_t i = 0; i < result_.truth->trackers().size(); ++i) {
@@ -386,7 +391,7 @@ Expected<void> ReportRecorder::Write() {
                         {"stills", stills_},
                         {"runs", runs_}};
   TSDFPP_RETURN_IF_ERROR(WriteFile(out_ / "record" / "record.bin", bytes_));
-  return WriteFile(out_ / "record" / "record.json", record.dump() + "\n");
+  return WriteFile(out_ / "record" / "record.json", JsonText(record) + "\n");
 }
 
 }  // namespace tsdfpp

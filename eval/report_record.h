@@ -37,6 +37,8 @@ class ReportRecorder {
   // One map's evaluation at the frame that was seen last; `frame` as the maps saw it. Writes the
   // stills of the video. Errors: kEnvironment where the disk refuses.
   Expected<void> Take(const CompareRun& run, const Evaluation& evaluation, const Frame& frame);
+  // Drops a map that failed, before it leaves the result's runs.
+  void Forget(const CompareRun& run);
 
   // The rest: record.json, record.bin. Errors: kEnvironment where the disk refuses.
   Expected<void> Write();

@@ -3,11 +3,13 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "core/files.h"
+#include "core/decode_image.h"
+#include "core/json_text.h"
+#include "core/plain_name.h"
+#include "core/quiet_stderr.h"
 #include "eval/recording.h"
 #include "eval/report_record.h"
 
@@ -93,11 +95,7 @@ class Film {
 };
 
 Expected<cv::Mat> ReadStill(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-  const std::vector<std::uint8_t> encoded(bytes.begin(), bytes.end());
-  cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
-  if (image.empty()) return DataError("{} is no image", path.string());
-  return image;
+  return ReadImageFile(path, DecodeAs::kColour);
 }
 
 cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
@@ -115,11 +113,12 @@ Expected<std::vector<cv::Mat>> AfterRemoval(const Recording& recording,
     const nlohmann::json& keys = runs[r]["key_frames"];
     if (keys.empty() || !keys.back().contains("picture_after")) continue;
     const nlohmann::json& place = keys.back()["picture_after"];
-    const auto start = recording.bytes.begin() + place[0].get<std::ptrdiff_t>();
-    const std::vector<std::uint8_t> encoded(start, start + place[1].get<std::ptrdiff_t>());
-    cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
-    if (image.empty()) return DataError("a picture after the removal is no image");
-    images[kColumns + r] = image;
+    // ReadRecording has made sure of the place.
+    const std::string_view encoded =
+        std::string_view(recording.bytes)
+            .substr(place[0].get<std::size_t>(), place[1].get<std::size_t>());
+    TSDFPP_ASSIGN(images[kColumns + r],
+                  DecodeImage(encoded, "a picture after the removal", DecodeAs::kColour));
   }
   return images;
 }
@@ -144,13 +143,16 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   for (const nlohmann::json& still : recording->json["stills"]) {
     if (!still.is_number_integer()) {
       return DataError("'{}': a still is {}, expected a frame's number", run.string(),
-                       still.dump());
+                       JsonShown(still));
     }
     stills.push_back(still.get<int>());
   }
   std::vector<Panel> panels{{"camera", "colour"}, {"objects", "mask"}, {"", ""}};
   for (const nlohmann::json& each : recording->json["runs"]) {
     panels.push_back({TitleOf(each), each["folder"].get<std::string>()});
+    // Part of the stills' file names.
+    TSDFPP_RETURN_IF_ERROR(
+        CheckPlainName(panels.back().still, fmt::format("'{}': a map's folder", run.string())));
   }
   const auto read = [&](int frame) -> Expected<std::vector<cv::Mat>> {
     std::vector<cv::Mat> images;
@@ -163,15 +165,19 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
     return images;
   };
   TSDFPP_ASSIGN(std::vector<cv::Mat> images, read(stills.front()));
-  const Film film(panels, {kCellWidth, kCellWidth * images[0].rows / images[0].cols});
+  const Film film(panels, {kCellWidth, std::max(1, kCellWidth * images[0].rows / images[0].cols)});
 
   // OpenCV names the format by the file's end, so the temporary file has it as well.
   std::error_code failure;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failure);
   const Temporary part{file.parent_path() /
                        fmt::format(".{}.{}.mp4", file.filename().string(), getpid())};
-  cv::VideoWriter writer(part.path.string(), cv::CAP_FFMPEG,
-                         cv::VideoWriter::fourcc('a', 'v', 'c', '1'), kRate_hz, film.size());
+  cv::VideoWriter writer;
+  {
+    const QuietStderr quiet;  // the encoder prints what it chose
+    writer.open(part.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
+                kRate_hz, film.size());
+  }
   if (!writer.isOpened()) {
     return EnvironmentError(
         "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",

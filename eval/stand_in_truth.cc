@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/folders.h"
 #include "mapper/pipeline.h"
 #include "sequence/cofusion_layout.h"
 
@@ -77,8 +78,8 @@ RevealPlan PaperPlan(const SequenceInfo& info) {
 
 bool IsForeignCofusion(const std::filesystem::path& path) {
   std::error_code ignored;
-  return cofusion::IsCofusion(path) && !std::filesystem::exists(path / cofusion::kSequence) &&
-         !std::filesystem::exists(path / cofusion::kModels);
+  return cofusion::IsCofusion(path) && !IsThere(path / cofusion::kSequence) &&
+         !IsThere(path / cofusion::kModels);
 }
 
 Expected<std::vector<TrueModel>> ReconstructTruth(

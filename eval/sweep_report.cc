@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -258,7 +259,7 @@ Expected<void> WriteSweep(const SweepResult& result, const std::filesystem::path
   const std::vector<Condition> conditions = ConditionsOf(result);
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "results.csv", SweepCsv(result)));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "summary.txt", SweepText(result, conditions)));
-  return WriteFile(out / "results.json", SweepJson(result, conditions).dump(1) + "\n");
+  return WriteFile(out / "results.json", JsonText(SweepJson(result, conditions), 1) + "\n");
 }
 
 }  // namespace tsdfpp

@@ -1,6 +1,7 @@
 #include "mapper/map_file.h"
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "mapper/section_file.h"
 #include "mapper/volume_store.h"
 
@@ -9,6 +10,7 @@ namespace {
 
 constexpr const char* kConfigSection = "CONF";
 constexpr const char* kRunSection = "RUN ";
+constexpr int kGreatestFrame = 1'000'000'000;  // what users of the number can add to
 
 void PutText(std::string_view text, std::string& bytes) {
   PutBytes(static_cast<std::uint32_t>(text.size()), bytes);
@@ -67,6 +69,10 @@ Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range
     }
   }
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
+  TSDFPP_RETURN_IF_ERROR(CheckObjects(run.objects, "its list"));
+  if (run.last_frame < -1 || run.last_frame > kGreatestFrame) {
+    return DataError("its last frame is {}, expected -1 to {}", run.last_frame, kGreatestFrame);
+  }
   return run;
 }
 

@@ -6,6 +6,8 @@
 #include <bit>
 #include <cmath>
 
+#include "core/limits.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -167,6 +169,10 @@ void SaveGrid(const TsdfGrid& grid, std::string& bytes) {
 Expected<TsdfGrid> LoadGrid(ByteReader& bytes, const MapConfig& config) {
   const auto blocks = bytes.Get<std::uint64_t>();
   if (blocks > bytes.left() / kIndexBytes) return DataError("it has too few blocks");
+  // A block that is nearly empty takes some fifty times its place in the file.
+  TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::map_bytes,
+                                    static_cast<std::int64_t>(blocks * sizeof(TsdfBlock)),
+                                    "its blocks", "bytes"));
   const std::size_t groups = (blocks + kBlocksPerGroup - 1) / kBlocksPerGroup;
   std::vector<std::string_view> group_bytes;
   for (std::size_t g = 0; g < groups; ++g) {
@@ -230,6 +236,7 @@ void SaveVolumes(const ObjectVolumes& volumes, std::string& bytes) {
 Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config) {
   ObjectVolumes volumes;
   const LatticeRange range(config.voxel_m);
+  std::size_t blocks = 0;
   const auto count = bytes.Get<std::uint32_t>();
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto id = bytes.Get<InstanceId>();
@@ -250,6 +257,10 @@ Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config) 
     if (!volume.lattice_is_world) placement.blocks = &volume.grid;
     TSDFPP_RETURN_IF_ERROR(CheckMoved(range, placement, kPlacementSlack_blocks,
                                       fmt::format("object {}'s poses take a part of it to", id)));
+    blocks += volume.grid.entries().size();
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::map_bytes,
+                                      static_cast<std::int64_t>(blocks * sizeof(TsdfBlock)),
+                                      "its blocks", "bytes"));
   }
   return volumes;
 }

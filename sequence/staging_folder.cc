@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/sequence_json.h"
 
@@ -24,7 +25,7 @@ constexpr const char* kSet = "set";
 
 // An absolute path without a trailing slash has a file name and a folder it stands in.
 fs::path Normal(const fs::path& out) {
-  const fs::path folder = fs::absolute(out).lexically_normal();
+  const fs::path folder = AbsolutePath(out).lexically_normal();
   return folder.has_filename() ? folder : folder.parent_path();
 }
 
@@ -114,11 +115,10 @@ Expected<void> StagingFolder::Make() {
   mine_ = true;
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(path_));
   // What a killed process was just writing (core/files.h).
-  std::vector<fs::path> halves;
-  for (const auto& entry : fs::recursive_directory_iterator(root_, code)) {
-    if (entry.path().extension() == ".part") halves.push_back(entry.path());
+  TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFilesBelow(root_));
+  for (const fs::path& file : files) {
+    if (file.extension() == ".part") fs::remove(file, code);
   }
-  for (const fs::path& half : halves) fs::remove(half, code);
   return {};
 }
 
@@ -126,13 +126,13 @@ void StagingFolder::RemoveAbandoned() {
   const std::string prefix = Sibling("").filename().string();
   std::error_code code;
   std::vector<fs::path> abandoned;
-  for (const auto& entry : fs::directory_iterator(out_.parent_path(), code)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::path& entry : EntriesOf(out_.parent_path())) {
+    const std::string name = entry.filename().string();
     const auto making = ProcessOf(name, prefix, ".part");
     // An earlier sequence that was moved aside goes only where another is in its place.
     const auto replacing = fs::exists(out_, code) ? ProcessOf(name, prefix, ".old") : std::nullopt;
     const auto process = making ? making : replacing;
-    if (process && IsAbandoned(entry.path(), *process)) abandoned.push_back(entry.path());
+    if (process && IsAbandoned(entry, *process)) abandoned.push_back(entry);
   }
   for (const fs::path& folder : abandoned) fs::remove_all(folder, code);
 }

@@ -135,6 +135,14 @@ TEST(Adapter, IsReadStrictlyAndWrittenBack) {
   const std::vector<std::pair<std::string, std::string>> wrong{
       {"name = \"x\"\n", "command"},
       {Toml("a b", "[\"x\"]"), "name is 'a b'"},
+      {Toml("a\\u0001b", "[\"x\"]"), "holds a control character"},
+      {Toml(std::string(101, 'n'), "[\"x\"]"), "is longer than 100 bytes"},
+      {Toml("-rf", "[\"x\"]"), "begins with a dot or a dash"},
+      {Toml("nul", "[\"x\"]"), "is the name of a device"},
+      {Toml("record", "[\"x\"]"), "of its own"},
+      {Toml("Summary.json", "[\"x\"]"), "of its own"},
+      {Toml("figure-close-gt.png", "[\"x\"]"), "of its own"},
+      {Toml("tsdf++-literal_paper_icp", "[\"x\"]"), "of its own"},
       {Toml("x", "[]"), "command is empty"},
       {Toml("x", "[\"x\"]", "colour = 1\n"), "colour"},
       {Toml("x", "[\"x\"]", "layout = \"bop\"\n"), "layout is bop"},
@@ -236,7 +244,7 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
       {"half", "scene.ply"},
       {"silent", "meshes: no such folder"},
       {"late", "holds nothing for frame 3"},
-      {"talks", "timing.json is no JSON"},
+      {"talks", "timing.json: not JSON"},
       {"lost", "left-3.txt"}};
   const std::string table = SummaryTable(*result);
   const nlohmann::json summary = SummaryJson(*result, "the command");

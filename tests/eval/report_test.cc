@@ -429,7 +429,7 @@ TEST_F(Report, SpoiltFilesGetASentence) {
       {"no-summary", [](const auto& run) { std::filesystem::remove(run / "summary.json"); },
        "has no summary.json"},
       {"no-json", [](const auto& run) { (void)WriteFile(run / "summary.json", "[1"); },
-       "is no JSON object"},
+       "not a JSON object"},
       {"schema",
        [&](const auto& run) { edit(run / "summary.json", [](json& s) { s["schema"] = 7; }); },
        "schema is 7, expected 1"},
