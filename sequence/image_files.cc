@@ -99,7 +99,7 @@ Expected<void> CheckDepthChannels(std::string_view bytes, const std::string& fil
     names.insert(channel.name);
     if (channel.type == ExrType::kInteger) {
       return DataError("{}: depth of an integer type (channel {}), expected 32-bit float metres",
-                       file, Quoted(channel.name));
+                       file, OneLine(channel.name, 100));
     }
   }
   const bool colours = names.contains("R") && names.contains("G") && names.contains("B");
