@@ -1,4 +1,5 @@
 """What a page says of an experiment: tables of the results.json of `tsdfpp sweep`."""
+import textwrap
 
 DIFFERENCES = 2  # of so many metrics the difference to the baseline has a column of its own
 
@@ -40,7 +41,7 @@ def axes_shown(results):
 
 def comparison_of(results):
     """The question; a row a condition and method: of the first metrics mean and paired difference to the baseline with
-    their intervals, of the others the mean; and where a method is not ahead of the baseline in the first metric."""
+    their intervals, of the others the mean."""
     metrics = results["experiment"]["metrics"]
     baseline = results["experiment"]["baseline"]
     varied = axes_shown(results)
@@ -59,9 +60,8 @@ def comparison_of(results):
                     row.append(difference_text(results, condition, method, metric))
             rows.append(row)
     lines = results["text"].rstrip("\n").split("\n")
-    verdicts = [line for line in lines[2:] if line.startswith(tuple(results["conditions"][0]["methods"])) and "ahead" in line]
-    return (f"{lines[0]} {lines[1]}\n\n" + "".join("| " + " | ".join(row) + " |\n" for row in rows) + "\n" +
-            "".join("- " + line + "\n" for line in verdicts))
+    lead = "\n".join(textwrap.wrap(f"{lines[0]} {lines[1]}", 120))
+    return lead + "\n\n" + "".join("| " + " | ".join(row) + " |\n" for row in rows)
 
 
 def scenes_of(results):
