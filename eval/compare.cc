@@ -76,7 +76,7 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given,
     AdapterTask task = given;
     task.sequence = sequence;
     AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
-    done = RunAdapter(run, task, out / adapter.name);
+    done = RunAdapter(run, task, out / adapter.name, out / adapter.name);
     if (!done) break;
   }
   for (const auto& [layout, sequence] : sequences) {
@@ -98,7 +98,8 @@ void ScoreTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
     run.trajectories = std::move(*scores);
   } else {
     run.failure =
-        Error{scores.error().kind, fmt::format("{}: {}", run.config.name, scores.error().message)};
+        Error{scores.error().kind,
+              WithShownFolder(run, fmt::format("{}: {}", run.config.name, scores.error().message))};
   }
 }
 
