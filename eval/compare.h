@@ -56,6 +56,7 @@ struct CompareRun {
 struct CompareResult {
   SequenceInfo info;
   CompareConfig config;
+  std::string run;  // what run.json calls this run (eval/run_folder.h)
   int last_frame = 0;
   std::optional<int> reveal_frame;
   std::set<InstanceId> movers;
@@ -73,9 +74,9 @@ bool IsEvaluated(const CompareResult& result, int frame);
 using CompareProgress = std::function<void(int done, int total)>;
 
 // Errors: those of the source; kUsage where `until` is no frame of it or the config is wrong; kData
-// where a frame has no mask; kEnvironment where `out` cannot be written. An adapter that fails is
-// reported, and the others go on. Writes meshes and pictures
-// below `out` on the way (docs/formats.md), then summary.json, frames.csv and report.html.
+// where a frame has no mask; kEnvironment where `out` cannot be written or another process has it.
+// An adapter that fails is reported, and the others go on. What it writes appears below `out` at
+// the end, all together: meshes, pictures, summary.json, frames.csv, report.html and run.json.
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
                                    const std::filesystem::path& out, const std::string& command,
                                    const CompareProgress& progress);

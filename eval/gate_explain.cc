@@ -161,7 +161,10 @@ Expected<void> Draw(const Seen& seen, const std::filesystem::path& file) {
   cv::hconcat(parts, all);
   cv::cvtColor(all, all, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", all, bytes);
+  if (!cv::imencode(".png", all, bytes)) {
+    return EnvironmentError("{}: a picture of {} x {} pixels cannot be encoded", file.string(),
+                            all.cols, all.rows);
+  }
   return WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 

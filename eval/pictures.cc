@@ -25,7 +25,10 @@ Expected<void> SavePng(const std::filesystem::path& path, const cv::Mat& rgb) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
+  if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9})) {
+    return EnvironmentError("{}: a picture of {} x {} pixels cannot be encoded", path.string(),
+                            rgb.cols, rgb.rows);
+  }
   return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 

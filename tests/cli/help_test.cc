@@ -102,11 +102,12 @@ TEST(CommandJson, IsAllThatStdoutHolds) {
   EXPECT_FALSE(std::filesystem::exists((folder / "map") / "mesh" / "house-2.ply"));
 }
 
-// Every file of a folder but stats.json, whose times differ.
+// Every file of a folder but stats.json, whose times differ, and run.json, whose run does.
 std::map<std::string, std::string> FilesOf(const std::filesystem::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file() || entry.path().filename() == "stats.json") continue;
+    const std::string name = entry.path().filename();
+    if (!entry.is_regular_file() || name == "stats.json" || name == "run.json") continue;
     files[std::filesystem::relative(entry.path(), folder)] = ReadFile(entry.path()).value();
   }
   return files;
