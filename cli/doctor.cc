@@ -10,6 +10,7 @@
 
 #include "cli/command.h"
 #include "core/json_text.h"
+#include "eval/child_process.h"
 #include "sim/gl_context.h"
 
 namespace tsdfpp {
@@ -30,6 +31,8 @@ Run AddDoctor(CLI::App&, const CommonOptions& common) {
         "{}\n",
         TSDFPP_VERSION, cores, mj_versionString(), CV_VERSION, PCL_VERSION_PRETTY, OPEN3D_VERSION,
         json["eigen"].get<std::string>());
+    json["children"] = ChildControl();
+    text += fmt::format("adapters ended by {}\n", json["children"].get<std::string>());
     auto gl = GlContext::Create();
     if (!gl) {
       // The rest of what is known is worth printing, and then the fault decides the exit code.

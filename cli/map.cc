@@ -11,6 +11,7 @@
 #include "eval/map_output.h"
 #include "eval/map_views.h"
 #include "eval/open_source.h"
+#include "eval/run_folder.h"
 #include "mapper/voxel_list.h"
 #include "sequence/sequence_json.h"
 
@@ -71,6 +72,18 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   return StartLoaded(options.load, options.source, options.until);
 }
 
+// The command with what was given.
+std::string CommandText(const CLI::App& app) {
+  std::string text = "tsdfpp map";
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0) continue;
+    if (!option->get_positional()) text += " " + option->get_name();
+    if (option->get_items_expected_max() == 0) continue;  // a flag
+    for (const std::string& value : option->results()) text += " " + value;
+  }
+  return text;
+}
+
 // Before anything is mapped, which may take long.
 Expected<void> CheckOutputs(const MapArguments& options) {
   if (!options.remove.empty() && SplitList(options.remove).empty()) {
@@ -79,7 +92,6 @@ Expected<void> CheckOutputs(const MapArguments& options) {
   if (IsOurSequence(options.out)) {
     return UsageError("--out '{}' is a sequence, expected another folder", options.out);
   }
-  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
   if (options.save.empty()) return {};
   const std::filesystem::path save(options.save);
   std::error_code ignored;
@@ -106,6 +118,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
                       options.views);
   }
   TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
+  TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, CommandText(app)));
+  const std::filesystem::path& out = run_folder.path();
 
   RunTimes times;
   Pose T_WC = Pose::Identity();  // of the last frame
@@ -132,13 +146,13 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   for (const std::string& remark : remarks) spdlog::warn("{}: {}", info.name, remark);
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
-  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out, mesh_format));
+  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, out, mesh_format));
   if (options.views > 0) {
-    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views,
-                                      std::filesystem::path(options.out) / "views"));
+    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views, out / "views"));
   }
   const MapMemory memory = map->Memory();
   nlohmann::json stats{
+      {"run", run_folder.id()},
       {"method", MethodName(config.method)},
       {"poses", PoseSourceName(config.poses)},
       {"segmentation", options.segmentation},
@@ -165,8 +179,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     stats["saved"] = {{"file", options.save},
                       {"bytes", std::filesystem::file_size(options.save, ignored)}};
   }
-  TSDFPP_RETURN_IF_ERROR(
-      WriteFile(std::filesystem::path(options.out) / "stats.json", JsonText(stats, 2) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "stats.json", JsonText(stats, 2) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(run_folder.Commit());
   const std::string fusion = frames == 0
                                  ? ""
                                  : fmt::format("; fusion median {:.1f} ms a frame",

@@ -69,6 +69,8 @@ bool HasControl(std::string_view text) {
   return false;
 }
 
+bool IsShowable(std::string_view text) { return IsUtf8(text) && !HasControl(text); }
+
 std::string OneLine(std::string_view text, std::size_t most) {
   std::string line;
   line.reserve(text.size());

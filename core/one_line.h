@@ -20,6 +20,9 @@ bool IsUtf8(std::string_view text);
 // Whether it holds a control character: C0 (tabs and line ends too), DEL or, as UTF-8, C1.
 bool HasControl(std::string_view text);
 
+// Whether it is UTF-8 without control characters: what OneLine() leaves as it is.
+bool IsShowable(std::string_view text);
+
 // The text with each control byte and each byte that is not UTF-8 written as \xNN, a line end and a
 // tab as a blank. What is over `most` bytes then loses its middle, for which " ... " stands;
 // characters stay whole. Text that is fine is returned as it is.

@@ -14,6 +14,7 @@
 #include "eval/mesh_folder.h"
 #include "eval/pictures.h"
 #include "eval/report_record.h"
+#include "eval/run_folder.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -61,8 +62,9 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
 }
 
 // Runs the adapters, one after the other, on the frames as they are given to a mapper.
-Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given,
-                           const std::filesystem::path& out, CompareResult& result) {
+Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const RunFolder& folder,
+                           CompareResult& result) {
+  const std::filesystem::path& out = folder.path();
   std::map<DatasetFormat, std::filesystem::path> sequences;
   Expected<void> done;
   for (const AdapterConfig& adapter : result.config.adapters) {
@@ -78,7 +80,7 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given,
     AdapterTask task = given;
     task.sequence = sequence;
     AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
-    done = RunAdapter(run, task, out / adapter.name);
+    done = RunAdapter(run, task, out / adapter.name, folder.out() / adapter.name);
     if (!done) break;
   }
   for (const auto& [layout, sequence] : sequences) {
@@ -100,7 +102,8 @@ void ScoreTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
     run.trajectories = std::move(*scores);
   } else {
     run.failure =
-        Error{scores.error().kind, fmt::format("{}: {}", run.config.name, scores.error().message)};
+        Error{scores.error().kind,
+              WithShownFolder(run, fmt::format("{}: {}", run.config.name, scores.error().message))};
   }
 }
 
@@ -203,8 +206,8 @@ bool IsEvaluated(const CompareResult& result, int frame) {
 }
 
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
-                                   const std::filesystem::path& out, const std::string& command,
-                                   const CompareProgress& progress) {
+                                   const std::filesystem::path& out_folder,
+                                   const std::string& command, const CompareProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const auto since = [](std::chrono::steady_clock::time_point t) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
@@ -214,10 +217,12 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   result.config = config;
   TSDFPP_ASSIGN(result.last_frame, LastFrame(result.info, config.until));
   if (config.every < 1) return UsageError("--every is {}, expected 1 or more", config.every);
-  if (IsOurSequence(out)) {
-    return UsageError("--out '{}' is a sequence, expected another folder", out.string());
+  if (IsOurSequence(out_folder)) {
+    return UsageError("--out '{}' is a sequence, expected another folder", out_folder.string());
   }
-  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(out));
+  TSDFPP_ASSIGN(RunFolder folder_of_run, RunFolder::Begin(out_folder, command));
+  const std::filesystem::path& out = folder_of_run.path();
+  result.run = folder_of_run.id();
   TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source, config.truth));
   result.truth = std::make_unique<SceneTruth>(std::move(truth));
   std::vector<ObjectInfo> names;
@@ -244,7 +249,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   }
   task.truncation_m = settings.voxel_m * settings.trunc_front_voxels;
   task.truncation_back_m = settings.voxel_m * settings.trunc_back_voxels;
-  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, out, result));
+  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, folder_of_run, result));
   Trajectory camera;
   PictureMaker pictures(result, out);
   std::optional<ReportRecorder> recorder;
@@ -317,6 +322,9 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   result.total_s = since(start);
   TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
   TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));
+  // `tsdfpp report` writes another page in its place.
+  TSDFPP_RETURN_IF_ERROR(folder_of_run.Commit({kPageFile}));
+  for (const auto& run : result.adapters) run->folder = run->shown;
   return result;
 }
 

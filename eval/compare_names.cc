@@ -9,9 +9,13 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::array<std::string_view, 11> kCompareFiles = {
-    "frames",     "frames.csv", "lock",          "log.txt",      "record",   "report.html",
-    "report.mp4", "run.json",   "sequence.json", "summary.json", "table.txt"};
+constexpr std::array<std::string_view, 16> kNames{
+    kSummaryFile, kFramesFile, kTableFile,        kPageFile,      kRecordFolder,  "report.mp4",
+    "run.json",   "lock",      "log.txt",         "mesh",         "trajectories", "frames",
+    "gates.json", "gates.md",  "gates.junit.xml", "sequence.json"};
+constexpr std::array<std::string_view, 3> kBeginnings{".", "figure-", "table-"};
+constexpr std::array<std::string_view, 2> kProfiles{"_paper", "_close"};
+constexpr std::array<PoseSource, 2> kPoseSources{PoseSource::kGiven, PoseSource::kIcp};
 
 }  // namespace
 
@@ -21,24 +25,19 @@ std::string RunFolderName(Method method, std::string_view profile, PoseSource po
   return name;
 }
 
-bool IsCompareName(std::string_view name) {
-  std::string lower(name);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
+bool IsCompareName(std::string_view given) {
+  std::string name(given);
+  std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (lower.starts_with('.') || lower.starts_with("figure-") || lower.starts_with("table-")) {
-    return true;
-  }
-  if (std::find(kCompareFiles.begin(), kCompareFiles.end(), lower) != kCompareFiles.end()) {
-    return true;
-  }
-  for (const Method method : AllMethods()) {
-    for (const char* profile : {"paper", "close"}) {
-      for (const PoseSource poses : {PoseSource::kGiven, PoseSource::kIcp}) {
-        if (lower == RunFolderName(method, profile, poses)) return true;
-      }
-    }
-  }
-  return false;
+  const auto begins = [&](std::string_view with) { return name.starts_with(with); };
+  const auto ends_as_a_map = [&](PoseSource poses) {
+    return std::any_of(kProfiles.begin(), kProfiles.end(), [&](std::string_view profile) {
+      return name.ends_with(fmt::format("{}_{}", profile, PoseSourceName(poses)));
+    });
+  };
+  return std::find(kNames.begin(), kNames.end(), name) != kNames.end() ||
+         std::any_of(kBeginnings.begin(), kBeginnings.end(), begins) ||
+         std::any_of(kPoseSources.begin(), kPoseSources.end(), ends_as_a_map);
 }
 
 }  // namespace tsdfpp

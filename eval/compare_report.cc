@@ -205,6 +205,7 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
                          {"read_s", result.read_s},
                          {"total_s", result.total_s},
                          {"runs", runs}};
+  if (!result.run.empty()) summary["run"] = result.run;
   if (!result.config.truth_note.empty()) summary["truth"] = result.config.truth_note;
   if (!result.adapters.empty()) {
     summary["adapters"] = nlohmann::json::array();

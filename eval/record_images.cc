@@ -60,7 +60,7 @@ cv::Mat DrawMask(const cv::Mat& mask) {
   return rgb;
 }
 
-std::string WebpBytes(const cv::Mat& rgb, bool lossless) {
+Expected<std::string> WebpBytes(const cv::Mat& rgb, bool lossless) {
   const int longest = std::max(rgb.cols, rgb.rows);
   if (longest > kMostWebpSide_px) {
     const double scale = static_cast<double>(kMostWebpSide_px) / longest;
@@ -69,9 +69,12 @@ std::string WebpBytes(const cv::Mat& rgb, bool lossless) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".webp", bgr, bytes,
-               {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality});
-  return {bytes.begin(), bytes.end()};
+  if (!cv::imencode(".webp", bgr, bytes,
+                    {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality})) {
+    return EnvironmentError("a picture of {} x {} pixels cannot be encoded as WebP", rgb.cols,
+                            rgb.rows);
+  }
+  return std::string(bytes.begin(), bytes.end());
 }
 
 }  // namespace tsdfpp

@@ -9,8 +9,10 @@
 #include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/base64.h"
+#include "eval/compare_names.h"
 #include "eval/recording.h"
 #include "eval/report_gates.h"
+#include "eval/run_folder.h"
 #include "sequence/sequence_json.h"
 #include "viewer/report_template.h"
 
@@ -26,6 +28,10 @@ struct Comparison {
   std::optional<Recording> recording;
   json pictures = json::array();
   json files = json::array();
+  std::optional<RunNote> note;
+
+  // Whether a file is of the run; of an older version's everything is.
+  bool Has(const std::string& name) const { return !note || note->files.contains(name); }
 };
 
 // A name for people: the folder's own, even where it is given as "." or with a slash at its end.
@@ -64,7 +70,7 @@ Expected<void> AddPictures(Comparison& comparison) {
   std::set<std::string> names;
   for (const std::filesystem::path& entry : EntriesOf(comparison.folder)) {
     const std::string name = entry.filename().string();
-    if (!name.ends_with(".png")) continue;
+    if (!name.ends_with(".png") || !comparison.Has(name)) continue;
     // With a recording the page makes the figure itself, sharper and for each frame.
     if (name.starts_with("table-") || (name.starts_with("figure-") && !comparison.recording)) {
       names.insert(name);
@@ -89,18 +95,26 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
   comparison.folder = folder;
   const std::filesystem::path path = folder / "summary.json";
   if (!IsThere(path)) {
+    TSDFPP_ASSIGN(comparison.note, ReadRunNote(folder));
+    if (!comparison.note) TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, std::nullopt, {}));
     return DataError("'{}' has no summary.json, expected a folder that tsdfpp compare wrote",
                      folder.string());
   }
   TSDFPP_ASSIGN(comparison.summary, ReadJsonObject(path));
   TSDFPP_RETURN_IF_ERROR(CheckSummary(comparison.summary, path));
+  // Before anything is found wrong that comes of it; the files' sizes when they have been read.
+  TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, RunOfSummary(comparison.summary), {}));
   TSDFPP_ASSIGN(comparison.csv, ReadFile(folder / "frames.csv"));
   if (!comparison.csv.starts_with("frame,method,profile,poses,")) {
     return DataError("{} does not begin with the columns frame,method,profile,poses",
                      (folder / "frames.csv").string());
   }
   TSDFPP_ASSIGN(comparison.recording, ReadRecording(folder));
+  TSDFPP_ASSIGN(comparison.note, ReadRunNote(folder));
   TSDFPP_RETURN_IF_ERROR(AddPictures(comparison));
+  std::set<std::string> read{kSummaryFile, kFramesFile, "record/record.json", "record/record.bin"};
+  for (const json& picture : comparison.pictures) read.insert(picture["file"].get<std::string>());
+  TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, RunOfSummary(comparison.summary), read));
   for (const char* name : {"summary.json", "frames.csv", "record/record.bin"}) {
     const std::filesystem::path file = folder / name;
     if (!IsThere(file)) continue;

@@ -45,6 +45,8 @@ class ReportRecorder {
 
  private:
   nlohmann::json Add(const std::string& bytes);
+  // The image as a file; nothing where it cannot be encoded, which failure_ then says.
+  std::string Encoded(const cv::Mat& rgb, bool lossless);
   nlohmann::json AddImage(const cv::Mat& rgb, bool lossless);
   Expected<void> WriteStill(const std::string& name, int frame, const std::string& bytes) const;
   nlohmann::json AddMesh(const TriangleMesh& mesh, const VertexMeasures& measures);
@@ -64,6 +66,7 @@ class ReportRecorder {
   nlohmann::json keys_ = nlohmann::json::array();
   std::vector<int> stills_;
   std::vector<nlohmann::json> runs_;
+  std::optional<Error> failure_;
   float nearest_m_ = 0;  // depth that the depth images show, fixed at the first key frame
   float farthest_m_ = 0;
 };

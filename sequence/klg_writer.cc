@@ -46,6 +46,7 @@ class KlgWriter : public DatasetWriter {
     Put(static_cast<std::int32_t>(colour.size()));
     out_.write(depth.data(), static_cast<std::streamsize>(depth.size()));
     out_.write(colour.data(), static_cast<std::streamsize>(colour.size()));
+    if (!out_) return EnvironmentError("{}: cannot be written", (folder_ / kRecording).string());
     if (!frame.mask.empty()) {
       TSDFPP_RETURN_IF_ERROR(WriteEncoded(folder_ / fmt::format("mask/{:06d}.png", count_),
                                           EncodePng(frame.mask, name)));

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <vector>
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kNotes = "notes";
+constexpr const char* kNotesAside = "notes-aside";
 constexpr const char* kSet = "set";
 
 // An absolute path without a trailing slash has a file name and a folder it stands in.
@@ -172,10 +174,30 @@ Expected<void> StagingFolder::Clear() {
   return MakeWritableFolder(path_);
 }
 
+bool StagingFolder::Exchange() {
+  // Were this process killed in between, its notes would say of the earlier set, which stands in
+  // path_ then, what is true of the new one.
+  const fs::path aside = root_ / kNotesAside;
+  std::error_code ignored;
+  if (kind_ == Kind::kShared) fs::rename(notes(), aside, ignored);
+  if (renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, out_.c_str(), RENAME_EXCHANGE) == 0) {
+    fs::remove_all(root_, ignored);
+    return true;
+  }
+  if (kind_ == Kind::kShared) fs::rename(aside, notes(), ignored);
+  return false;
+}
+
 Expected<void> StagingFolder::TakeThePlace() {
-  const fs::path old = Sibling(fmt::format("{}.old", getpid()));
   std::error_code code;
   const bool replaces = fs::exists(out_, code);
+  // In one stroke, so that there is a sequence at every moment.
+  if (replaces && Exchange()) {
+    mine_ = false;
+    return {};
+  }
+  // Where the file system cannot, the earlier one stands aside for a moment.
+  const fs::path old = Sibling(fmt::format("{}.old", getpid()));
   if (replaces) fs::rename(out_, old, code);
   if (!code) {
     fs::rename(path_, out_, code);

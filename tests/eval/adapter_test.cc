@@ -149,6 +149,13 @@ TEST(Adapter, IsReadStrictlyAndWrittenBack) {
       {Toml("x", "[\"x\"]", "layout = \"disc\"\n"), "disc"},
       {Toml("x", "[\"x\"]", "time_limit_s = 0\n"), "time_limit_s is 0"},
       {Toml("x", "[\"x\"]", "memory_limit_mb = -1\n"), "memory_limit_mb is -1"},
+      {Toml("x", "[\"x\"]", "process_limit = 0\n"), "process_limit is 0, expected 1 to 30000"},
+      {Toml("x", "[\"x\"]", "log_limit_mb = 0\n"), "log_limit_mb is 0"},
+      {Toml("x", "[\"x\"]", "log_limit_mb = 1e9\n"), "log_limit_mb is 1000000000"},
+      {Toml("x", "[\"x\"]", "disk_limit_mb = -2\n"), "disk_limit_mb is -2"},
+      {Toml("x", "[\"x\"]", "memory_limit_mb = 1e200\n"), "expected above 0 and at most"},
+      {Toml("a\\u0007b", "[\"x\"]"), "name is 'a?b'"},
+      {Toml(std::string(101, 'n'), "[\"x\"]"), "at most 100 bytes"},
       {Toml("x", "[\"x\"]", "scale = 0\n"), "scale is 0"},
       {Toml("x", "[\"x\"]", "match = \"luck\"\n"), "match is 'luck'"},
   };
@@ -166,6 +173,25 @@ TEST(Adapter, IsReadStrictlyAndWrittenBack) {
   ASSERT_FALSE(unknown.has_value());
   EXPECT_NE(unknown.error().message.find("unknown word '{sequenz'"), std::string::npos)
       << unknown.error().message;
+}
+
+// An adapter must not write over what compare itself leaves.
+TEST(Adapter, HasANameOfItsOwn) {
+  const TempFolder folder;
+  for (const char* name :
+       {"summary.json", "Summary.JSON", "frames.csv", "table.txt", "report.html", "report.mp4",
+        "run.json", "record", "frames", "gates.json", "figure-close-gt.png", "table-icp.png",
+        "tsdf_close_gt", "tsdf++-anchored_paper_icp", "not-yet-known_close_icp"}) {
+    ASSERT_TRUE(WriteFile(folder / "a.toml", Toml(name, "[\"x\"]")).has_value());
+    const auto result = ReadAdapter(folder / "a.toml");
+    ASSERT_FALSE(result.has_value()) << name;
+    EXPECT_NE(result.error().message.find("of its own"), std::string::npos)
+        << result.error().message;
+  }
+  for (const char* name :
+       {"mine", "tsdf", "open3d-scalable", "records", "close_gt", "my_close_gt2"}) {
+    EXPECT_EQ(Read(folder, Toml(name, "[\"x\"]")).name, name);
+  }
 }
 
 // A comparison of shell scripts that copy prepared meshes.
@@ -231,6 +257,16 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
       Script("talks", std::string(kCopy) + "; echo half > timing.json"),
       Script("lost",
              std::string(kCopy) + "; mkdir trajectories; echo 1 2 > trajectories/left-3.txt"),
+      Script("pipe", std::string(kCopy) + "; rm meshes/000003/scene.ply; "
+                                          "mkfifo meshes/000003/scene.ply"),
+      Script("link", std::string(kCopy) + "; rm meshes/000006/scene.ply; "
+                                          "ln -s $2/000006/scene.ply meshes/000006/scene.ply"),
+      Script("moves", "mv meshes away; rm -rf meshes; ln -s $2 meshes"),
+      Script("times", std::string(kCopy) + "; ln -s /dev/zero timing.json"),
+      Script("leaves", std::string(kCopy) + "; mkfifo queue; ln -s /dev/zero endless; "
+                                            "touch \"$(printf 'a\\377b')\""),
+      Script("cut", "printf '\\342\\202\\254%.0s' $(seq 100); printf '\\342\\202'; exit 3"),
+      Script("log", std::string(kCopy) + "; rm log.txt; mkfifo log.txt"),
       Script("last", kCopy),
   };
   const auto result = RunCompare(source, config, folder_ / "out", "the command", {});
@@ -244,8 +280,13 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
       {"half", "scene.ply"},
       {"silent", "meshes: no such folder"},
       {"late", "holds nothing for frame 3"},
-      {"talks", "timing.json: not JSON"},
-      {"lost", "left-3.txt"}};
+      {"talks", "talks/timing.json: not JSON"},
+      {"lost", "left-3.txt"},
+      {"pipe", "pipe/meshes/000003/scene.ply is a pipe, expected a file"},
+      {"link", "link/meshes/000006/scene.ply is a link, expected a file"},
+      {"moves", "moves/meshes is a link, expected a file"},
+      {"times", "times/timing.json is a link, expected a file"},
+      {"cut", "ended with exit code 3"}};
   const std::string table = SummaryTable(*result);
   const nlohmann::json summary = SummaryJson(*result, "the command");
   ASSERT_EQ(summary.at("adapters").size(), config.adapters.size());
@@ -268,6 +309,20 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
     EXPECT_NE(table.find("failed: " + run.failure->message), std::string::npos) << table;
     EXPECT_EQ(json.at("failure"), run.failure->message);
   }
+  // All of it can be written down, also half a character.
+  EXPECT_NO_THROW((void)summary.dump());
+  EXPECT_EQ(ReadFile(folder_ / "out/summary.json").value_or("").find(".tsdfpp-run"),
+            std::string::npos);
+  for (const char* gone :
+       {"leaves/queue", "leaves/endless", "log/log.txt", "pipe/meshes/000003/scene.ply"}) {
+    EXPECT_FALSE(fs::exists(fs::symlink_status(folder_ / "out" / gone))) << gone;
+  }
+  const auto& leaves = *std::find_if(result->adapters.begin(), result->adapters.end(),
+                                     [](const auto& run) { return run->config.name == "leaves"; });
+  EXPECT_EQ(leaves->remarks,
+            std::vector<std::string>{"3 links, pipes, devices or files with odd names are removed "
+                                     "from " +
+                                     (folder_ / "out/leaves").string()});
   // What an adapter is given: the frames, and nothing of the truth.
   const std::string seen = ReadFile(folder_ / "out/good/seen.txt").value_or("");
   EXPECT_NE(seen.find("Color0006.png"), std::string::npos) << seen;
