@@ -156,7 +156,8 @@ TEST(MapFileSize, BlocksAreCountedBeforeTheyAreMade) {
   const std::string file = MapToBytes(*map);
   Limits limits;
   std::int64_t raw = 0;
-  for (const auto& [name, bytes] : UnpackSections(file, "map.tsdf").value()) {
+  const auto sections = UnpackSections(file, "map.tsdf").value();
+  for (const auto& [name, bytes] : sections) {
     raw += static_cast<std::int64_t>(bytes.size());
   }
   limits.map_bytes = raw;
