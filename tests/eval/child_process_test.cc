@@ -11,6 +11,8 @@
 #include <sstream>
 #include <thread>
 
+#include "core/files.h"
+#include "core/one_line.h"
 #include "eval/capped_log.h"
 #include "eval/control_group.h"
 #include "tests/core/temp_folder.h"
@@ -39,7 +41,7 @@ std::vector<pid_t> Numbers(const fs::path& file) {
 
 bool IsThere(pid_t process) { return kill(process, 0) == 0; }
 
-ChildLimits Limits(double time_s = 60, bool control_group = true) {
+ChildLimits RoomyLimits(double time_s = 60, bool control_group = true) {
   ChildLimits limits;
   limits.time_s = time_s;
   limits.memory_bytes = 2000 * kMb;
@@ -48,13 +50,87 @@ ChildLimits Limits(double time_s = 60, bool control_group = true) {
 }
 
 ChildOutcome RunWords(const TempFolder& folder, const std::vector<std::string>& words,
-                      const ChildLimits& limits = Limits()) {
+                      const ChildLimits& limits = RoomyLimits()) {
   return RunChildProcess("it", words, folder.path(), folder / "log", limits);
 }
 
 ChildOutcome RunPython(const TempFolder& folder, const std::string& script,
-                       const ChildLimits& limits = Limits()) {
+                       const ChildLimits& limits = RoomyLimits()) {
   return RunWords(folder, {kPython, "-c", script}, limits);
+}
+
+ChildOutcome Shell(const TempFolder& folder, const std::string& script,
+                   const ChildLimits& limits = RoomyLimits()) {
+  return RunChildProcess("it", {"sh", "-c", script}, folder.path(), folder / "log", limits);
+}
+
+TEST(ChildProcess, EndsWellAndIsMeasured) {
+  const TempFolder folder;
+  const ChildOutcome outcome = Shell(folder, "pwd; echo oops >&2; read x || echo no input");
+  EXPECT_FALSE(outcome.failure.has_value());
+  EXPECT_EQ(ReadFile(folder / "log").value_or(""),
+            fs::canonical(folder.path()).string() + "\noops\nno input\n");
+  EXPECT_GT(outcome.wall_s, 0);
+  EXPECT_GT(outcome.peak_bytes, 100'000);  // no shell is smaller
+}
+
+TEST(ChildProcess, FailuresAreSentences) {
+  const TempFolder folder;
+  const ChildOutcome code = Shell(folder, "echo first; echo 'no such model'; exit 3");
+  ASSERT_TRUE(code.failure.has_value());
+  EXPECT_EQ(code.failure->kind, ErrorKind::kData);
+  EXPECT_EQ(code.failure->message, "it: ended with exit code 3; " + (folder / "log").string() +
+                                       " ends with: no such model");
+  const ChildOutcome crash = Shell(folder, "kill -SEGV $$");
+  ASSERT_TRUE(crash.failure.has_value());
+  EXPECT_NE(crash.failure->message.find("was ended by signal 11"), std::string::npos);
+  EXPECT_NE(crash.failure->message.find("it said nothing"), std::string::npos);
+  const ChildOutcome missing =
+      RunChildProcess("it", {"/nowhere/mapper"}, folder.path(), folder / "log", RoomyLimits());
+  ASSERT_TRUE(missing.failure.has_value());
+  EXPECT_EQ(missing.failure->kind, ErrorKind::kEnvironment);
+  EXPECT_EQ(missing.failure->message,
+            "it: '/nowhere/mapper' cannot be run (No such file or directory)");
+}
+
+TEST(ChildProcess, WhatHangsIsEndedWithAllThatItStarted) {
+  const TempFolder folder;
+  const ChildOutcome outcome =
+      Shell(folder, "sleep 600 & echo $! > pid; sleep 600", RoomyLimits(3));
+  ASSERT_TRUE(outcome.failure.has_value());
+  EXPECT_NE(outcome.failure->message.find("ran longer than its limit of 3 s, and was ended"),
+            std::string::npos)
+      << outcome.failure->message;
+  EXPECT_LT(outcome.wall_s, 60);
+  const std::string pid = ReadFile(folder / "pid").value_or("");
+  ASSERT_FALSE(pid.empty());
+  // Killed: it is gone, or whoever adopted it still has to take note. On a busy machine the kernel
+  // takes a while.
+  constexpr int kMostLooks = 1000;
+  std::string state = "S";
+  for (int look = 0; look < kMostLooks && state != "Z" && !state.empty(); ++look) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::ifstream stat("/proc/" + pid.substr(0, pid.find('\n')) + "/stat");
+    std::string text;
+    state = std::getline(stat, text) ? text.substr(text.rfind(')') + 2, 1) : "";
+  }
+  EXPECT_TRUE(state == "Z" || state.empty()) << state;
+}
+
+TEST(ChildProcess, WhatEatsMemoryIsEnded) {
+  const TempFolder folder;
+  ChildLimits small = RoomyLimits();
+  small.memory_bytes = 150 * kMb;
+  const ChildOutcome outcome =
+      RunChildProcess("it",
+                      {"/usr/bin/python3", "-c",
+                       "x = []\nwhile True:\n  x.append(bytearray(b'x') * 10_000_000)\n  "
+                       "import time; time.sleep(0.02)"},
+                      folder.path(), folder / "log", small);
+  ASSERT_TRUE(outcome.failure.has_value());
+  EXPECT_NE(outcome.failure->message.find("more than its limit of 150 MB"), std::string::npos)
+      << outcome.failure->message;
+  EXPECT_GT(outcome.peak_bytes, 150 * kMb);
 }
 
 std::string Message(const ChildOutcome& outcome) {
@@ -88,7 +164,7 @@ TEST_P(ChildTree, WhoLeftTheGroupIsEndedWithTheProgram) {
                                              "for i in range(3):\n"
                                              "    away(lambda: time.sleep(600))\n"
                                              "written(3)\n",
-                                         Limits(60, GetParam()));
+                                         RoomyLimits(60, GetParam()));
   EXPECT_EQ(Message(outcome), "");
   EXPECT_GE(outcome.most_processes, 1);
   EXPECT_LT(outcome.wall_s, 60);
@@ -103,7 +179,7 @@ TEST_P(ChildTree, WhoLeftTheGroupIsEndedAtTheLimitOfTime) {
                                          std::string(kAway) +
                                              "away(lambda: time.sleep(600))\nwritten(1)\n"
                                              "time.sleep(600)\n",
-                                         Limits(2, GetParam()));
+                                         RoomyLimits(2, GetParam()));
   EXPECT_NE(Message(outcome).find("ran longer than its limit of 2 s, and was ended"),
             std::string::npos)
       << Message(outcome);
@@ -114,7 +190,7 @@ TEST_P(ChildTree, WhoLeftTheGroupIsEndedAtTheLimitOfTime) {
 
 TEST_P(ChildTree, WhoLeftTheGroupIsCounted) {
   const TempFolder folder;
-  ChildLimits limits = Limits(60, GetParam());
+  ChildLimits limits = RoomyLimits(60, GetParam());
   limits.memory_bytes = 150 * kMb;
   const ChildOutcome outcome =
       RunPython(folder,
@@ -128,7 +204,7 @@ TEST_P(ChildTree, WhoLeftTheGroupIsCounted) {
 
 TEST_P(ChildTree, TooManyProcessesAreEnded) {
   const TempFolder folder;
-  ChildLimits limits = Limits(60, GetParam());
+  ChildLimits limits = RoomyLimits(60, GetParam());
   limits.processes = 20;
   const ChildOutcome outcome =
       RunPython(folder,
@@ -155,7 +231,7 @@ TEST_P(ChildTree, WhoKeepsStartingHimselfAnewIsEnded) {
                                          "for i in range(50000):\n"
                                          "    if os.fork(): os._exit(0)\n"
                                          "    with open('count', 'a') as f: f.write('x')\n",
-                                         Limits(60, GetParam()));
+                                         RoomyLimits(60, GetParam()));
   EXPECT_EQ(Message(outcome), "");
   const std::size_t count = Text(folder / "count").size();
   EXPECT_GT(count, 0U);
@@ -173,7 +249,7 @@ TEST_P(ChildTree, AllEndsWhenWeAreKilled) {
                   "away(lambda: time.sleep(600))\nwritten(1)\n"
                   "with open('pids', 'a') as file: file.write(f'{os.getpid()}\\n')\n"
                   "time.sleep(600)\n",
-              Limits(60, GetParam()));
+              RoomyLimits(60, GetParam()));
     _exit(0);
   }
   const auto wait_for = [](const auto& done) {
@@ -193,20 +269,21 @@ TEST_P(ChildTree, AllEndsWhenWeAreKilled) {
 TEST_P(ChildTree, WhoEndsHisWatcherHasFailed) {
   const TempFolder folder;
   const ChildOutcome outcome =
-      RunWords(folder, {"sh", "-c", "kill -9 $PPID; sleep 600"}, Limits(60, GetParam()));
+      RunWords(folder, {"sh", "-c", "kill -9 $PPID; sleep 600"}, RoomyLimits(60, GetParam()));
   EXPECT_NE(Message(outcome).find("it: ended the process that watches it"), std::string::npos)
       << Message(outcome);
 }
 
 TEST_P(ChildTree, WhatAProgramDoesToItsGroupStaysThere) {
   const TempFolder folder;
-  const ChildOutcome outcome = RunWords(folder, {"sh", "-c", "kill -9 0"}, Limits(60, GetParam()));
+  const ChildOutcome outcome =
+      RunWords(folder, {"sh", "-c", "kill -9 0"}, RoomyLimits(60, GetParam()));
   EXPECT_NE(Message(outcome).find("was ended by signal 9"), std::string::npos) << Message(outcome);
 }
 
 TEST(ChildOutput, OfTooMuchHeadAndTailAreKept) {
   const TempFolder folder;
-  ChildLimits limits = Limits(30);
+  ChildLimits limits = RoomyLimits(30);
   limits.log_bytes = 10'000;
   const ChildOutcome outcome = RunWords(
       folder, {"sh", "-c", "echo the first; yes | head -c 3000000; echo the last; exit 1"}, limits);
@@ -221,7 +298,7 @@ TEST(ChildOutput, OfTooMuchHeadAndTailAreKept) {
 
 TEST(ChildOutput, WhoNeverStopsWritingIsEnded) {
   const TempFolder folder;
-  ChildLimits limits = Limits(1);
+  ChildLimits limits = RoomyLimits(1);
   limits.log_bytes = 10'000;
   const ChildOutcome outcome = RunWords(folder, {"yes"}, limits);
   EXPECT_NE(Message(outcome).find("ran longer than its limit of 1 s"), std::string::npos);
@@ -246,7 +323,7 @@ TEST(ChildOutput, ALineIsNotCutInTheMiddleOfACharacter) {
 
 TEST(ChildOutput, TooMuchOnDiskIsEnded) {
   const TempFolder folder;
-  ChildLimits limits = Limits();
+  ChildLimits limits = RoomyLimits();
   limits.disk_bytes = 20 * kMb;
   const ChildOutcome many =
       RunWords(folder,
