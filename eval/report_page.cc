@@ -112,7 +112,9 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
   TSDFPP_ASSIGN(comparison.recording, ReadRecording(folder));
   TSDFPP_ASSIGN(comparison.note, ReadRunNote(folder));
   TSDFPP_RETURN_IF_ERROR(AddPictures(comparison));
-  std::set<std::string> read{kSummaryFile, kFramesFile, "record/record.json", "record/record.bin"};
+  std::set<std::string> read{kSummaryFile, kFramesFile};
+  // Who takes the recording away has a page without it.
+  if (comparison.recording) read.insert({"record/record.json", "record/record.bin"});
   for (const json& picture : comparison.pictures) read.insert(picture["file"].get<std::string>());
   TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, RunOfSummary(comparison.summary), read));
   for (const char* name : {"summary.json", "frames.csv", "record/record.bin"}) {

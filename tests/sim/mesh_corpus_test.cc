@@ -134,7 +134,7 @@ TEST_F(MeshCorpus, AGivenPictureMustFit) {
   auto mesh = ImportMesh(cube, 1, folder_ / "none.png");
   ASSERT_FALSE(mesh.has_value());
   EXPECT_EQ(mesh.error().kind, ErrorKind::kData);
-  EXPECT_NE(mesh.error().message.find("none.png: no such file"), std::string::npos);
+  EXPECT_NE(mesh.error().message.find("none.png: no such image"), std::string::npos);
   const fs::path text = Write("text.png", "text");
   mesh = ImportMesh(cube, 1, text);
   ASSERT_FALSE(mesh.has_value());
