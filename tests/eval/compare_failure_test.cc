@@ -36,6 +36,35 @@ class BreakingSource : public FrameSource {
   Way way_;
 };
 
+// Puts files where maps' folders are to go while the run writes, in its hidden folder.
+class PlantingSource : public FrameSource {
+ public:
+  PlantingSource(std::filesystem::path out, std::vector<std::string> names)
+      : out_(std::move(out)), names_(std::move(names)) {}
+  const SequenceInfo& info() const override { return source_.info(); }
+  Expected<Frame> Read(int index) override {
+    if (index == kPlanted) {
+      for (const auto& entry : std::filesystem::directory_iterator(out_)) {
+        if (!entry.is_directory() || entry.path().filename().string().front() != '.') continue;
+        for (const std::string& name : names_) {
+          EXPECT_TRUE(WriteFile(entry.path() / name, "in the way").has_value());
+          ++planted_;
+        }
+      }
+    }
+    return source_.Read(index);
+  }
+  Expected<std::vector<TrueModel>> Truth() override { return source_.Truth(); }
+  std::size_t planted() const { return planted_; }
+
+ private:
+  static constexpr int kPlanted = 5;
+  std::filesystem::path out_;
+  std::vector<std::string> names_;
+  BoxSource source_{7};
+  std::size_t planted_ = 0;
+};
+
 CompareConfig TwoMaps() {
   CompareConfig config;
   config.methods = {Method::kTsdf, Method::kTsdfpp};
@@ -56,11 +85,11 @@ TEST(CompareFailure, AMapThatFailsIsSaidAndTheOthersAreKept) {
   for (const bool record : {false, true}) {
     const std::filesystem::path out = folder / (record ? "recorded" : "out");
     // Where the first map's meshes are to go there is a file.
-    ASSERT_TRUE(WriteFile(out / "tsdf_close_gt", "in the way").has_value());
-    BoxSource source(7);
+    PlantingSource source(out, {"tsdf_close_gt"});
     CompareConfig config = TwoMaps();
     config.record = record;
     const auto result = RunCompare(source, config, out, "the command", {});
+    ASSERT_EQ(source.planted(), 1U);
     ASSERT_TRUE(result.has_value()) << result.error().message;
     ASSERT_EQ(result->failed.size(), 1U);
     EXPECT_EQ(result->failed[0].folder, "tsdf_close_gt");
@@ -87,11 +116,9 @@ TEST(CompareFailure, AMapThatFailsIsSaidAndTheOthersAreKept) {
 
 TEST(CompareFailure, WhereNothingIsLeftThereIsNoResult) {
   const TempFolder folder;
-  for (const char* name : {"tsdf_close_gt", "tsdf++_close_gt"}) {
-    ASSERT_TRUE(WriteFile(folder / name, "in the way").has_value());
-  }
-  BoxSource source(7);
+  PlantingSource source(folder.path(), {"tsdf_close_gt", "tsdf++_close_gt"});
   const auto result = RunCompare(source, TwoMaps(), folder.path(), "the command", {});
+  ASSERT_EQ(source.planted(), 2U);
   ASSERT_FALSE(result.has_value());
   EXPECT_EQ(result.error().kind, ErrorKind::kEnvironment);
   EXPECT_TRUE(result.error().message.starts_with("tsdf, close, given poses, at frame 6: "))

@@ -124,7 +124,7 @@ TEST_P(PlanBlocksTest, AllInViewHoldsForTheKernelAtTheLatticesEnd) {
   const MapConfig config = ToyConfig(1 + GetParam() % 4);
   Frame frame = RenderToys(TableWithToys(), GetParam());
   frame.depth.setTo(2.0);  // a pixel says something of each voxel
-  const int far = (GetParam() % 2 == 0 ? 1 : -1) * (kFurthestBlock - 16);
+  const int far = (GetParam() % 2 == 0 ? 1 : -1) * (kFurthestBlock / 8);
   const Index3 offset{far, GetParam() < 3 ? far : 0, -far};
   frame.T_WC.translation() +=
       Eigen::Vector3d(offset.x, offset.y, offset.z) * (kBlockSide * config.voxel_m);

@@ -219,7 +219,10 @@ TEST(CofusionErrors, OurOwnSet) {
       {Text("sequence.json", "{"), "@/sequence.json: not a JSON object"},
       {Text("calibration.txt", "564.3 1 6 3 13 7"),
        "@/sequence.json: the intrinsics differ from those in calibration.txt"},
-      {TakeSizeAway, "@/sequence.json: images of 0x0 pixels, expected sides from 1 to 16384"},
+      {TakeSizeAway,
+       "@/sequence.json: a field is missing or of another type (width is 0, expected a whole "
+       "number "
+       "from 2 to 16384)"},
       {Text("trajectories/gt-boat-9.txt", ""),
        "@/trajectories/gt-boat-9.txt: object 9 is not listed in sequence.json"},
       {Remove("colour/Color0001.png"), "@/colour/Color0001.png: no such image"},
