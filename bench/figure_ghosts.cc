@@ -100,7 +100,7 @@ GhostSums SumGhosts(const Footage& footage, const SceneTruth& truth,
   const bool anchored = config.method == Method::kTsdfppAnchored;
   const double voxel_m = config.map.voxel_m;
   Observations observations(footage, truth.recent().back().index, config.map,
-                            config.method != Method::kTsdf);
+                            !IsOneField(config.method));
   const TrueModel& room = truth.surface(0).model();
   const NearestTruth nearest = FindNearestTruth(scores.samples.points, current);
   GhostSums sums;
@@ -165,7 +165,8 @@ Expected<void> MeasureGhosts(const FigureOptions& options) {
     const int frame = footage.truth_from.begin()->first;
     const SceneTruth& truth = *footage.truth_from.begin()->second;
     for (const char* profile : {"paper", "close"}) {
-      for (const Method method : {Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored}) {
+      for (const Method method :
+           {Method::kTsdfStatic, Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored}) {
         PipelineConfig config;
         config.method = method;
         TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(profile));

@@ -28,7 +28,8 @@ struct Layering {
                        resampling == Resampling::kObserved ? " observed" : "");
   }
 };
-constexpr std::array<Layering, 12> kLayerings{{{Method::kTsdf},
+constexpr std::array<Layering, 13> kLayerings{{{Method::kTsdfStatic},
+                                               {Method::kTsdf},
                                                {Method::kTsdfGuarded},
                                                {Method::kTsdfppLiteral},
                                                {Method::kTsdfpp, 2},

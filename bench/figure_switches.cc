@@ -114,8 +114,9 @@ Expected<void> MeasureSwitches(const FigureOptions& options) {
 Expected<void> MeasureSweep(const FigureOptions& options) {
   TSDFPP_ASSIGN(const Footage footage, Film({kSwitchesScene, 1, 1, kReveal, {kReveal}}));
   FigureTable table(Columns({"map", "back voxels"}));
-  for (const Method method : {Method::kTsdf, Method::kTsdfMin, Method::kTsdfGuarded,
-                              Method::kTsdfpp, Method::kTsdfppLiteral, Method::kTsdfppAnchored}) {
+  for (const Method method :
+       {Method::kTsdfStatic, Method::kTsdf, Method::kTsdfMin, Method::kTsdfGuarded, Method::kTsdfpp,
+        Method::kTsdfppLiteral, Method::kTsdfppAnchored}) {
     for (int back = 2; back <= 10; ++back) {
       PipelineConfig config;
       config.method = method;

@@ -10,6 +10,7 @@
 #include "eval/map_views.h"
 #include "eval/rasteriser.h"
 #include "eval/scene_sanity.h"
+#include "eval/scene_seams.h"
 #include "mapper/map_representation.h"
 #include "sim/simulated_source.h"
 #include "tests/core/temp_folder.h"
@@ -26,6 +27,8 @@ constexpr double kMedianError_m = 0.35e-3;
 // surface is found to be hidden are the triangle's there and the gradient here.
 constexpr double kMeshMedian_voxels = 0.005;
 constexpr double kMeshNear_voxels = 0.25;
+// Of the background's pixels beside objects; without rims a tenth of them sees nothing.
+constexpr double kRingShare = 0.02;
 constexpr double kMeshShare = 0.985;  // of the pixels that either sees; edges are among them
 
 class ToyCarRays : public ::testing::Test {
@@ -48,8 +51,9 @@ class ToyCarRays : public ::testing::Test {
     ASSERT_EQ(frames_->size(), static_cast<std::size_t>(kFrames));
   }
 
-  static std::unique_ptr<MapRepresentation> Mapped(Method method) {
+  static std::unique_ptr<MapRepresentation> Mapped(Method method, bool rims = true) {
     MapConfig config;
+    config.rims = rims;
     config.voxel_m = kVoxel_m;
     EXPECT_TRUE(config.SetProfile("paper").has_value());
     auto map = MakeMap(method, config);
@@ -136,6 +140,32 @@ TEST_F(ToyCarRays, SeeTheScenesMesh) {
               << static_cast<double>(near) / seen << " near\n";
     EXPECT_LE(errors[errors.size() / 2], kMeshMedian_voxels);
     EXPECT_GE(near, kMeshShare * seen);
+  }
+}
+
+// The ring of missing table around objects, which rims close: rays see it closed as the mesh does.
+TEST_F(ToyCarRays, LeaveNoRingAroundObjects) {
+  const Frame& last = frames_->back();
+  const std::deque<Frame> recent(frames_->end() - 3, frames_->end());
+  RayCastOptions options;
+  options.colour = false;
+  const auto ring = [&](const cv::Mat& depth) {
+    return ScoreSeams(depth, recent, kVoxel_m).beside_objects.share.value.value();
+  };
+  const auto cast = [&](const MapRepresentation& map) {
+    return ring(map.CastRays(last.intrinsics, last.T_WC, options).front().depth);
+  };
+  for (const Method method : {Method::kTsdfpp, Method::kTsdfppAnchored, Method::kVolumes}) {
+    SCOPED_TRACE(MethodName(method));
+    const auto map = Mapped(method);
+    const double of_mesh = ring(Rasterise(map->SceneMesh(), last.intrinsics, last.T_WC).depth);
+    const double of_rays = cast(*map);
+    const double without_rims = cast(*Mapped(method, false));
+    std::cout << MethodName(method) << ": " << of_rays << ", of its mesh " << of_mesh
+              << ", without rims " << without_rims << "\n";
+    EXPECT_NEAR(of_rays, of_mesh, kRingShare);
+    EXPECT_LE(of_rays, kRingShare);
+    EXPECT_GE(without_rims, of_rays + 2 * kRingShare);
   }
 }
 
