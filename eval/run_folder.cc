@@ -42,7 +42,7 @@ json RunNoteJson(const RunNote& note) {
   }
   return {{"schema", 1},
           {"generator", "tsdfpp"},
-          {"command", OneLine(note.command, note.command.size())},
+          {"command", OneLine(note.command, 4 * note.command.size())},
           {"run", note.run},
           {"files", std::move(files)}};
 }

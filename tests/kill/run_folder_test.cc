@@ -185,7 +185,7 @@ TEST(RunFolder, TheNoteListsWhatThereIs) {
   ASSERT_TRUE(note->has_value());
   EXPECT_EQ((*note)->run, run->id());
   EXPECT_EQ((*note)->run.size(), 16U);
-  EXPECT_EQ((*note)->command, "a command ?");
+  EXPECT_EQ((*note)->command, "a command \\xff");
   const std::map<std::string, std::optional<std::uintmax_t>> files{{"deep/file", 5},
                                                                    {"page", std::nullopt}};
   EXPECT_EQ((*note)->files, files);
