@@ -45,7 +45,7 @@ void MapFootage(const Footage& footage, const PipelineConfig& config,
   Pipeline pipeline(config, footage.info.objects);
   for (const Frame& frame : footage.frames) {
     if (frame.index > *looked_at.rbegin()) return;
-    pipeline.Process(frame);
+    pipeline.Process(frame).value();
     if (looked_at.contains(frame.index)) look(frame.index, pipeline.map());
   }
 }

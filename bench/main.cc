@@ -19,6 +19,7 @@
 #include "bench/render.h"
 #include "bench/scaling.h"
 #include "bench/side_by_side.h"
+#include "core/guard.h"
 
 namespace tsdfpp {
 namespace {
@@ -153,7 +154,9 @@ void AddScaling(CLI::App& app, Chosen& chosen) {
 }  // namespace
 }  // namespace tsdfpp
 
-int main(int argc, char** argv) {
+namespace {
+
+int RunBench(int argc, char** argv) {
   // OpenMP's waiting threads would take the cores from whoever comes after Open3D; the library
   // reads this as it is loaded, so the program starts itself again.
   if (std::getenv("OMP_WAIT_POLICY") == nullptr) {
@@ -188,13 +191,20 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "tsdfpp_bench: %s (see tsdfpp_bench %s --help)\n", error.what(), argv[1]);
+    tsdfpp::PrintError("tsdfpp_bench",
+                       fmt::format("{} (see tsdfpp_bench {} --help)", error.what(), argv[1]));
     return static_cast<int>(tsdfpp::ErrorKind::kUsage);
   }
   const auto done = chosen();
   if (!done) {
-    std::fprintf(stderr, "tsdfpp_bench: %s\n", done.error().message.c_str());
+    tsdfpp::PrintError("tsdfpp_bench", done.error().message);
     return static_cast<int>(done.error().kind);
   }
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return tsdfpp::GuardedMain("tsdfpp_bench", [&] { return RunBench(argc, argv); });
 }

@@ -225,7 +225,7 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
     };
     peer_growth_mb += growth_of([&] { peer.Integrate(frame); });
     for (Run& run : runs) {
-      run.growth_mb += growth_of([&] { run.pipeline->Process(frame); });
+      run.growth_mb += growth_of([&] { run.pipeline->Process(frame).value(); });
       run.frames.Measure(run.pipeline->map(), (i + 1) % options.every == 0 || i + 1 == count);
       if (i + 1 < count) continue;
       const cv::Mat labels = LargestObjectAlone(frame);

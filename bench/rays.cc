@@ -120,7 +120,7 @@ Expected<void> RunRaysBench(const RaysBenchOptions& options) {
     Pipeline pipeline(PipelineConfig{method, map, PoseSource::kGiven, {}}, info.objects);
     std::vector<RayTiming> timings;
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      pipeline.Process(frames[i]);
+      TSDFPP_RETURN_IF_ERROR(pipeline.Process(frames[i]));
       if (cast[i]) timings.push_back(Cast(pipeline.map(), frames[i], options.repeats));
     }
     PrintLine(std::string(MethodName(method)), timings, peer_ms);

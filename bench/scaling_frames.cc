@@ -59,7 +59,7 @@ std::vector<Tenth> RunLong(Method method, const MapConfig& config, const Footage
       const int filmed = at < kFilmed ? at : kRound - at;
       const double start = WallMilliseconds();
       const double cpu_start = CpuMilliseconds();
-      pipeline.Process(footage.frames[static_cast<std::size_t>(filmed)]);
+      pipeline.Process(footage.frames[static_cast<std::size_t>(filmed)]).value();
       times.ms.push_back(WallMilliseconds() - start);
       cpu.ms.push_back(CpuMilliseconds() - cpu_start);
     }

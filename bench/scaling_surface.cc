@@ -72,7 +72,7 @@ Expected<void> MeasureSurface(const ScalingOptions& options) {
           for (std::size_t i = 0; i < windowed[w].size(); ++i) {
             const double start = WallMilliseconds();
             const double cpu_start = CpuMilliseconds();
-            pipeline.Process(windowed[w][i]);
+            pipeline.Process(windowed[w][i]).value();
             if (i < kSurfaceWarmUp) continue;
             wall[run].ms.push_back(WallMilliseconds() - start);
             cpu[run].ms.push_back(CpuMilliseconds() - cpu_start);

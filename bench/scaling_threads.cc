@@ -46,7 +46,7 @@ void RunOnce(Method method, const MapConfig& config, const Footage& footage, int
   steps.StartRun();
   int number = 0;
   for (const Frame& frame : footage.frames) {
-    const StepTimes times = pipeline.Process(frame);
+    const StepTimes times = pipeline.Process(frame).value();
     if (++number <= kThreadsWarmUp) continue;
     steps.Add(0, 1e3 * times.update_poses_s);
     steps.Add(1, 1e3 * times.fuse_s);

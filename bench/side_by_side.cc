@@ -72,11 +72,11 @@ struct Timed {
   void Process(const std::vector<Frame>& frames, int to_skip) {
     for (int k = 0; k < static_cast<int>(frames.size()); ++k) {
       const double start = WallMilliseconds();
-      equal->Process(frames[static_cast<std::size_t>(k)]);
+      equal->Process(frames[static_cast<std::size_t>(k)]).value();
       if (k >= to_skip) equal_run.ms.push_back(WallMilliseconds() - start);
     }
     for (int k = 0; k < static_cast<int>(frames.size()); ++k) {
-      const StepTimes steps = shipped->Process(frames[static_cast<std::size_t>(k)]);
+      const StepTimes steps = shipped->Process(frames[static_cast<std::size_t>(k)]).value();
       if (k >= to_skip) shipped_run.ms.push_back(1e3 * steps.fuse_s);
     }
     equal_run.bytes = equal->map().Memory().bytes;

@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/sweep_progress.h"
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -62,7 +63,7 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments&
     const std::filesystem::path file =
         std::filesystem::path(options.out) / fmt::format("{}.json", stem);
     nlohmann::json json = BenchResultJson(set, made, name, options.commit);
-    TSDFPP_RETURN_IF_ERROR(WriteFile(file, json.dump(1) + "\n"));
+    TSDFPP_RETURN_IF_ERROR(WriteFile(file, JsonText(json, 1) + "\n"));
     result.json.push_back(std::move(json));
     result.text += fmt::format("{}\n", file.string());
   }

@@ -12,6 +12,8 @@
 #include <optional>
 #include <sstream>
 
+#include "core/data_folder.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -106,6 +108,12 @@ std::string SpeedText(int done, int total, double elapsed_s) {
   const double per_second = done / elapsed_s;
   const auto left_s = static_cast<int>((total - done) / per_second + 0.5);
   return fmt::format("{:.1f} frames/s, {}:{:02d} left", per_second, left_s / 60, left_s % 60);
+}
+
+void AddFollowLinks(CLI::App& app) {
+  app.add_flag_callback(
+      "--follow-links", [] { SetLinkPolicy(LinkPolicy::kAnywhere); },
+      "Follow symbolic links that lead out of the data's folder (docs/limits.md)");
 }
 
 std::vector<std::string> SplitList(const std::string& text) {

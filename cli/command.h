@@ -72,6 +72,9 @@ CLI::Validator WholeBetween(std::int64_t low, std::int64_t high);
 CLI::Validator OneOf(const std::vector<std::string>& words);
 CLI::Validator NotEmpty(const std::string& expected);
 
+// The flag --follow-links, for subcommands that read data with paths in it or folders of data.
+void AddFollowLinks(CLI::App& app);
+
 // The words between commas. Empty text gives none.
 std::vector<std::string> SplitList(const std::string& text);
 

@@ -135,10 +135,21 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   const auto show = [&](int done, int total) { bar.Show(done, total); };
   TSDFPP_ASSIGN(const CompareResult result,
                 RunCompare(*source, config, options.out, command, show));
+  for (const auto& run : result.runs) {
+    for (const std::string& remark : run->pipeline.Remarks()) {
+      spdlog::warn("{}: {}", run->Title(), remark);
+    }
+  }
+  // What was finished is the result; that something was not decides the exit code.
+  for (const std::string& line : FailureLines(result)) spdlog::error("{}", line);
+  int exit_code = 0;
+  if (!result.failed.empty()) exit_code = static_cast<int>(result.failed.front().error.kind);
+  if (result.stopped) exit_code = static_cast<int>(result.stopped->kind);
   return CommandResult{
       SummaryJson(result, command),
       FrontTable(result) + "\n" + SummaryTable(result) +
-          fmt::format("report: {}/report.html ({:.0f} s)\n", options.out, result.total_s)};
+          fmt::format("report: {}/report.html ({:.0f} s)\n", options.out, result.total_s),
+      exit_code};
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 #include <thread>
 
 #include "cli/command.h"
+#include "core/json_text.h"
+#include "eval/child_process.h"
 #include "sim/gl_context.h"
 
 namespace tsdfpp {
@@ -29,11 +31,13 @@ Run AddDoctor(CLI::App&, const CommonOptions& common) {
         "{}\n",
         TSDFPP_VERSION, cores, mj_versionString(), CV_VERSION, PCL_VERSION_PRETTY, OPEN3D_VERSION,
         json["eigen"].get<std::string>());
+    json["children"] = ChildControl();
+    text += fmt::format("adapters ended by {}\n", json["children"].get<std::string>());
     auto gl = GlContext::Create();
     if (!gl) {
       // The rest of what is known is worth printing, and then the fault decides the exit code.
       json["gl"] = nullptr;
-      std::fputs(common.json ? (json.dump(2) + "\n").c_str() : text.c_str(), stdout);
+      std::fputs(common.json ? (JsonText(json, 2) + "\n").c_str() : text.c_str(), stdout);
       return tl::unexpected(gl.error());
     }
     const GlInfo& info = (*gl)->info();

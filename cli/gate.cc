@@ -113,6 +113,7 @@ Expected<CommandResult> Explain(const GateRun& run, const References& references
 // The reports, with a picture for each gate that does not hold.
 Expected<CommandResult> Report(const GateRun& run, const References& references,
                                const std::filesystem::path& out) {
+  TSDFPP_RETURN_IF_ERROR(RemoveGateReport(out));
   GateExplanations explanations;
   for (const GateOutcome& outcome : run.gates) {
     if (outcome.passed()) continue;

@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/stop_on_signal.h"
+#include "core/folders.h"
 #include "core/intrinsics.h"
 #include "eval/scene_page.h"
 #include "sim/scene_list.h"
@@ -76,7 +77,7 @@ Expected<CommandResult> RunGenerate(const GenerateArguments& options) {
   if (options.out.empty()) return UsageError("--out is required (see tsdfpp generate --help)");
   std::optional<std::uint64_t> seed;
   if (options.seed_given->count() > 0) seed = options.seed;
-  if (std::filesystem::is_directory(options.scene)) {
+  if (IsFolder(options.scene)) {
     return UsageError("{}: is a folder, expected a scene file (.toml)", options.scene);
   }
   if (std::filesystem::path(options.scene).extension() == ".xml") {

@@ -1,19 +1,28 @@
 // The command `tsdfpp`. Exit codes: core/error.h; 0 where all went well.
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <map>
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/log_lines.h"
 #include "cli/report.h"
+#include "core/guard.h"
+#include "core/json_text.h"
+#include "core/one_line.h"
 
 namespace {
 
 using tsdfpp::CommonOptions;
 using tsdfpp::ErrorKind;
+
+constexpr std::size_t kMostOfAnOption = 300;  // shown of what was typed
 
 int RunCommand(int argc, char** argv) {
   CLI::App app("tsdfpp: measures what maps keep of surfaces that they can no longer see", "tsdfpp");
@@ -60,7 +69,8 @@ int RunCommand(int argc, char** argv) {
                                  : error.what();
     const auto used = app.get_subcommands();
     const std::string command = used.empty() ? "tsdfpp" : "tsdfpp " + used.front()->get_name();
-    std::fprintf(stderr, "tsdfpp: %s (see %s --help)\n", what.c_str(), command.c_str());
+    tsdfpp::PrintError("tsdfpp", fmt::format("{} (see {} --help)",
+                                             tsdfpp::OneLine(what, kMostOfAnOption), command));
     return static_cast<int>(ErrorKind::kUsage);
   }
   std::unique_ptr<tbb::global_control> limit;
@@ -70,18 +80,24 @@ int RunCommand(int argc, char** argv) {
   }
   const auto result = runs.at(app.get_subcommands().front())();
   if (!result) {
-    std::fprintf(stderr, "tsdfpp: %s\n", result.error().message.c_str());
+    tsdfpp::PrintError("tsdfpp", result.error().message);
     return static_cast<int>(result.error().kind);
   }
-  const std::string text = common.json ? result->json.dump(2) + "\n" : result->text;
-  std::fputs(text.c_str(), stdout);
-  return std::fflush(stdout) == 0 ? result->exit_code : static_cast<int>(ErrorKind::kEnvironment);
+  const std::string text = common.json ? tsdfpp::JsonText(result->json, 2) + "\n" : result->text;
+  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0) {
+    tsdfpp::PrintError("tsdfpp",
+                       fmt::format("the result cannot be printed ({})", std::strerror(errno)));
+    return static_cast<int>(ErrorKind::kEnvironment);
+  }
+  return result->exit_code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("tsdfpp"));
-  spdlog::set_pattern("%^%l%$: %v");
-  return RunCommand(argc, argv);
+  return tsdfpp::GuardedMain("tsdfpp", [&] {
+    spdlog::set_default_logger(spdlog::stderr_color_mt("tsdfpp"));
+    tsdfpp::LogOneLineEach();
+    return RunCommand(argc, argv);
+  });
 }

@@ -7,9 +7,11 @@
 #include "cli/map_start.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/map_output.h"
 #include "eval/map_views.h"
 #include "eval/open_source.h"
+#include "eval/run_folder.h"
 #include "mapper/voxel_list.h"
 #include "sequence/sequence_json.h"
 
@@ -70,6 +72,18 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   return StartLoaded(options.load, options.source, options.until);
 }
 
+// The command with what was given.
+std::string CommandText(const CLI::App& app) {
+  std::string text = "tsdfpp map";
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0) continue;
+    if (!option->get_positional()) text += " " + option->get_name();
+    if (option->get_items_expected_max() == 0) continue;  // a flag
+    for (const std::string& value : option->results()) text += " " + value;
+  }
+  return text;
+}
+
 // Before anything is mapped, which may take long.
 Expected<void> CheckOutputs(const MapArguments& options) {
   if (!options.remove.empty() && SplitList(options.remove).empty()) {
@@ -78,7 +92,6 @@ Expected<void> CheckOutputs(const MapArguments& options) {
   if (IsOurSequence(options.out)) {
     return UsageError("--out '{}' is a sequence, expected another folder", options.out);
   }
-  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
   if (options.save.empty()) return {};
   const std::filesystem::path save(options.save);
   std::error_code ignored;
@@ -105,6 +118,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
                       options.views);
   }
   TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
+  TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, CommandText(app)));
+  const std::filesystem::path& out = run_folder.path();
 
   RunTimes times;
   Pose T_WC = Pose::Identity();  // of the last frame
@@ -116,7 +131,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
         return DataError("{}: frame {} has no mask and frame {} has one, expected masks for all",
                          options.source.path, index, info.first_index);
       }
-      times.Add(pipeline.Process(frame));
+      TSDFPP_ASSIGN(const StepTimes step, pipeline.Process(frame));
+      times.Add(step);
       T_WC = frame.T_WC;
       bar.Show(index - start.first + 1, frames);
     }
@@ -126,15 +142,17 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
                  options.source.path);
   }
+  const std::vector<std::string> remarks = pipeline.Remarks();
+  for (const std::string& remark : remarks) spdlog::warn("{}: {}", info.name, remark);
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
-  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, options.out, mesh_format));
+  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, out, mesh_format));
   if (options.views > 0) {
-    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views,
-                                      std::filesystem::path(options.out) / "views"));
+    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views, out / "views"));
   }
   const MapMemory memory = map->Memory();
   nlohmann::json stats{
+      {"run", run_folder.id()},
       {"method", MethodName(config.method)},
       {"poses", PoseSourceName(config.poses)},
       {"segmentation", options.segmentation},
@@ -152,6 +170,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     stats["segmentation"] = "none";
     stats["remarks"] = {start.mask_remark};
   }
+  for (const std::string& remark : remarks) stats["remarks"].push_back(remark);
   if (!options.load.empty()) stats["loaded"] = options.load;
   if (!options.save.empty()) {
     const MappedRun run = RunOf(start, start.last);
@@ -160,8 +179,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     stats["saved"] = {{"file", options.save},
                       {"bytes", std::filesystem::file_size(options.save, ignored)}};
   }
-  TSDFPP_RETURN_IF_ERROR(
-      WriteFile(std::filesystem::path(options.out) / "stats.json", stats.dump(2) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "stats.json", JsonText(stats, 2) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(run_folder.Commit());
   const std::string fusion = frames == 0
                                  ? ""
                                  : fmt::format("; fusion median {:.1f} ms a frame",

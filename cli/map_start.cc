@@ -31,7 +31,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     // Saved by another program, which had no sequence.
     run.poses = PoseSourceName(PoseSource::kGiven);
     for (const InstanceId id : loaded.map->Objects()) {
-      run.objects.push_back({id, id == kBackground ? "background" : "object", ""});
+      run.objects.push_back(
+          {id, id == kBackground ? "background" : fmt::format("object{}", id), ""});
     }
   }
   MapStart start;

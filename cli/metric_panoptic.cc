@@ -2,10 +2,13 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
+#include <stdexcept>
 
 #include "cli/metric.h"
-#include "core/files.h"
+#include "core/data_folder.h"
+#include "core/json_text.h"
 #include "eval/evaluation.h"
 #include "eval/label_image.h"
 #include "metrics/segmentation.h"
@@ -50,25 +53,32 @@ struct Annotations {
   std::map<int, bool> is_thing;  // by category
 };
 
+// Throws where it is none: nlohmann's own conversion wraps what does not fit.
+int IdOf(const nlohmann::json& json) {
+  const auto id = WholeIn(json, 0, std::numeric_limits<int>::max());
+  if (!id) throw std::out_of_range(fmt::format("{} is no id", JsonShown(json)));
+  return static_cast<int>(*id);
+}
+
 Expected<Annotations> ReadAnnotations(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   Annotations out;
   try {
-    const auto json = nlohmann::json::parse(text);
     for (const auto& category : json.value("categories", nlohmann::json::array())) {
-      out.is_thing[category.at("id")] = category.value("isthing", 1) == 1;
+      out.is_thing[IdOf(category.at("id"))] = category.value("isthing", 1) == 1;
     }
     for (const auto& annotation : json.at("annotations")) {
       const std::string file = annotation.at("file_name");
-      const std::string id = annotation.at("image_id").dump();
+      const std::string id = JsonText(annotation.at("image_id"));
       std::vector<PanopticSegment>& segments = out.by_file[file];
       out.id_of_file[file] = id;
       out.file_of_id[id] = file;
       for (const auto& info : annotation.at("segments_info")) {
-        segments.push_back({info.at("id"), info.at("category_id"), info.value("iscrowd", 0) == 1});
+        segments.push_back(
+            {IdOf(info.at("id")), IdOf(info.at("category_id")), info.value("iscrowd", 0) == 1});
       }
     }
-  } catch (const nlohmann::json::exception& error) {
+  } catch (const std::exception& error) {
     return DataError("{}: is no panoptic JSON as COCO's: {}", path.string(), error.what());
   }
   if (out.by_file.empty()) return DataError("{}: has no annotations", path.string());
@@ -85,6 +95,8 @@ struct Totals {
 
 Expected<void> AddCoco(const MetricPanopticArguments& options, const Annotations& truth,
                        const Annotations& prediction, Totals& totals) {
+  const DataFolder truth_folder(options.truth);
+  const DataFolder predicted_folder(options.prediction);
   for (const auto& [file, segments] : truth.by_file) {
     const std::string& id = truth.id_of_file.at(file);
     const auto partner = prediction.file_of_id.find(id);
@@ -92,9 +104,11 @@ Expected<void> AddCoco(const MetricPanopticArguments& options, const Annotations
       return DataError("{}: has no prediction for image {}", options.prediction_json, id);
     }
     PanopticImage images[2];
-    TSDFPP_ASSIGN(images[0].ids, ReadNumbers(fs::path(options.truth) / file, true));
+    TSDFPP_ASSIGN(const fs::path true_image, truth_folder.Find(file));
+    TSDFPP_ASSIGN(images[0].ids, ReadNumbers(true_image, true));
     images[0].segments = segments;
-    TSDFPP_ASSIGN(images[1].ids, ReadNumbers(fs::path(options.prediction) / partner->second, true));
+    TSDFPP_ASSIGN(const fs::path predicted_image, predicted_folder.Find(partner->second));
+    TSDFPP_ASSIGN(images[1].ids, ReadNumbers(predicted_image, true));
     images[1].segments = prediction.by_file.at(partner->second);
     for (const PanopticImage& image : images) {
       for (const PanopticSegment& segment : image.segments) {
@@ -307,6 +321,7 @@ Run AddMetricPanoptic(CLI::App& app) {
                  "and STQ, the images being one sequence in order of their names");
   app.add_option("--gt-json", options->truth_json, "Of coco; GT_DIR.json by default");
   app.add_option("--pred-json", options->prediction_json, "Of coco; PRED_DIR.json by default");
+  AddFollowLinks(app);
   return [options] { return RunPanoptic(*options); };
 }
 

@@ -51,6 +51,7 @@ Run AddReplay(CLI::App& app, const CommonOptions&) {
       ->required();
   app.add_option("--out", options->out, "Output folder; by default out/replay/<cell>-<frame>")
       ->check(NotEmpty("a folder"));
+  AddFollowLinks(app);
   return [options] { return RunReplay(*options); };
 }
 

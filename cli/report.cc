@@ -82,6 +82,7 @@ Run AddReport(CLI::App& app, const CommonOptions&) {
       ->check(NotEmpty("a file"));
   app.add_flag("--video", options->video,
                "A film (MP4, H.264) in place of the page: camera, masks, the maps, the removal");
+  AddFollowLinks(app);
   return [options] { return RunReport(*options); };
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "cli/command.h"
+#include "core/data_folder.h"
 #include "eval/open_source.h"
 #include "sequence/calibration.h"
 
@@ -33,6 +34,7 @@ CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
                "Take a camera without poses on disk as one that does not move");
   app.add_flag("--unchecked", arguments.unchecked,
                "Do not look for wrong units and inverted poses");
+  AddFollowLinks(app);
   return path;
 }
 
@@ -43,6 +45,7 @@ std::string TextOf(const SequenceArguments& arguments) {
   if (arguments.depth_units > 0) text += fmt::format(" --depth-units {}", arguments.depth_units);
   if (arguments.fixed_camera) text += " --fixed-camera";
   if (arguments.unchecked) text += " --unchecked";
+  if (CurrentLinkPolicy() == LinkPolicy::kAnywhere) text += " --follow-links";
   return text;
 }
 

@@ -1,7 +1,8 @@
 #include "cli/stop_on_signal.h"
 
 #include <csignal>
-#include <cstdio>
+
+#include "core/guard.h"
 
 namespace tsdfpp {
 namespace {
@@ -30,7 +31,7 @@ StopOnSignal::~StopOnSignal() {
 const std::atomic<bool>& StopOnSignal::stop() { return stop_asked; }
 
 void StopOnSignal::Die(const Error& error) {
-  std::fprintf(stderr, "tsdfpp: %s\n", error.message.c_str());
+  PrintError("tsdfpp", error.message);
   std::raise(stop_signal);
 }
 

@@ -1,6 +1,7 @@
 #include <cstdio>
 
 #include "cli/command.h"
+#include "core/json_text.h"
 #include "eval/certify.h"
 
 namespace tsdfpp {
@@ -25,7 +26,7 @@ Expected<CommandResult> RunVerify(const VerifyArguments& options, const CommonOp
   CommandResult output{CertifyJson(*result), CertifyText(*result)};
   if (result->sound()) return output;
   // What was found is the result; that there is something decides the exit code.
-  std::fputs(common.json ? (output.json.dump(2) + "\n").c_str() : output.text.c_str(), stdout);
+  std::fputs(common.json ? (JsonText(output.json, 2) + "\n").c_str() : output.text.c_str(), stdout);
   return DataError("{}: the sequence is not sound, {} findings, the first: {}", options.sequence,
                    result->findings.size(), FindingText(result->findings.front()));
 }
@@ -39,6 +40,7 @@ Run AddVerify(CLI::App& app, const CommonOptions& common) {
       app.add_option("--share", options->share, "Share of the frames that are compared with rays")
           ->check(Between(0, 1))
           ->capture_default_str();
+  AddFollowLinks(app);
   app.add_flag("--all", options->all, "Compare all frames with rays")->excludes(share);
   return [options, &common] { return RunVerify(*options, common); };
 }

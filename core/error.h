@@ -14,6 +14,7 @@ enum class ErrorKind {
   kUsage = 2,        // something the user typed or wrote is wrong: an option, a TOML file
   kEnvironment = 3,  // the machine lacks something: GL, a library, disk
   kData = 4,         // data on disk cannot be used
+  kInternal = 5,     // a fault of the program itself (core/guard.h)
 };
 
 // One clear sentence: which file, field or option, what was found, what was expected.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/gltf_format.h"
+#include "core/json_text.h"
 
 namespace tsdfpp::gltf {
 
@@ -71,8 +72,7 @@ Expected<std::optional<std::size_t>> Document::Whole(const json& object, const c
   if (found == object.end()) return std::nullopt;
   if (!found->is_number_unsigned() || found->get<std::uint64_t>() > most) {
     return DataError("{}: {}: '{}' is {}, expected a whole number from 0 to {}", file_, where, key,
-                     found->dump(-1, ' ', false, json::error_handler_t::replace).substr(0, 40),
-                     most);
+                     JsonShown(*found), most);
   }
   return found->get<std::size_t>();
 }
@@ -143,10 +143,7 @@ Expected<void> Document::Parse(std::string bytes) {
     if (chunk == 1 && type == kBinaryChunk) body_ = content;
     at += kChunkHeaderBytes + content.size();
   }
-  root_ = json::parse(text, nullptr, false);
-  if (!root_.is_object()) {
-    return DataError("{}: its first chunk is not a JSON object", file_);
-  }
+  TSDFPP_ASSIGN(root_, ParseJsonObject(text, file_ + ": its first chunk"));
   return {};
 }
 

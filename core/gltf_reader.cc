@@ -6,6 +6,8 @@
 #include "core/gltf.h"
 #include "core/gltf_document.h"
 #include "core/gltf_format.h"
+#include "core/json_text.h"
+#include "core/limits.h"
 
 namespace tsdfpp {
 namespace {
@@ -14,8 +16,6 @@ using gltf::Elements;
 using nlohmann::json;
 
 constexpr auto kMost = std::numeric_limits<std::uint32_t>::max();
-// Vertices and corners of one file: a small file can name one mesh many times.
-constexpr std::size_t kMostElements = 200'000'000;
 // primitive.mode
 constexpr std::size_t kTriangles = 4;
 constexpr std::size_t kStrip = 5;
@@ -116,10 +116,8 @@ Expected<void> GlbReader::AddTriangles(const std::vector<std::uint32_t>& corners
 
 Expected<void> GlbReader::Count(std::size_t elements) {
   elements_ += elements;
-  if (elements_ > kMostElements) {
-    return DataError("{}: more than {} vertices and corners", file(), kMostElements);
-  }
-  return {};
+  return CheckLimit(&Limits::mesh_elements, static_cast<std::int64_t>(elements_), file(),
+                    "vertices and corners");
 }
 
 Expected<void> GlbReader::AddPositions(const json& attributes, const std::string& where,
@@ -285,7 +283,7 @@ Expected<std::vector<NamedMesh>> GlbReader::Read(std::string bytes) {
   if (required != document_.root().end() && required->is_array() && !required->empty()) {
     const json& name = (*required)[0];
     return DataError("{}: it requires the extension {}, which is not understood", file(),
-                     name.dump(-1, ' ', false, json::error_handler_t::replace));
+                     JsonShown(name));
   }
   const auto nodes = document_.root().find("nodes");
   const std::size_t node_count =

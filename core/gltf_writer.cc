@@ -8,6 +8,7 @@
 #include "core/files.h"
 #include "core/gltf.h"
 #include "core/gltf_format.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -128,7 +129,7 @@ Expected<void> WriteGlb(const std::filesystem::path& path, const std::vector<Nam
         json::array({json::object({{"doubleSided", true}, {"pbrMetallicRoughness", matt}})});
   }
   // Names come from files: what is not UTF-8 in them is replaced.
-  std::string text = document.dump(-1, ' ', false, json::error_handler_t::replace);
+  std::string text = JsonText(document);
   text.resize((text.size() + 3) / 4 * 4, ' ');
   std::string& body = content.bytes;  // a multiple of 4 long, as all that it holds is
 

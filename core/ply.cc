@@ -10,6 +10,9 @@
 #include <string>
 
 #include "core/files.h"
+#include "core/limits.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace {
@@ -186,6 +189,7 @@ Expected<Header> ParseHeader(const std::string& file, const std::string& bytes) 
         if (index != header.regions.size()) {
           return DataError("{}: region comments are not numbered 0, 1, ...", file);
         }
+        TSDFPP_RETURN_IF_ERROR(CheckLabel(name, fmt::format("{}: region {}", file, index)));
         header.regions.push_back(name);
       }
     } else if (word == "element") {
@@ -193,6 +197,9 @@ Expected<Header> ParseHeader(const std::string& file, const std::string& bytes) 
       if (!(words >> element.name >> element.count) || element.count > bytes.size()) {
         return DataError("{}: PLY element line '{}' cannot be read", file, line);
       }
+      TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::mesh_elements,
+                                        static_cast<std::int64_t>(element.count), file,
+                                        "elements of one kind"));
       header.elements.push_back(element);
     } else if (word == "property") {
       Property property;
@@ -242,7 +249,10 @@ void ReadVertex(const Element& element, Body& body, TriangleMesh& mesh) {
                            : property.name == "blue"  ? 2
                                                       : -1;
       if (channel >= 0 && property.type == Scalar::kUint8) {
-        colour[static_cast<std::size_t>(channel)] = static_cast<std::uint8_t>(value);
+        // Text may have any number here.
+        constexpr double kMostColour = 255;
+        const bool fits = value >= 0 && value <= kMostColour;
+        colour[static_cast<std::size_t>(channel)] = static_cast<std::uint8_t>(fits ? value : 0);
         coloured = true;
       }
     }
@@ -300,6 +310,11 @@ Expected<Parsed> Parse(const std::filesystem::path& path) {
   parsed.regions = header.regions;
   Body body(std::string_view(bytes).substr(header.body_at), header.ascii);
   for (const Element& element : header.elements) {
+    // Without properties it takes no bytes, so its count is bounded by nothing.
+    if (element.properties.empty() && element.count > 0) {
+      return DataError("{}: {} elements {} have no property, expected one at least", file,
+                       element.count, Quoted(element.name));
+    }
     for (std::size_t i = 0; i < element.count && body.Ok(); ++i) {
       if (element.name == "vertex") {
         ReadVertex(element, body, parsed.mesh);

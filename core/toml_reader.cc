@@ -1,5 +1,7 @@
 #include "core/toml_reader.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <sstream>
 
 #include "core/files.h"
@@ -23,9 +25,62 @@ std::optional<double> Number(const toml::node& node) {
   return number;
 }
 
+// Skips a string that begins at `at`: the place of its last quote, or the text's end.
+std::size_t EndOfString(std::string_view text, std::size_t at) {
+  const char quote = text[at];
+  const std::string three(3, quote);
+  const bool multiline = text.substr(at, 3) == three;
+  for (std::size_t i = at + (multiline ? 3 : 1); i < text.size(); ++i) {
+    if (text[i] == '\\' && quote == '"') {
+      ++i;
+    } else if (multiline ? text.substr(i, 3) == three : text[i] == quote || text[i] == '\n') {
+      return i + (multiline ? 2 : 0);
+    }
+  }
+  return text.size();
+}
+
+// How deep tables and lists lie within one another, by brackets and by the dots of keys, within one
+// header or one statement; toml++ itself bounds brackets only, and takes a place on the stack for
+// each.
+std::int64_t DepthOfToml(std::string_view text) {
+  std::vector<std::int64_t> open;  // of each bracket the depth that it added
+  std::int64_t depth = 0;
+  std::int64_t dots = 0;
+  std::int64_t deepest = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '#') {
+      i = std::min(text.find('\n', i), text.size());
+      dots = 0;
+    } else if (c == '"' || c == '\'') {
+      i = EndOfString(text, i);
+    } else if (c == '.') {
+      ++dots;
+    } else if (c == '[' || c == '{') {
+      open.push_back(dots + 1);
+      depth += dots + 1;
+      dots = 0;
+    } else if (c == ']' || c == '}') {
+      if (!open.empty()) {
+        depth -= open.back();
+        open.pop_back();
+      }
+      dots = 0;
+    } else if (c == '\n' || c == ',') {
+      dots = 0;
+    }
+    deepest = std::max(deepest, depth + dots);
+  }
+  return deepest;
+}
+
 }  // namespace
 
 Expected<toml::table> ParseToml(std::string_view text, std::string_view name) {
+  const auto shallow =
+      CheckLimit(&Limits::nesting, DepthOfToml(text), name, "tables and lists within one another");
+  if (!shallow) return UsageError("{}", shallow.error().message);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
@@ -36,7 +91,7 @@ Expected<toml::table> ParseToml(std::string_view text, std::string_view name) {
 }
 
 Expected<toml::table> ParseTomlFile(const std::filesystem::path& path) {
-  auto text = ReadFile(path);
+  auto text = ReadFile(path, &Limits::text_bytes);
   if (!text) return UsageError("{}", text.error().message);
   return ParseToml(*text, path.string());
 }

@@ -22,7 +22,10 @@ struct AdapterConfig {
   DatasetFormat layout = DatasetFormat::kCofusion;  // of the sequence; or tum, klg, 7scenes
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
-  double scale = 1;  // metres a unit of the meshes
+  int process_limit = 500;      // at once
+  double log_limit_mb = 10;     // kept of what it prints: half the beginning, half the end
+  double disk_limit_mb = 8000;  // of its output folder; of any file that it writes
+  double scale = 1;             // metres a unit of the meshes
   MatchMode match = MatchMode::kNames;
   std::filesystem::path folder;  // where its file is: {adapter}
 
@@ -62,6 +65,7 @@ struct AdapterRun {
 
   AdapterConfig config;
   std::filesystem::path folder;  // what it wrote: meshes/, trajectories/, timing.json; log.txt
+  std::filesystem::path shown;   // what that folder will be called
   ChildOutcome outcome;
   std::optional<Error> failure;  // the outcome's, or what is wrong with its files
   nlohmann::json timing;         // its own words; null where it wrote none
@@ -72,10 +76,13 @@ struct AdapterRun {
   std::optional<TrajectoryEvaluation> trajectories;
 };
 
-// Runs it into `out`, which is made anew. A failure of the adapter is the run's, not an error.
-// Errors: kUsage of CommandOf; kEnvironment where `out` cannot be made.
+// Runs it into `out`, which is made anew. A failure of the adapter is the run's, not an error; so
+// is anything but files and folders where its meshes, trajectories and times should be. Elsewhere
+// in its folder such things (links, pipes, devices, names that cannot be printed) are removed, with
+// a remark. `shown` is what `out` will be called, for messages. Errors: kUsage of CommandOf;
+// kEnvironment where `out` cannot be made.
 Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task,
-                          const std::filesystem::path& out);
+                          const std::filesystem::path& out, const std::filesystem::path& shown);
 
 // Scores its meshes at the truth's current frame, unless it failed before; what is wrong with them
 // becomes the run's failure.
@@ -86,6 +93,9 @@ void EvaluateAdapter(AdapterRun& run, const SceneTruth& truth, const std::vector
 // surfaces. Errors: those of the source and of writing.
 Expected<void> WriteForAdapters(FrameSource& source, DatasetFormat layout, int last,
                                 const std::filesystem::path& out);
+
+// The text with the folder's name as it will be.
+std::string WithShownFolder(const AdapterRun& run, std::string text);
 
 nlohmann::json ToJson(const AdapterRun& run);
 

@@ -9,6 +9,8 @@
 #include <thread>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
 #include "eval/sweep_metrics.h"
 #include "sequence/sequence_json.h"
 #include "sim/scene_builder.h"
@@ -81,9 +83,9 @@ Expected<BenchSet> BenchSet::Load(const fs::path& folder, const std::string& nam
   std::error_code code;
   if (!fs::exists(set.file, code)) {
     std::string known;
-    for (const auto& entry : fs::directory_iterator(folder, code)) {
-      if (!fs::exists(entry.path() / "set.toml", code)) continue;
-      known += (known.empty() ? "" : ", ") + entry.path().filename().string();
+    for (const fs::path& entry : EntriesOf(folder)) {
+      if (!IsThere(entry / "set.toml")) continue;
+      known += (known.empty() ? "" : ", ") + entry.filename().string();
     }
     return UsageError("there is no benchmark '{}' in {}, expected one of: {}", name,
                       folder.string(), known.empty() ? "none is there" : known);
@@ -203,18 +205,16 @@ json BenchResultJson(const BenchSet& set, const SweepResult& result, const std::
 }
 
 Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(file));
   const std::string where = file.string();
-  const json root = json::parse(text, nullptr, false);
-  if (!root.is_object()) return DataError("{}: is not JSON", where);
+  TSDFPP_ASSIGN(const json root, ReadJsonObject(file));
   if (root.value("kind", json()) != "tsdfpp bench result" ||
       root.value("schema", json()) != kBenchResultSchema) {
     return DataError("{}: is no benchmark result of schema {}", where, kBenchResultSchema);
   }
   if (root.value("bench_set", json()) != set.name || root.value("bench_hash", json()) != set.hash) {
     return DataError("{}: is of benchmark {} with hash {}, expected {} with {}", where,
-                     root.value("bench_set", json()).dump(),
-                     root.value("bench_hash", json()).dump(), set.name, set.hash);
+                     JsonShown(root.value("bench_set", json())),
+                     JsonShown(root.value("bench_hash", json())), set.name, set.hash);
   }
   BenchResult result;
   result.file = file.filename().string();
@@ -230,7 +230,7 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
     for (const json& entry : root.at("entries")) {
       auto& scores = result.scores[entry.at("sequence").get<std::string>()];
       if (!scores.empty()) {
-        return DataError("{}: sequence {} is there twice", where, entry.at("sequence").dump());
+        return DataError("{}: sequence {} is there twice", where, JsonShown(entry.at("sequence")));
       }
       for (const auto& [name, value] : entry.at("scores").items()) {
         scores[name] = value.is_number() ? Measured::Of(value.get<double>())
@@ -267,9 +267,8 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
 
 Expected<std::string> Leaderboard(const BenchSet& set, const fs::path& folder) {
   std::vector<fs::path> files;
-  std::error_code code;
-  for (const auto& entry : fs::directory_iterator(folder, code)) {
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  for (const fs::path& entry : EntriesOf(folder)) {
+    if (entry.extension() == ".json") files.push_back(entry);
   }
   if (files.empty()) {
     return UsageError("{}: holds no result, expected a folder of *.json", folder.string());

@@ -1,6 +1,7 @@
 #include "eval/cell.h"
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/pose_text.h"
 #include "sequence/sequence_json.h"
 
@@ -93,8 +94,7 @@ nlohmann::json CellToJson(const Cell& cell, const CellResult& result) {
 }
 
 Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object()) return DataError("cell {}: not JSON", cell.id);
+  TSDFPP_ASSIGN(const nlohmann::json json, ParseJsonObject(text, "cell " + cell.id));
   try {
     if (json.at("schema") != kCellSchema || json.at("key") != cell.key) {
       return DataError("cell {}: is of another program or of other settings", cell.id);
@@ -127,7 +127,7 @@ Expected<CellResult> CellStore::Read(const Cell& cell) const {
 }
 
 Expected<void> CellStore::Write(const Cell& cell, const CellResult& result) const {
-  return WriteFile(PathOf(cell.id), CellToJson(cell, result).dump(1) + "\n");
+  return WriteFile(PathOf(cell.id), JsonText(CellToJson(cell, result), 1) + "\n");
 }
 
 }  // namespace tsdfpp

@@ -26,14 +26,15 @@ CellMapper::CellMapper(const CellSettings& settings, const std::vector<ObjectInf
   }
 }
 
-void CellMapper::Process(const Frame& frame) {
+Expected<void> CellMapper::Process(const Frame& frame) {
   if (pipeline_) {
-    const StepTimes step = pipeline_->Process(frame);
+    TSDFPP_ASSIGN(const StepTimes step, pipeline_->Process(frame));
     times_.Add(step);
     frame_s_.push_back(step.track_s + step.update_poses_s + step.fuse_s);
   } else {
     frame_s_.push_back(open3d_->Integrate(frame));
   }
+  return {};
 }
 
 SceneMeshes CellMapper::Meshes(const std::set<InstanceId>& movers) {
@@ -86,7 +87,7 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
         std::binary_search(variant.evaluated.begin(), variant.evaluated.end(), index);
     const std::set<InstanceId> movers = MoversNow(source.info(), truth);
     for (Run& run : runs) {
-      run.mapper.Process(both.frame);
+      TSDFPP_RETURN_IF_ERROR(run.mapper.Process(both.frame));
       if (!evaluated) continue;
       SceneMeshes meshes = run.mapper.Meshes(movers);
       SabotageMeshes(run.sabotage, meshes);

@@ -18,7 +18,8 @@ class CellMapper {
   // The settings must be valid.
   CellMapper(const CellSettings& settings, const std::vector<ObjectInfo>& objects);
 
-  void Process(const Frame& frame);
+  // Errors: those of Pipeline::Process.
+  Expected<void> Process(const Frame& frame);
   // What an evaluation looks at, after the removals that it needs. Open3D's mesh has no labels.
   SceneMeshes Meshes(const std::set<InstanceId>& movers);
   RunCosts costs() const;

@@ -11,13 +11,17 @@
 #include <set>
 #include <utility>
 
+#include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/one_line.h"
 #include "eval/file_check.h"
 #include "eval/visibility_truth.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_reader.h"
 #include "sim/ray_scene.h"
 #include "sim/scene_builder.h"
+#include "sim/scene_inputs.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -91,16 +95,30 @@ bool SameModel(const TrueModel& a, const TrueModel& b) {
   return a.mesh_O.vertices == b.mesh_O.vertices && a.mesh_O.triangles == b.mesh_O.triangles;
 }
 
+// This scene is data, not what its user wrote: its files are those of the sequence.
+Expected<void> CheckInside(const SceneConfig& config, const fs::path& folder) {
+  TSDFPP_ASSIGN(const SceneInputs inputs, CollectInputs(config));
+  const DataFolder data(folder);
+  const fs::path root = AbsolutePath(folder).lexically_normal();
+  for (const auto& [place, file] : inputs.files) {
+    const std::string relative = file.lexically_normal().lexically_relative(root).string();
+    TSDFPP_ASSIGN(const fs::path found, data.Find(relative));
+  }
+  return {};
+}
+
 // Composes the scene again and compares what comes out with the models on disk.
 void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
                 CertifyResult& result) {
-  if (!fs::exists(folder / cofusion::kScene)) {
+  if (!IsThere(folder / cofusion::kScene)) {
     result.notes.emplace_back("scene.toml is not there: the scene was not composed again");
     return;
   }
   const auto config = LoadSceneConfig(folder / cofusion::kScene);
-  auto scene = config ? CompiledScene::Compile(*config)
-                      : Expected<CompiledScene>(tl::unexpected(config.error()));
+  const auto inside =
+      config ? CheckInside(*config, folder) : Expected<void>(tl::unexpected(config.error()));
+  auto scene = inside ? CompiledScene::Compile(*config)
+                      : Expected<CompiledScene>(tl::unexpected(inside.error()));
   if (!scene) {
     result.findings.push_back({"scene", cofusion::kScene, -1,
                                "the scene cannot be composed again: " + scene.error().message});
@@ -249,6 +267,7 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
     return DataError("{}: holds no {}, expected a sequence that tsdfpp generate made",
                      folder.string(), cofusion::kSequence);
   }
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   TSDFPP_ASSIGN(const SequenceRecord record, ReadSequenceJson(folder / cofusion::kSequence));
   CertifyResult result;
   result.sequence = record.info.name;
@@ -300,7 +319,8 @@ std::string FindingText(const Finding& finding) {
   std::string where = finding.subject;
   if (finding.frame >= 0)
     where += fmt::format("{}frame {}", where.empty() ? "" : ", ", finding.frame);
-  return where.empty() ? finding.sentence : where + ": " + finding.sentence;
+  // Names of files on disk may hold anything.
+  return OneLine(where.empty() ? finding.sentence : where + ": " + finding.sentence);
 }
 
 std::string CertifyText(const CertifyResult& result) {

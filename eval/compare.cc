@@ -8,10 +8,13 @@
 #include <fstream>
 
 #include "core/files.h"
+#include "core/guard.h"
+#include "eval/compare_names.h"
 #include "eval/compare_report.h"
 #include "eval/mesh_folder.h"
 #include "eval/pictures.h"
 #include "eval/report_record.h"
+#include "eval/run_folder.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -59,8 +62,9 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
 }
 
 // Runs the adapters, one after the other, on the frames as they are given to a mapper.
-Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given,
-                           const std::filesystem::path& out, CompareResult& result) {
+Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const RunFolder& folder,
+                           CompareResult& result) {
+  const std::filesystem::path& out = folder.path();
   std::map<DatasetFormat, std::filesystem::path> sequences;
   Expected<void> done;
   for (const AdapterConfig& adapter : result.config.adapters) {
@@ -76,7 +80,7 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given,
     AdapterTask task = given;
     task.sequence = sequence;
     AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
-    done = RunAdapter(run, task, out / adapter.name);
+    done = RunAdapter(run, task, out / adapter.name, folder.out() / adapter.name);
     if (!done) break;
   }
   for (const auto& [layout, sequence] : sequences) {
@@ -98,8 +102,84 @@ void ScoreTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
     run.trajectories = std::move(*scores);
   } else {
     run.failure =
-        Error{scores.error().kind, fmt::format("{}: {}", run.config.name, scores.error().message)};
+        Error{scores.error().kind,
+              WithShownFolder(run, fmt::format("{}: {}", run.config.name, scores.error().message))};
   }
+}
+
+// A frame as the sensor gave it and, where that differs, as it was.
+struct SeenFrames {
+  Frame given;
+  std::optional<Frame> true_frame;
+};
+
+// Reads a frame and lets the truth see it.
+Expected<SeenFrames> SeeFrame(FrameSource& source, int index, SceneTruth& truth) {
+  SeenFrames frames;
+  TSDFPP_ASSIGN(frames.given, source.Read(index));
+  if (source.IsSensed()) {
+    TSDFPP_ASSIGN(frames.true_frame, source.ReadTrue(index));
+  }
+  if (frames.given.mask.empty()) {
+    return DataError("{}: frame {} has no mask", source.info().name, index);
+  }
+  TSDFPP_RETURN_IF_ERROR(truth.Observe(frames.true_frame ? *frames.true_frame : frames.given));
+  return frames;
+}
+
+// What pictures needed of an evaluation.
+void DropMeshes(Evaluation& evaluation) {
+  evaluation.scene = {};
+  evaluation.revealed = {};
+  evaluation.table_reconstructed = {};
+}
+
+// Evaluates a map at a frame and writes what is to be seen of it.
+Expected<void> EvaluateRun(CompareRun& run, const Frame& frame,
+                           const std::vector<ObjectInfo>& names, const std::filesystem::path& out,
+                           const CompareResult& result, PictureMaker& pictures,
+                           std::optional<ReportRecorder>& recorder) {
+  const int index = frame.index;
+  SceneMeshes meshes = MeshesOf(run.pipeline.map(), result.movers);
+  if (result.config.keep_meshes) {
+    TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run.FolderName() / "frames", index));
+  }
+  run.evaluations.push_back(EvaluateMeshes(std::move(meshes), *result.truth, names, result.movers,
+                                           run.config.map.voxel_m, run.last_seen));
+  Evaluation& evaluation = run.evaluations.back();
+  run.times.mesh_s.push_back(evaluation.mesh_s);
+  TSDFPP_RETURN_IF_ERROR(pictures.Take(&run, evaluation, frame));
+  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(run, evaluation, frame));
+  const bool examined = index == result.reveal_frame.value_or(result.last_frame);
+  if (examined) {
+    auto copy = run.pipeline.map().Clone();
+    for (const InstanceId id : result.movers) copy->Remove(id);
+    TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, result.info, out / run.FolderName()));
+  }
+  DropMeshes(evaluation);
+  return {};
+}
+
+// Where no map and no adapter is left.
+Error NothingLeft(const CompareResult& result) {
+  const FailedRun& first = result.failed.front();
+  return {first.error.kind,
+          fmt::format("{}, at frame {}: {}{}", first.title, first.frame, first.error.message,
+                      result.failed.size() > 1 ? "; and the others too" : "")};
+}
+
+// The last frame at which all that is left was evaluated; before the first where there is none.
+int LastEvaluated(const CompareResult& result) {
+  int last = result.info.first_index - 1;
+  for (const auto& run : result.runs) {
+    if (!run->evaluations.empty()) last = std::max(last, run->evaluations.back().frame);
+  }
+  for (const auto& run : result.adapters) {
+    if (!run->failure && !run->evaluations.empty()) {
+      last = std::max(last, run->evaluations.back().frame);
+    }
+  }
+  return last;
 }
 
 }  // namespace
@@ -117,10 +197,7 @@ std::string CompareRun::Title() const {
 }
 
 std::string CompareRun::FolderName() const {
-  std::string name =
-      fmt::format("{}_{}_{}", MethodName(config.method), profile, PoseSourceName(config.poses));
-  std::replace(name.begin(), name.end(), '/', '-');
-  return name;
+  return RunFolderName(config.method, profile, config.poses);
 }
 
 bool IsEvaluated(const CompareResult& result, int frame) {
@@ -129,8 +206,8 @@ bool IsEvaluated(const CompareResult& result, int frame) {
 }
 
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
-                                   const std::filesystem::path& out, const std::string& command,
-                                   const CompareProgress& progress) {
+                                   const std::filesystem::path& out_folder,
+                                   const std::string& command, const CompareProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const auto since = [](std::chrono::steady_clock::time_point t) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
@@ -140,10 +217,12 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   result.config = config;
   TSDFPP_ASSIGN(result.last_frame, LastFrame(result.info, config.until));
   if (config.every < 1) return UsageError("--every is {}, expected 1 or more", config.every);
-  if (IsOurSequence(out)) {
-    return UsageError("--out '{}' is a sequence, expected another folder", out.string());
+  if (IsOurSequence(out_folder)) {
+    return UsageError("--out '{}' is a sequence, expected another folder", out_folder.string());
   }
-  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(out));
+  TSDFPP_ASSIGN(RunFolder folder_of_run, RunFolder::Begin(out_folder, command));
+  const std::filesystem::path& out = folder_of_run.path();
+  result.run = folder_of_run.id();
   TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source, config.truth));
   result.truth = std::make_unique<SceneTruth>(std::move(truth));
   std::vector<ObjectInfo> names;
@@ -170,71 +249,82 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   }
   task.truncation_m = settings.voxel_m * settings.trunc_front_voxels;
   task.truncation_back_m = settings.voxel_m * settings.trunc_back_voxels;
-  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, out, result));
+  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, folder_of_run, result));
   Trajectory camera;
   PictureMaker pictures(result, out);
   std::optional<ReportRecorder> recorder;
   if (config.record) recorder.emplace(result, out);
-  for (int index = first; index <= result.last_frame; ++index) {
+  const int planned = result.last_frame;
+  for (int index = first; index <= planned; ++index) {
     const auto read_start = std::chrono::steady_clock::now();
-    TSDFPP_ASSIGN(const Frame frame, source.Read(index));
-    std::optional<Frame> true_frame;
-    if (source.IsSensed()) {
-      TSDFPP_ASSIGN(true_frame, source.ReadTrue(index));
-    }
+    auto frames = Guarded([&] { return SeeFrame(source, index, *result.truth); });
     result.read_s += since(read_start);
-    if (frame.mask.empty()) return DataError("{}: frame {} has no mask", result.info.name, index);
-    TSDFPP_RETURN_IF_ERROR(result.truth->Observe(true_frame ? *true_frame : frame));
-    camera[index] = true_frame ? true_frame->T_WC : frame.T_WC;
-    const bool reveal = index == result.reveal_frame;
+    if (!frames) {
+      result.stopped = std::move(frames.error());
+      break;
+    }
+    const Frame& frame = frames->given;
+    const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
+    camera[index] = true_frame.T_WC;
     const bool evaluate = IsEvaluated(result, index);
-    if (recorder) recorder->SeeFrame(true_frame ? *true_frame : frame);
-    for (const auto& run : result.runs) {
-      const std::int64_t before = ResidentBytes();
-      run->times.Add(run->pipeline.Process(frame));
-      run->process_growth_bytes += ResidentBytes() - before;
-      if (recorder) recorder->SeeMap(*run);
-      if (!evaluate) continue;
-      SceneMeshes meshes = MeshesOf(run->pipeline.map(), result.movers);
-      if (config.keep_meshes) {
-        TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run->FolderName() / "frames", index));
+    if (recorder) recorder->SeeFrame(true_frame);
+    for (std::size_t r = 0; r < result.runs.size();) {
+      CompareRun& run = *result.runs[r];
+      const auto mapped = Guarded([&]() -> Expected<void> {
+        const std::int64_t before = ResidentBytes();
+        TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
+        run.times.Add(step);
+        run.process_growth_bytes += ResidentBytes() - before;
+        if (recorder) recorder->SeeMap(run);
+        if (!evaluate) return {};
+        return EvaluateRun(run, frame, names, out, result, pictures, recorder);
+      });
+      if (mapped) {
+        ++r;
+        continue;
       }
-      run->evaluations.push_back(EvaluateMeshes(std::move(meshes), *result.truth, names,
-                                                result.movers, run->config.map.voxel_m,
-                                                run->last_seen));
-      Evaluation& evaluation = run->evaluations.back();
-      run->times.mesh_s.push_back(evaluation.mesh_s);
-      TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
-      if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(*run, evaluation, frame));
-      const bool examined = reveal || (!result.reveal_frame && index == result.last_frame);
-      if (examined) {
-        const std::filesystem::path folder = out / run->FolderName();
-        auto copy = run->pipeline.map().Clone();
-        for (const InstanceId id : result.movers) copy->Remove(id);
-        TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run->pipeline, result.info, folder));
-      }
-      evaluation.scene = {};
-      evaluation.revealed = {};
-      evaluation.table_reconstructed = {};
+      result.failed.push_back({run.Title(), run.FolderName(), index, mapped.error()});
+      if (recorder) recorder->Forget(run);
+      result.runs.erase(result.runs.begin() + static_cast<std::ptrdiff_t>(r));
     }
     for (const auto& run : result.adapters) {
       if (!evaluate) continue;
-      EvaluateAdapter(*run, *result.truth, names, task);
-      if (run->failure) continue;
-      Evaluation& evaluation = run->evaluations.back();
-      TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
-      evaluation.scene = {};
-      evaluation.revealed = {};
-      evaluation.table_reconstructed = {};
+      const auto scored = Guarded([&]() -> Expected<void> {
+        EvaluateAdapter(*run, *result.truth, names, task);
+        if (run->failure) return {};
+        Evaluation& evaluation = run->evaluations.back();
+        TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
+        DropMeshes(evaluation);
+        return {};
+      });
+      if (!scored)
+        run->failure = Error{scored.error().kind, run->config.name + ": " + scored.error().message};
     }
     if (progress) progress(index - first + 1, total);
+    const bool any_adapter = std::any_of(result.adapters.begin(), result.adapters.end(),
+                                         [](const auto& run) { return !run->failure.has_value(); });
+    if (result.runs.empty() && !any_adapter && !result.failed.empty()) {
+      return tl::unexpected(NothingLeft(result));
+    }
+  }
+  if (result.stopped) {
+    const int seen = LastEvaluated(result);
+    if (seen < first) return tl::unexpected(*result.stopped);
+    result.last_frame = seen;
+    if (result.reveal_frame && *result.reveal_frame > seen) result.reveal_frame.reset();
   }
   for (const auto& run : result.adapters) ScoreTrajectories(*run, names, *result.truth, camera);
-  TSDFPP_RETURN_IF_ERROR(pictures.Finish());
-  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Write());
+  // Figures and the recording are of all frames that were planned, or not at all.
+  if (!result.stopped) {
+    TSDFPP_RETURN_IF_ERROR(Guarded([&] { return pictures.Finish(); }));
+    if (recorder) TSDFPP_RETURN_IF_ERROR(Guarded([&] { return recorder->Write(); }));
+  }
   result.total_s = since(start);
   TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
   TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));
+  // `tsdfpp report` writes another page in its place.
+  TSDFPP_RETURN_IF_ERROR(folder_of_run.Commit({kPageFile}));
+  for (const auto& run : result.adapters) run->folder = run->shown;
   return result;
 }
 

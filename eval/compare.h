@@ -53,14 +53,26 @@ struct CompareRun {
   std::string FolderName() const;
 };
 
+// A map that could not be finished: the others go on without it.
+struct FailedRun {
+  std::string title;
+  std::string folder;
+  int frame = 0;  // at which it failed
+  Error error;
+};
+
 struct CompareResult {
   SequenceInfo info;
   CompareConfig config;
+  std::string run;  // what run.json calls this run (eval/run_folder.h)
   int last_frame = 0;
   std::optional<int> reveal_frame;
   std::set<InstanceId> movers;
-  std::unique_ptr<SceneTruth> truth;  // as at the last frame
-  std::vector<std::unique_ptr<CompareRun>> runs;
+  std::unique_ptr<SceneTruth> truth;              // as at the last frame
+  std::vector<std::unique_ptr<CompareRun>> runs;  // that were finished
+  std::vector<FailedRun> failed;
+  // Why the frames ended before `last_frame` of the plan; results are those until then.
+  std::optional<Error> stopped;
   std::vector<std::unique_ptr<AdapterRun>> adapters;  // failed ones among them
   double read_s = 0;                                  // rendering or reading
   double total_s = 0;
@@ -73,9 +85,11 @@ bool IsEvaluated(const CompareResult& result, int frame);
 using CompareProgress = std::function<void(int done, int total)>;
 
 // Errors: those of the source; kUsage where `until` is no frame of it or the config is wrong; kData
-// where a frame has no mask; kEnvironment where `out` cannot be written. An adapter that fails is
-// reported, and the others go on. Writes meshes and pictures
-// below `out` on the way (docs/formats.md), then summary.json, frames.csv and report.html.
+// where a frame has no mask; kEnvironment where `out` cannot be written or another process has it.
+// A map or an adapter that fails is reported, and the others go on; a frame that cannot be had ends
+// the frames, and what was evaluated before is kept (`failed` and `stopped` of the result); an
+// error is returned where nothing is left to show. What it writes appears below `out` at the end,
+// all together: meshes, pictures, summary.json, frames.csv, report.html and run.json.
 Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
                                    const std::filesystem::path& out, const std::string& command,
                                    const CompareProgress& progress);

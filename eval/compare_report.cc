@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/base64.h"
 #include "eval/compare_tables.h"
 #include "eval/evaluation_columns.h"
@@ -186,7 +187,11 @@ std::string Headline(const CompareResult& result) {
 
 nlohmann::json SummaryJson(const CompareResult& result, const std::string& command) {
   nlohmann::json runs = nlohmann::json::array();
-  for (const auto& run : result.runs) runs.push_back(RunJson(result, *run));
+  for (const auto& run : result.runs) {
+    runs.push_back(RunJson(result, *run));
+    const std::vector<std::string> remarks = run->pipeline.Remarks();
+    if (!remarks.empty()) runs.back()["remarks"] = remarks;
+  }
   nlohmann::json summary{{"schema", 1},
                          {"generator", "tsdfpp"},
                          {"version", TSDFPP_VERSION},
@@ -200,6 +205,7 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
                          {"read_s", result.read_s},
                          {"total_s", result.total_s},
                          {"runs", runs}};
+  if (!result.run.empty()) summary["run"] = result.run;
   if (!result.config.truth_note.empty()) summary["truth"] = result.config.truth_note;
   if (!result.adapters.empty()) {
     summary["adapters"] = nlohmann::json::array();
@@ -212,6 +218,13 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
       summary["adapters"].push_back(std::move(one));
     }
   }
+  for (const FailedRun& run : result.failed) {
+    summary["failed"].push_back({{"title", run.title},
+                                 {"folder", run.folder},
+                                 {"frame", run.frame},
+                                 {"failure", run.error.message}});
+  }
+  if (result.stopped) summary["stopped"] = result.stopped->message;
   summary["reveal_frame"] =
       result.reveal_frame ? nlohmann::json(*result.reveal_frame) : nlohmann::json(nullptr);
   return summary;
@@ -220,7 +233,7 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
 Expected<void> WriteSummary(const CompareResult& result, const std::string& command,
                             const std::filesystem::path& out) {
   TSDFPP_RETURN_IF_ERROR(
-      WriteFile(out / "summary.json", SummaryJson(result, command).dump(1) + "\n"));
+      WriteFile(out / "summary.json", JsonText(SummaryJson(result, command), 1) + "\n"));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "frames.csv", Csv(result)));
   return WriteFile(out / "table.txt",
                    FrontTable(result) + "\n" + SummaryTable(result, Times::kLeftOut));
@@ -270,6 +283,9 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       "all and of the worst object. Times are medians a frame on this machine.</p>\n";
   if (!result.config.truth_note.empty()) {
     html += fmt::format("<p>{}</p>\n", Escaped(result.config.truth_note));
+  }
+  for (const std::string& line : FailureLines(result)) {
+    html += fmt::format("<p>{}</p>\n", Escaped(line));
   }
   for (const std::string& line : AdapterLines(result)) {
     html += fmt::format("<p>{}</p>\n", Escaped(line));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/one_line.h"
 #include "eval/evaluation_columns.h"
 
 namespace tsdfpp {
@@ -114,6 +115,19 @@ std::vector<std::vector<std::string>> TableRows(const CompareResult& result, Tim
   return rows;
 }
 
+std::vector<std::string> FailureLines(const CompareResult& result) {
+  std::vector<std::string> lines;
+  for (const FailedRun& run : result.failed) {
+    lines.push_back(fmt::format("failed: {} at frame {}: {}", run.title, run.frame,
+                                OneLine(run.error.message)));
+  }
+  if (result.stopped) {
+    lines.push_back(fmt::format("stopped after frame {}: {}", result.last_frame,
+                                OneLine(result.stopped->message)));
+  }
+  return lines;
+}
+
 std::vector<std::string> AdapterLines(const CompareResult& result) {
   std::vector<std::string> lines;
   for (const auto& run : result.adapters) {
@@ -172,6 +186,7 @@ std::string SummaryTable(const CompareResult& result, Times times) {
       "{} at frame {}, the table after removing {} moving objects; threshold one voxel\n",
       result.info.name, result.reveal_frame.value_or(result.last_frame), result.movers.size());
   text += Aligned(TableRows(result, times));
+  for (const std::string& line : FailureLines(result)) text += line + "\n";
   if (times == Times::kShown) {
     for (const std::string& line : AdapterLines(result)) text += line + "\n";
   }

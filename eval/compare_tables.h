@@ -20,6 +20,9 @@ enum class Times { kShown, kLeftOut };
 // Every column of every map and adapter; titles first, "-" where a value is undefined.
 std::vector<std::vector<std::string>> TableRows(const CompareResult& result, Times times);
 
+// A sentence for each map that failed, and one where the frames ended early.
+std::vector<std::string> FailureLines(const CompareResult& result);
+
 // A line an adapter: what it cost, or why it failed; and its remarks.
 std::vector<std::string> AdapterLines(const CompareResult& result);
 

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <optional>
 
+#include "core/data_folder.h"
 #include "eval/evaluation.h"
 #include "eval/label_image.h"
 
@@ -38,6 +39,7 @@ Expected<MaskEvaluator> MaskEvaluator::Open(const fs::path& folder) {
   if (!fs::is_directory(folder, failure)) {
     return UsageError("--masks {}: no such folder", folder.string());
   }
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   MaskEvaluator evaluator;
   evaluator.folder_ = folder;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;

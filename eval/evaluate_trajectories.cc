@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/data_folder.h"
 #include "eval/evaluation.h"
 #include "sequence/trajectory_file.h"
 
@@ -55,6 +56,7 @@ Expected<TrajectoryEvaluation> EvaluateTrajectories(const fs::path& folder,
   if (!fs::is_directory(folder, failure)) {
     return UsageError("--trajectories {}: no such folder", folder.string());
   }
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   std::vector<fs::path> files;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
        entry.increment(failure)) {

@@ -230,7 +230,7 @@ void CheckTogether(TomlReader& reader, const ExperimentConfig& config) {
 }  // namespace
 
 Expected<ExperimentConfig> ExperimentConfig::Load(const std::filesystem::path& file) {
-  auto text = ReadFile(file);
+  auto text = ReadFile(file, &Limits::text_bytes);
   if (!text) return UsageError("{}", text.error().message);
   return Parse(*text, file);
 }

@@ -4,7 +4,8 @@
 
 #include <set>
 
-#include "core/files.h"
+#include "core/data_folder.h"
+#include "core/folders.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/trajectory_file.h"
 
@@ -23,11 +24,13 @@ std::vector<Finding> CheckFiles(const fs::path& folder, const SequenceRecord& re
   const std::vector<std::pair<std::string, std::string>> listed(record.hashes.begin(),
                                                                 record.hashes.end());
   std::vector<std::string> wrong(listed.size());
+  const DataFolder data(folder);
   tbb::parallel_for(std::size_t{0}, listed.size(), [&](std::size_t i) {
     const auto& [file, hash] = listed[i];
-    const auto bytes = ReadFile(folder / file);
+    const auto bytes = data.Read(file);
     if (!bytes) {
-      wrong[i] = "is listed in sequence.json and cannot be read";
+      wrong[i] =
+          fmt::format("is listed in sequence.json and cannot be read ({})", bytes.error().message);
     } else if (const std::string found = HashText(*bytes); found != hash) {
       wrong[i] =
           fmt::format("its hash is {}, sequence.json says {}: the file was changed", found, hash);
@@ -36,14 +39,12 @@ std::vector<Finding> CheckFiles(const fs::path& folder, const SequenceRecord& re
   for (std::size_t i = 0; i < listed.size(); ++i) {
     if (!wrong[i].empty()) findings.push_back(FileFinding(listed[i].first, wrong[i]));
   }
-  std::error_code code;
   std::set<std::string> strangers;
-  for (const auto& entry : fs::recursive_directory_iterator(folder, code)) {
-    const std::string file = entry.path().lexically_relative(folder).string();
-    if (entry.is_directory() || file == cofusion::kSequence || record.hashes.contains(file)) {
-      continue;
-    }
-    strangers.insert(file);
+  const auto there = ListFilesBelow(folder);
+  if (!there) findings.push_back(FileFinding("", there.error().message));
+  for (const fs::path& path : there ? *there : std::vector<fs::path>()) {
+    const std::string file = path.lexically_relative(folder).string();
+    if (file != cofusion::kSequence && !record.hashes.contains(file)) strangers.insert(file);
   }
   for (const std::string& file : strangers) {
     findings.push_back(FileFinding(file, "is not listed in sequence.json"));

@@ -20,6 +20,11 @@ Expected<FolderLock> FolderLock::Take(const std::filesystem::path& folder) {
   constexpr useconds_t kPause_us = 50000;
   for (int i = 0; i < kTries; ++i) {
     if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return FolderLock(descriptor);
+    const int fault = errno;
+    if (fault != EWOULDBLOCK && fault != EINTR) {
+      close(descriptor);
+      return EnvironmentError("{}: cannot be locked ({})", folder.string(), std::strerror(fault));
+    }
     usleep(kPause_us);
   }
   close(descriptor);

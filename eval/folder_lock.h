@@ -10,7 +10,7 @@ namespace tsdfpp {
 class FolderLock {
  public:
   // Locks the folder itself, which must be there. Errors: kEnvironment where another process has
-  // it.
+  // it, or where the file system has no locks.
   static Expected<FolderLock> Take(const std::filesystem::path& folder);
   ~FolderLock();
   FolderLock(FolderLock&& other) noexcept;

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
 #include "core/pose_text.h"
 
 namespace tsdfpp {
@@ -26,7 +28,7 @@ std::string ToJson(const JournalEntry& entry) {
   json["hashes"] = frame.hashes;
   json["visibility"] = entry.visibility;
   json["segments"] = entry.segments;
-  return json.dump() + "\n";
+  return JsonText(json) + "\n";
 }
 
 // Throws what nlohmann throws, and std::exception for a pose that is none.
@@ -66,9 +68,9 @@ Expected<void> FrameJournal::Add(const JournalEntry& entry) const {
 
 Expected<JournalEntry> FrameJournal::Read(int index) const {
   const fs::path path = notes_ / fmt::format("{:04d}.json", index);
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   try {
-    return FromJson(nlohmann::json::parse(text));
+    return FromJson(json);
   } catch (const std::exception& exception) {
     return DataError("{}: not a frame's entry ({})", path.string(), exception.what());
   }
@@ -76,11 +78,10 @@ Expected<JournalEntry> FrameJournal::Read(int index) const {
 
 std::map<int, JournalEntry> FrameJournal::ReadSound() const {
   std::map<int, JournalEntry> entries;
-  std::error_code code;
-  for (const auto& file : fs::directory_iterator(notes_, code)) {
-    if (file.path().extension() != ".json") continue;
+  for (const fs::path& file : EntriesOf(notes_)) {
+    if (file.extension() != ".json") continue;
     // A damaged entry is none: its frame is rendered again.
-    auto entry = Read(std::atoi(file.path().stem().c_str()));
+    auto entry = Read(std::atoi(file.stem().c_str()));
     if (!entry) continue;
     const auto& hashes = entry->frame.hashes;
     const bool sound = std::all_of(hashes.begin(), hashes.end(), [&](const auto& item) {

@@ -358,7 +358,7 @@ Expected<std::map<std::string, CellSettings>> ChosenCells(const ExperimentConfig
 }
 
 Expected<GatesConfig> GatesConfig::Load(const std::filesystem::path& file) {
-  auto text = ReadFile(file);
+  auto text = ReadFile(file, &Limits::text_bytes);
   if (!text) return UsageError("{}", text.error().message);
   return Parse(*text, file);
 }

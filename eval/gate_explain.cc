@@ -124,7 +124,7 @@ Expected<Seen> MapAgain(const ExperimentConfig& config, const CellSettings& sett
     if (index > last) break;
     TSDFPP_ASSIGN(VariantFrame both, source.Read(index));
     TSDFPP_RETURN_IF_ERROR(seen.truth->Observe(both.truth));
-    mapper.Process(both.frame);
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
     seen.frame = std::move(both.frame);
   }
   seen.movers = MoversNow(source.info(), *seen.truth);
@@ -137,8 +137,8 @@ Expected<Seen> MapAgain(const ExperimentConfig& config, const CellSettings& sett
 
 cv::Mat Titled(const cv::Mat& image, const std::string& title) {
   cv::Mat scaled;
-  cv::resize(image, scaled, {image.cols * kPictureHeight / image.rows, kPictureHeight}, 0, 0,
-             image.rows < kPictureHeight ? cv::INTER_NEAREST : cv::INTER_AREA);
+  cv::resize(image, scaled, {std::max(1, image.cols * kPictureHeight / image.rows), kPictureHeight},
+             0, 0, image.rows < kPictureHeight ? cv::INTER_NEAREST : cv::INTER_AREA);
   cv::copyMakeBorder(scaled, scaled, 26, 6, 3, 3, cv::BORDER_CONSTANT, cv::Scalar(255, 255, 255));
   cv::putText(scaled, title, {4, 18}, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar(30, 30, 30), 1,
               cv::LINE_AA);
@@ -161,7 +161,10 @@ Expected<void> Draw(const Seen& seen, const std::filesystem::path& file) {
   cv::hconcat(parts, all);
   cv::cvtColor(all, all, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", all, bytes);
+  if (!cv::imencode(".png", all, bytes)) {
+    return EnvironmentError("{}: a picture of {}x{} cannot be encoded", file.string(), all.cols,
+                            all.rows);
+  }
   return WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 

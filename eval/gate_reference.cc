@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -71,12 +72,12 @@ std::string QuestionOf(const Gate& gate) {
 Expected<References> LoadReferences(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return References{};
-  TSDFPP_ASSIGN(const std::string text, ReadFile(file));
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object()) {
-    return DataError("{}: not JSON, expected references that tsdfpp gate --update wrote",
-                     file.string());
+  const auto read = ReadJsonObject(file);
+  if (!read) {
+    return DataError("{}, expected references that tsdfpp gate --update wrote",
+                     read.error().message);
   }
+  const nlohmann::json& json = *read;
   try {
     if (const int schema = json.at("schema"); schema != kReferencesSchema) {
       return DataError("{}: has schema {}, expected {}", file.string(), schema, kReferencesSchema);
@@ -95,7 +96,7 @@ Expected<void> SaveReferences(const References& references, const std::filesyste
   nlohmann::json gates = nlohmann::json::object();
   for (const auto& [gate, reference] : references) gates[gate] = ToJson(reference);
   const nlohmann::json json{{"schema", kReferencesSchema}, {"gates", gates}};
-  return WriteFile(file, json.dump(1) + "\n");
+  return WriteFile(file, JsonText(json, 1) + "\n");
 }
 
 std::string ReferencesDifference(const References& before, const References& after) {

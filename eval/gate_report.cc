@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -313,9 +314,21 @@ std::string GateMarkdown(const GateRun& run, const GateExplanations& explanation
 
 Expected<void> WriteGateReports(const GateRun& run, const GateExplanations& explanations,
                                 const std::filesystem::path& out) {
-  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.json", GateJson(run, explanations).dump(1) + "\n"));
+  // Last, and removed before anything else of it is written (RemoveGateReport): who finds it finds
+  // the rest of the same run.
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.junit.xml", GateJUnit(run)));
-  return WriteFile(out / "gates.md", GateMarkdown(run, explanations));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "gates.md", GateMarkdown(run, explanations)));
+  return WriteFile(out / "gates.json", JsonText(GateJson(run, explanations), 1) + "\n");
+}
+
+Expected<void> RemoveGateReport(const std::filesystem::path& out) {
+  std::error_code failure;
+  std::filesystem::remove(out / "gates.json", failure);
+  if (failure) {
+    return EnvironmentError("{}: cannot be removed ({})", (out / "gates.json").string(),
+                            failure.message());
+  }
+  return {};
 }
 
 }  // namespace tsdfpp

@@ -32,8 +32,12 @@ std::string GateJUnit(const GateRun& run);
 // not hold, with pictures.
 std::string GateMarkdown(const GateRun& run, const GateExplanations& explanations);
 
-// gates.json, gates.junit.xml and gates.md below `out`. Errors: kEnvironment.
+// gates.junit.xml, gates.md and, last, gates.json below `out`. Errors: kEnvironment.
 Expected<void> WriteGateReports(const GateRun& run, const GateExplanations& explanations,
                                 const std::filesystem::path& out);
+
+// Removes an earlier gates.json, which what is written next does not belong to. Errors:
+// kEnvironment.
+Expected<void> RemoveGateReport(const std::filesystem::path& out);
 
 }  // namespace tsdfpp

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/json_text.h"
 #include "eval/gate_times.h"
 #include "eval/sweep_metrics.h"
 
@@ -11,7 +12,7 @@ namespace tsdfpp {
 namespace {
 
 std::string KeyOf(const std::string& experiment, const CellSettings& settings) {
-  return experiment + " " + SettingsJson(settings).dump();
+  return experiment + " " + JsonText(SettingsJson(settings));
 }
 
 // An experiment of exactly these cells.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/frame_journal.h"
 #include "eval/visibility_truth.h"
 #include "eval/workers.h"
@@ -79,7 +80,7 @@ Expected<void> MakeFrames(const SceneConfig& scene, const RenderOptions& render,
                              {"renderer", gl.renderer},
                              {"version", gl.version},
                              {"sequence", SequenceToJson(record)}};
-  parent.Send(hello.dump());
+  parent.Send(JsonText(hello));
   TSDFPP_ASSIGN(const std::vector<TrueModel> models, source->Truth());
   std::optional<VisibilityTruth> visibility;
   while (const auto order = parent.Receive()) {
@@ -167,7 +168,9 @@ class Generator {
       if (!next) {
         // A worker that was killed leaves sound frames behind; a scene that cannot be rendered
         // none.
-        const bool died = next.error().message.starts_with("a worker process");
+        const bool died = next.error().message.starts_with("a worker process") ||
+                          next.error().message.starts_with("out of memory") ||
+                          next.error().kind == ErrorKind::kInternal;
         if (died && greeted == jobs) staging_.Keep();
         return tl::unexpected(next.error());
       }
@@ -197,7 +200,7 @@ class Generator {
 
   // The first hello tells what was rendered before and can be kept.
   Expected<void> TakeHello(const std::string& line, bool first) {
-    const nlohmann::json hello = nlohmann::json::parse(line, nullptr, false);
+    TSDFPP_ASSIGN(const nlohmann::json hello, ParseJsonObject(line, "a worker process"));
     const GlInfo gl{hello.at("backend"), hello.at("platform"), hello.at("renderer"),
                     hello.at("version")};
     if (!first) {

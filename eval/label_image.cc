@@ -1,22 +1,11 @@
 #include "eval/label_image.h"
 
-#include <opencv2/imgcodecs.hpp>
-
-#include "core/files.h"
+#include "core/decode_image.h"
 
 namespace tsdfpp {
 
 Expected<cv::Mat> ReadNumbers(const std::filesystem::path& path, bool rgb_id) {
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-  cv::Mat image;
-  try {
-    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1,
-                          const_cast<char*>(bytes.data()));
-    if (!bytes.empty()) image = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) return DataError("{}: is no image that can be read", path.string());
+  TSDFPP_ASSIGN(const cv::Mat image, ReadImageFile(path));
   cv::Mat numbers;
   if (!rgb_id && (image.type() == CV_8UC1 || image.type() == CV_16UC1)) {
     image.convertTo(numbers, CV_32SC1);

@@ -6,6 +6,8 @@
 #include <charconv>
 #include <optional>
 
+#include "core/data_folder.h"
+#include "core/folders.h"
 #include "core/ply.h"
 #include "eval/surface_file.h"
 #include "metrics/mesh_tools.h"
@@ -145,6 +147,7 @@ ScenePart PartOfName(const std::string& stem) {
 }
 
 Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alone, double scale) {
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(given));
   TSDFPP_ASSIGN(const fs::path folder, FolderOf(given, frame, alone));
   std::vector<fs::path> scenes;
   std::vector<fs::path> others;
@@ -153,7 +156,7 @@ Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alon
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
        entry.increment(failure)) {
     const fs::path& path = entry->path();
-    if (!IsSurfaceFile(path) || entry->is_directory()) continue;
+    if (!IsSurfaceFile(path) || IsFolder(path)) continue;
     const std::string stem = path.stem().string();
     if (stem == kScene) {
       scenes.push_back(path);

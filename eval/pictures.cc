@@ -6,7 +6,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
+#include "core/limits.h"
 #include "eval/rasteriser.h"
+#include "eval/record_images.h"
 
 namespace tsdfpp {
 namespace {
@@ -25,7 +27,10 @@ Expected<void> SavePng(const std::filesystem::path& path, const cv::Mat& rgb) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
+  if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9})) {
+    return EnvironmentError("{}: a picture of {}x{} cannot be encoded", path.string(), bgr.cols,
+                            bgr.rows);
+  }
   return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -102,9 +107,7 @@ cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, con
       }
     }
   }
-  cv::Mat small;
-  cv::resize(image, small, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
-  return small;
+  return Scaled(image, 1 / scale, cv::INTER_AREA);
 }
 
 cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, double pixel_m) {
@@ -128,8 +131,11 @@ cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, doubl
   }
   if (bounds.isEmpty()) return {};
   const auto pixel = static_cast<float>(pixel_m);
-  const int width = static_cast<int>(std::ceil(bounds.sizes().x() / pixel)) + 1;
-  const int height = static_cast<int>(std::ceil(bounds.sizes().y() / pixel)) + 1;
+  const Eigen::Vector2f sides = (bounds.sizes() / pixel).array().ceil();
+  const auto most = static_cast<float>(CurrentLimits().image_side - 1);
+  if (!(sides.maxCoeff() < most)) return {};  // no table that is looked at from above
+  const int width = static_cast<int>(sides.x()) + 1;
+  const int height = static_cast<int>(sides.y()) + 1;
   cv::Mat image(height, width, CV_8UC3, cv::Scalar(150, 150, 150));
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!on_top(i)) continue;
@@ -190,7 +196,7 @@ Expected<void> PictureMaker::Take(const void* run, const Evaluation& evaluation,
   const std::vector<int> columns = Columns();
   if (std::find(columns.begin(), columns.end(), frame.index) != columns.end()) {
     cells_[run][frame.index] = DrawScene(evaluation.scene, frame.intrinsics, frame.T_WC, scale);
-    cv::resize(frame.colour, camera_[frame.index], {}, 1 / scale, 1 / scale, cv::INTER_AREA);
+    camera_[frame.index] = Scaled(frame.colour, 1 / scale, cv::INTER_AREA);
   }
   if (frame.index != ExaminedFrame()) return {};
   after_removal_[run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, scale);
@@ -239,9 +245,17 @@ Expected<void> PictureMaker::Finish() {
         cells.push_back(row);
         table_cells.back().push_back(tables_.at(run));
       };
-      for (const auto& run : result_.runs) {
-        if (run->profile != profile || run->config.poses != poses) continue;
-        add(run.get(), std::string(MethodName(run->config.method)));
+      for (const Method method : result_.config.methods) {
+        const auto run = std::find_if(
+            result_.runs.begin(), result_.runs.end(), [&](const std::unique_ptr<CompareRun>& each) {
+              return each->config.method == method && each->profile == profile &&
+                     each->config.poses == poses;
+            });
+        if (run != result_.runs.end()) {
+          add(run->get(), std::string(MethodName(method)));
+        } else {  // it failed
+          table_cells.back().emplace_back();
+        }
       }
       // An adapter has no profile; it stands beside each.
       for (const auto& run : result_.adapters) {

@@ -11,15 +11,25 @@ namespace tsdfpp {
 namespace {
 
 constexpr int kWebpQuality = 82;
-constexpr int kWebpLossless = 101;  // what OpenCV takes above 100
+constexpr int kMostWebpSide_px = 16383;  // the format's own limit
+constexpr int kWebpLossless = 101;       // what OpenCV takes above 100
 
 }  // namespace
 
+cv::Mat Scaled(const cv::Mat& image, double scale, int interpolation) {
+  cv::Mat scaled;
+  if (std::min(image.cols, image.rows) * scale > 0.5) {  // which is rounded to 1
+    cv::resize(image, scaled, {}, scale, scale, interpolation);
+    return scaled;
+  }
+  // A strip keeps a row of pixels.
+  const auto side = [&](int pixels) { return std::max(1, static_cast<int>(pixels * scale)); };
+  cv::resize(image, scaled, {side(image.cols), side(image.rows)}, 0, 0, interpolation);
+  return scaled;
+}
+
 cv::Mat Smaller(const cv::Mat& image, double width, int interpolation) {
-  cv::Mat small;
-  const double scale = std::min(1.0, width / image.cols);
-  cv::resize(image, small, {}, scale, scale, interpolation);
-  return small;
+  return Scaled(image, std::min(1.0, width / image.cols), interpolation);
 }
 
 cv::Mat DrawDepth(const cv::Mat& depth, float nearest_m, float farthest_m) {
@@ -50,13 +60,21 @@ cv::Mat DrawMask(const cv::Mat& mask) {
   return rgb;
 }
 
-std::string WebpBytes(const cv::Mat& rgb, bool lossless) {
+Expected<std::string> WebpBytes(const cv::Mat& rgb, bool lossless) {
+  const int longest = std::max(rgb.cols, rgb.rows);
+  if (longest > kMostWebpSide_px) {
+    const double scale = static_cast<double>(kMostWebpSide_px) / longest;
+    return WebpBytes(Scaled(rgb, scale, lossless ? cv::INTER_NEAREST : cv::INTER_AREA), lossless);
+  }
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".webp", bgr, bytes,
-               {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality});
-  return {bytes.begin(), bytes.end()};
+  if (!cv::imencode(".webp", bgr, bytes,
+                    {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality})) {
+    return EnvironmentError("a picture of {} x {} pixels cannot be encoded as WebP", rgb.cols,
+                            rgb.rows);
+  }
+  return std::string(bytes.begin(), bytes.end());
 }
 
 }  // namespace tsdfpp

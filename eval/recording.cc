@@ -4,6 +4,8 @@
 #include <functional>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -72,6 +74,7 @@ bool HasForm(const json& recording) {
   const auto object_has_form = [](const json& object) {
     return object.is_object() && object.value("id", json()).is_number_unsigned() &&
            object.value("name", json()).is_string() &&
+           object.value("removed", json(false)).is_boolean() &&
            NumbersOfLength(object.value("colour", json()), 3);
   };
   const auto frame_has_form = [](const json& frame) {
@@ -79,9 +82,10 @@ bool HasForm(const json& recording) {
            NumbersOfLength(frame.value("T_WC", json()), 7) &&
            frame.value("T_WO", json()).is_object();
   };
-  return number("error_step_m") && number("age_step_frames") && list("objects") && list("frames") &&
-         list("key_frames") && list("runs") && recording.contains("grid") &&
-         recording.contains("intrinsics") && recording.contains("truth") &&
+  return recording.value("sequence", json("")).is_string() && number("error_step_m") &&
+         number("age_step_frames") && list("objects") && list("frames") && list("key_frames") &&
+         list("runs") && recording.contains("grid") && recording.contains("intrinsics") &&
+         recording.contains("truth") &&
          NumbersOfLength(recording.value("depth_range_m", json()), 2) &&
          std::all_of(recording["objects"].begin(), recording["objects"].end(), object_has_form) &&
          std::all_of(recording["frames"].begin(), recording["frames"].end(), frame_has_form);
@@ -129,14 +133,12 @@ void Recording::DropKeyFrame(int frame) {
 
 Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / "record" / "record.json";
-  if (!std::filesystem::exists(path)) return std::nullopt;
+  if (!IsThere(path)) return std::nullopt;
   Recording recording;
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  recording.json = json::parse(text, nullptr, false);
-  if (!recording.json.is_object()) return DataError("{} is no JSON object", path.string());
+  TSDFPP_ASSIGN(recording.json, ReadJsonObject(path));
   if (recording.json.value("schema", json()) != 1) {
     return DataError("{}: schema is {}, expected 1", path.string(),
-                     recording.json.value("schema", json()).dump());
+                     JsonShown(recording.json.value("schema", json())));
   }
   TSDFPP_ASSIGN(recording.bytes, ReadFile(folder / "record" / "record.bin"));
   if (!HasForm(recording.json)) {
@@ -149,7 +151,7 @@ Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& fo
         range->second <= recording.bytes.size() - range->first) {
       return true;
     }
-    outside = place.dump();
+    outside = JsonShown(place);
     return false;
   });
   if (!outside.empty()) {

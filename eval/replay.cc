@@ -2,7 +2,11 @@
 
 #include <algorithm>
 
+#include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "eval/cell_run.h"
 #include "eval/map_slice.h"
@@ -25,13 +29,6 @@ struct Recorded {
   json cell;  // its file
 };
 
-Expected<json> ReadResult(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  json parsed = json::parse(text, nullptr, false);
-  if (!parsed.is_object()) return DataError("{}: is not JSON", path.string());
-  return parsed;
-}
-
 Expected<std::string> FindCell(const json& cells, const std::string& wanted,
                                const std::string& where) {
   std::vector<std::string> found;
@@ -53,7 +50,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
       fs::is_directory(options.result, ignored) ? options.result / "results.json" : options.result;
   const std::string where = file.string();
   const fs::path folder = file.parent_path();
-  auto results = ReadResult(file);
+  auto results = ReadJsonObject(file);
   if (!results) return UsageError("{}, expected an experiment's folder", results.error().message);
   try {
     if (results->value("kind", "") != "tsdfpp experiment" ||
@@ -62,10 +59,12 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     }
     Recorded recorded;
     TSDFPP_ASSIGN(recorded.id, FindCell(results->at("cells"), options.cell, where));
+    TSDFPP_RETURN_IF_ERROR(CheckPlainName(recorded.id, where + ": a cell"));
     const json& cell = results->at("cells").at(recorded.id);
     TSDFPP_ASSIGN(recorded.settings, SettingsFromJson(cell.at("settings")));
     const json& sequence = results->at("sequences").at(cell.at("sequence").get<std::string>());
-    const fs::path scene = folder / sequence.at("scene").get<std::string>();
+    TSDFPP_ASSIGN(const fs::path scene,
+                  DataFolder(folder).Find(sequence.at("scene").get<std::string>()));
     SequenceVariant& variant = recorded.variant;
     TSDFPP_ASSIGN(variant.scene_text, ReadFile(scene));
     TSDFPP_ASSIGN(variant.scene,
@@ -77,9 +76,9 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     variant.object_error = sequence.at("object_error");
     recorded.program = fmt::format("{}, {}", results->at("program").get<std::string>(),
                                    results->at("renderer").get<std::string>());
-    TSDFPP_ASSIGN(recorded.cell, ReadResult(folder / "cells" / (recorded.id + ".json")));
+    TSDFPP_ASSIGN(recorded.cell, ReadJsonObject(folder / "cells" / (recorded.id + ".json")));
     return recorded;
-  } catch (const json::exception& error) {
+  } catch (const std::exception& error) {
     return DataError("{}: a field is missing or wrong ({})", where, error.what());
   }
 }
@@ -165,7 +164,7 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   for (int i = 0; i < total; ++i) {
     const int index = variant.frames[static_cast<std::size_t>(i)];
     TSDFPP_ASSIGN(both, source.Read(index));
-    mapper.Process(both.frame);
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
     ++result.frames;
     if (index == result.compared_map_frame || index == options.frame) {
       scene = mapper.Meshes({}).scene;
@@ -198,11 +197,10 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
                   {"program", ProgramIdentity()},
                   {"image_digest", result.image_digest},
                   {"map_digest", result.map_digest}};
-  TSDFPP_RETURN_IF_ERROR(WriteFile(options.out / "replay.json", note.dump(1) + "\n"));
-  for (const auto& entry : fs::recursive_directory_iterator(options.out)) {
-    if (entry.is_regular_file()) {
-      result.files.push_back(entry.path().lexically_relative(options.out).string());
-    }
+  TSDFPP_RETURN_IF_ERROR(WriteFile(options.out / "replay.json", JsonText(note, 1) + "\n"));
+  TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(options.out));
+  for (const fs::path& file : written) {
+    result.files.push_back(file.lexically_relative(options.out).string());
   }
   std::sort(result.files.begin(), result.files.end());
   return result;

@@ -1,6 +1,7 @@
 #include "eval/report_gates.h"
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/base64.h"
 #include "eval/gate_report.h"
 
@@ -34,8 +35,8 @@ Expected<void> CheckGates(const json& gates, const std::string& file) {
 // What the page reads without asking whether it is there.
 Expected<void> Check(const json& results, const std::string& file) {
   if (results.value("schema", json()) != kGatesSchema) {
-    return DataError("{}: schema is {}, expected {}", file, results.value("schema", json()).dump(),
-                     kGatesSchema);
+    return DataError("{}: schema is {}, expected {}", file,
+                     JsonShown(results.value("schema", json())), kGatesSchema);
   }
   TSDFPP_RETURN_IF_ERROR(CheckTexts(results, {"profile", "sabotage", "program"}, file + ": "));
   for (const char* name : {"controls", "gates", "sabotages"}) {
@@ -68,10 +69,7 @@ Expected<void> Check(const json& results, const std::string& file) {
 }  // namespace
 
 Expected<json> ReadGateResults(const std::filesystem::path& file) {
-  auto text = ReadFile(file);
-  if (!text) return DataError("{}", text.error().message);
-  json results = json::parse(*text, nullptr, false);
-  if (!results.is_object()) return DataError("{} is no JSON object", file.string());
+  TSDFPP_ASSIGN(json results, ReadJsonObject(file));
   TSDFPP_RETURN_IF_ERROR(Check(results, file.string()));
   json pictures = json::object();
   for (const json& gate : results["gates"]) {

@@ -4,10 +4,15 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/data_folder.h"
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
 #include "eval/base64.h"
+#include "eval/compare_names.h"
 #include "eval/recording.h"
 #include "eval/report_gates.h"
+#include "eval/run_folder.h"
 #include "sequence/sequence_json.h"
 #include "viewer/report_template.h"
 
@@ -23,27 +28,20 @@ struct Comparison {
   std::optional<Recording> recording;
   json pictures = json::array();
   json files = json::array();
+  std::optional<RunNote> note;
+
+  // Whether a file is of the run; of an older version's everything is.
+  bool Has(const std::string& name) const { return !note || note->files.contains(name); }
 };
 
 // A name for people: the folder's own, even where it is given as "." or with a slash at its end.
-std::string NameOf(const std::filesystem::path& folder) {
-  std::filesystem::path whole = std::filesystem::absolute(folder).lexically_normal();
-  if (whole.filename().empty()) whole = whole.parent_path();
-  return whole.filename().string();
-}
-
-Expected<json> ReadJson(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  json parsed = json::parse(text, nullptr, false);
-  if (!parsed.is_object()) return DataError("{} is no JSON object", path.string());
-  return parsed;
-}
+std::string NameOf(const std::filesystem::path& folder) { return OwnName(folder); }
 
 // What the page reads of a summary without asking whether it is there.
 Expected<void> CheckSummary(const json& summary, const std::filesystem::path& path) {
   if (summary.value("schema", json()) != 1) {
     return DataError("{}: schema is {}, expected 1", path.string(),
-                     summary.value("schema", json()).dump());
+                     JsonShown(summary.value("schema", json())));
   }
   for (const char* name : {"sequence", "command", "version", "generator"}) {
     if (!summary.contains(name) || !summary[name].is_string()) {
@@ -70,10 +68,9 @@ Expected<void> CheckSummary(const json& summary, const std::filesystem::path& pa
 
 Expected<void> AddPictures(Comparison& comparison) {
   std::set<std::string> names;
-  std::error_code failure;
-  for (const auto& entry : std::filesystem::directory_iterator(comparison.folder, failure)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.ends_with(".png")) continue;
+  for (const std::filesystem::path& entry : EntriesOf(comparison.folder)) {
+    const std::string name = entry.filename().string();
+    if (!name.ends_with(".png") || !comparison.Has(name)) continue;
     // With a recording the page makes the figure itself, sharper and for each frame.
     if (name.starts_with("table-") || (name.starts_with("figure-") && !comparison.recording)) {
       names.insert(name);
@@ -93,25 +90,36 @@ Expected<void> AddPictures(Comparison& comparison) {
 }
 
 Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   Comparison comparison;
   comparison.folder = folder;
   const std::filesystem::path path = folder / "summary.json";
-  if (!std::filesystem::exists(path)) {
+  if (!IsThere(path)) {
+    TSDFPP_ASSIGN(comparison.note, ReadRunNote(folder));
+    if (!comparison.note) TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, std::nullopt, {}));
     return DataError("'{}' has no summary.json, expected a folder that tsdfpp compare wrote",
                      folder.string());
   }
-  TSDFPP_ASSIGN(comparison.summary, ReadJson(path));
+  TSDFPP_ASSIGN(comparison.summary, ReadJsonObject(path));
   TSDFPP_RETURN_IF_ERROR(CheckSummary(comparison.summary, path));
+  // Before anything is found wrong that comes of it; the files' sizes when they have been read.
+  TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, RunOfSummary(comparison.summary), {}));
   TSDFPP_ASSIGN(comparison.csv, ReadFile(folder / "frames.csv"));
   if (!comparison.csv.starts_with("frame,method,profile,poses,")) {
     return DataError("{} does not begin with the columns frame,method,profile,poses",
                      (folder / "frames.csv").string());
   }
   TSDFPP_ASSIGN(comparison.recording, ReadRecording(folder));
+  TSDFPP_ASSIGN(comparison.note, ReadRunNote(folder));
   TSDFPP_RETURN_IF_ERROR(AddPictures(comparison));
+  std::set<std::string> read{kSummaryFile, kFramesFile};
+  // Who takes the recording away has a page without it.
+  if (comparison.recording) read.insert({"record/record.json", "record/record.bin"});
+  for (const json& picture : comparison.pictures) read.insert(picture["file"].get<std::string>());
+  TSDFPP_RETURN_IF_ERROR(CheckOneRun(folder, RunOfSummary(comparison.summary), read));
   for (const char* name : {"summary.json", "frames.csv", "record/record.bin"}) {
     const std::filesystem::path file = folder / name;
-    if (!std::filesystem::exists(file)) continue;
+    if (!IsThere(file)) continue;
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(file));
     comparison.files.push_back(
         {{"name", name}, {"bytes", bytes.size()}, {"hash", HashText(bytes)}});
@@ -124,7 +132,7 @@ Expected<Comparison> ReadComparison(const std::filesystem::path& folder) {
 // JSON that can stand inside <script>: no '<' can end it or begin a comment. Bytes that are no
 // UTF-8 become U+FFFD.
 std::string ScriptText(const json& value) {
-  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  const std::string text = JsonText(value);
   std::string safe;
   safe.reserve(text.size());
   for (const char c : text) {

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "eval/pictures.h"
 #include "eval/record_images.h"
 #include "metrics/mesh_tools.h"
@@ -153,8 +154,15 @@ nlohmann::json ReportRecorder::Add(const std::string& bytes) {
   return place;
 }
 
+std::string ReportRecorder::Encoded(const cv::Mat& rgb, bool lossless) {
+  auto bytes = WebpBytes(rgb, lossless);
+  if (bytes) return std::move(*bytes);
+  failure_ = bytes.error();
+  return "";
+}
+
 nlohmann::json ReportRecorder::AddImage(const cv::Mat& rgb, bool lossless) {
-  return Add(WebpBytes(rgb, lossless));
+  return Add(Encoded(rgb, lossless));
 }
 
 Expected<void> ReportRecorder::WriteStill(const std::string& name, int frame,
@@ -250,17 +258,17 @@ Expected<void> ReportRecorder::Take(const CompareRun& run, const Evaluation& eva
                                     const Frame& frame) {
   const double scale = std::max(1.0, frame.intrinsics.width / kPictureWidth);
   const auto draw = [&](const TriangleMesh& mesh) {
-    return WebpBytes(DrawScene(mesh, frame.intrinsics, frame.T_WC, scale), false);
+    return Encoded(DrawScene(mesh, frame.intrinsics, frame.T_WC, scale), false);
   };
   const std::string picture = draw(evaluation.scene);
   if (stills_.empty() || stills_.back() != frame.index) {
     stills_.push_back(frame.index);
     TSDFPP_RETURN_IF_ERROR(
         WriteStill("colour", frame.index,
-                   WebpBytes(Smaller(frame.colour, kPictureWidth, cv::INTER_AREA), false)));
-    TSDFPP_RETURN_IF_ERROR(WriteStill(
-        "mask", frame.index,
-        WebpBytes(Smaller(DrawMask(frame.mask), kPictureWidth, cv::INTER_NEAREST), true)));
+                   Encoded(Smaller(frame.colour, kPictureWidth, cv::INTER_AREA), false)));
+    TSDFPP_RETURN_IF_ERROR(
+        WriteStill("mask", frame.index,
+                   Encoded(Smaller(DrawMask(frame.mask), kPictureWidth, cv::INTER_NEAREST), true)));
   }
   TSDFPP_RETURN_IF_ERROR(WriteStill(run.FolderName(), frame.index, picture));
   if (std::find(key_frames_.begin(), key_frames_.end(), frame.index) == key_frames_.end()) {
@@ -302,6 +310,10 @@ std::size_t ReportRecorder::IndexOf(const CompareRun& run) const {
   return r;
 }
 
+void ReportRecorder::Forget(const CompareRun& run) {
+  runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(IndexOf(run)));
+}
+
 nlohmann::json ReportRecorder::TruthJson() {
   nlohmann::json truth = nlohmann::json::array();
   for (std::size_t i = 0; i < result_.truth->trackers().size(); ++i) {
@@ -327,6 +339,7 @@ nlohmann::json ReportRecorder::TruthJson() {
 }
 
 Expected<void> ReportRecorder::Write() {
+  if (failure_) return tl::unexpected(*failure_);
   const auto milliseconds = [](const std::vector<double>& seconds) {
     nlohmann::json list = nlohmann::json::array();
     for (const double s : seconds) list.push_back(Rounded(1e3 * s, 1000));
@@ -386,7 +399,7 @@ Expected<void> ReportRecorder::Write() {
                         {"stills", stills_},
                         {"runs", runs_}};
   TSDFPP_RETURN_IF_ERROR(WriteFile(out_ / "record" / "record.bin", bytes_));
-  return WriteFile(out_ / "record" / "record.json", record.dump() + "\n");
+  return WriteFile(out_ / "record" / "record.json", JsonText(record) + "\n");
 }
 
 }  // namespace tsdfpp

@@ -37,12 +37,16 @@ class ReportRecorder {
   // One map's evaluation at the frame that was seen last; `frame` as the maps saw it. Writes the
   // stills of the video. Errors: kEnvironment where the disk refuses.
   Expected<void> Take(const CompareRun& run, const Evaluation& evaluation, const Frame& frame);
+  // Drops a map that failed, before it leaves the result's runs.
+  void Forget(const CompareRun& run);
 
   // The rest: record.json, record.bin. Errors: kEnvironment where the disk refuses.
   Expected<void> Write();
 
  private:
   nlohmann::json Add(const std::string& bytes);
+  // The image as a file; nothing where it cannot be encoded, which failure_ then says.
+  std::string Encoded(const cv::Mat& rgb, bool lossless);
   nlohmann::json AddImage(const cv::Mat& rgb, bool lossless);
   Expected<void> WriteStill(const std::string& name, int frame, const std::string& bytes) const;
   nlohmann::json AddMesh(const TriangleMesh& mesh, const VertexMeasures& measures);
@@ -62,6 +66,7 @@ class ReportRecorder {
   nlohmann::json keys_ = nlohmann::json::array();
   std::vector<int> stills_;
   std::vector<nlohmann::json> runs_;
+  std::optional<Error> failure_;
   float nearest_m_ = 0;  // depth that the depth images show, fixed at the first key frame
   float farthest_m_ = 0;
 };

@@ -1,15 +1,24 @@
 #include "eval/report_video.h"
 
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
+#include <array>
+#include <cerrno>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "core/decode_image.h"
 #include "core/files.h"
+#include "core/json_text.h"
+#include "core/plain_name.h"
+#include "core/quiet_stderr.h"
+#include "eval/compare_names.h"
 #include "eval/recording.h"
 #include "eval/report_record.h"
+#include "eval/run_folder.h"
 
 namespace tsdfpp {
 namespace {
@@ -93,11 +102,7 @@ class Film {
 };
 
 Expected<cv::Mat> ReadStill(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-  const std::vector<std::uint8_t> encoded(bytes.begin(), bytes.end());
-  cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
-  if (image.empty()) return DataError("{} is no image", path.string());
-  return image;
+  return ReadImageFile(path, DecodeAs::kColour);
 }
 
 cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
@@ -115,11 +120,12 @@ Expected<std::vector<cv::Mat>> AfterRemoval(const Recording& recording,
     const nlohmann::json& keys = runs[r]["key_frames"];
     if (keys.empty() || !keys.back().contains("picture_after")) continue;
     const nlohmann::json& place = keys.back()["picture_after"];
-    const auto start = recording.bytes.begin() + place[0].get<std::ptrdiff_t>();
-    const std::vector<std::uint8_t> encoded(start, start + place[1].get<std::ptrdiff_t>());
-    cv::Mat image = encoded.empty() ? cv::Mat() : cv::imdecode(encoded, cv::IMREAD_COLOR);
-    if (image.empty()) return DataError("a picture after the removal is no image");
-    images[kColumns + r] = image;
+    // ReadRecording has made sure of the place.
+    const std::string_view encoded =
+        std::string_view(recording.bytes)
+            .substr(place[0].get<std::size_t>(), place[1].get<std::size_t>());
+    TSDFPP_ASSIGN(images[kColumns + r],
+                  DecodeImage(encoded, "a picture after the removal", DecodeAs::kColour));
   }
   return images;
 }
@@ -132,8 +138,95 @@ std::string TitleOf(const nlohmann::json& run) {
 
 }  // namespace
 
+// An MP4 file is a row of boxes, each a length and four letters. One that was cut has none called
+// "moov", which is written last, or one that is longer than what is there.
+bool IsWholeVideo(std::string_view bytes) {
+  constexpr std::size_t kHead = 8;
+  bool has_index = false;
+  while (!bytes.empty()) {
+    if (bytes.size() < kHead) return false;
+    const auto number = [&](std::size_t from, std::size_t count) {
+      std::uint64_t value = 0;
+      for (std::size_t i = from; i < from + count; ++i) {
+        value = value << 8U | static_cast<unsigned char>(bytes[i]);
+      }
+      return value;
+    };
+    std::uint64_t length = number(0, 4);
+    // 1: the length is in eight bytes behind; 0, to the end of the file, is what was never filled
+    // in.
+    if (length == 1 && bytes.size() >= 2 * kHead) length = number(kHead, kHead);
+    if (length < kHead || length > bytes.size()) return false;
+    has_index = has_index || bytes.substr(4, 4) == "moov";
+    bytes.remove_prefix(length);
+  }
+  return has_index;
+}
+
+namespace {
+
+// A file in memory that a library can open by a name: it says nothing where it could not write.
+class MemoryFile {
+ public:
+  MemoryFile() : descriptor_(memfd_create("tsdfpp-film", MFD_CLOEXEC)) {}
+  ~MemoryFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  bool is_open() const { return descriptor_ >= 0; }
+  Expected<std::string> Read() const {
+    std::string bytes;
+    std::array<char, 65536> block{};
+    while (true) {
+      const ssize_t count =
+          pread(descriptor_, block.data(), block.size(), static_cast<off_t>(bytes.size()));
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) return EnvironmentError("a film cannot be read ({})", std::strerror(errno));
+      if (count == 0) return bytes;
+      bytes.append(block.data(), static_cast<std::size_t>(count));
+    }
+  }
+  std::string path() const { return fmt::format("/proc/{}/fd/{}", getpid(), descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+std::string HiddenName(const std::filesystem::path& file) {
+  return fmt::format(".{}.", file.filename().string());
+}
+
+// Links to the memory of processes that were killed.
+void RemoveDeadLinks(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  std::vector<std::filesystem::path> dead;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    const std::string name = entry->path().filename().string();
+    std::error_code unknown;
+    if (name.starts_with(HiddenName(file)) && name.ends_with(".mp4") &&
+        std::filesystem::is_symlink(entry->symlink_status(unknown)) &&
+        !std::filesystem::exists(entry->path(), unknown)) {
+      dead.push_back(entry->path());
+    }
+  }
+  for (const std::filesystem::path& link : dead) std::filesystem::remove(link, failure);
+}
+
+// Errors: kData, saying what to do, where the recording is of another run than the summary.
+Expected<void> CheckRecordedRun(const std::filesystem::path& run) {
+  const auto read = ReadJsonObject(run / kSummaryFile);
+  const nlohmann::json summary = read ? *read : nlohmann::json();
+  return CheckOneRun(run, RunOfSummary(summary), {"record/record.json", "record/record.bin"});
+}
+
+}  // namespace
+
 Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
                                        const std::filesystem::path& file) {
+  TSDFPP_RETURN_IF_ERROR(CheckRecordedRun(run));
   TSDFPP_ASSIGN(const std::optional<Recording> recording, ReadRecording(run));
   if (!recording || !recording->json.contains("stills") || !recording->json["stills"].is_array() ||
       recording->json["stills"].empty()) {
@@ -144,13 +237,16 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   for (const nlohmann::json& still : recording->json["stills"]) {
     if (!still.is_number_integer()) {
       return DataError("'{}': a still is {}, expected a frame's number", run.string(),
-                       still.dump());
+                       JsonShown(still));
     }
     stills.push_back(still.get<int>());
   }
   std::vector<Panel> panels{{"camera", "colour"}, {"objects", "mask"}, {"", ""}};
   for (const nlohmann::json& each : recording->json["runs"]) {
     panels.push_back({TitleOf(each), each["folder"].get<std::string>()});
+    // Part of the stills' file names.
+    TSDFPP_RETURN_IF_ERROR(
+        CheckPlainName(panels.back().still, fmt::format("'{}': a map's folder", run.string())));
   }
   const auto read = [&](int frame) -> Expected<std::vector<cv::Mat>> {
     std::vector<cv::Mat> images;
@@ -163,15 +259,28 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
     return images;
   };
   TSDFPP_ASSIGN(std::vector<cv::Mat> images, read(stills.front()));
-  const Film film(panels, {kCellWidth, kCellWidth * images[0].rows / images[0].cols});
+  const Film film(panels, {kCellWidth, std::max(1, kCellWidth * images[0].rows / images[0].cols)});
 
-  // OpenCV names the format by the file's end, so the temporary file has it as well.
+  // OpenCV does not say whether what it wrote got anywhere, so it writes to memory. It knows the
+  // format by the name's end, so a link there has one.
+  if (file.has_parent_path()) TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(file.parent_path()));
+  const MemoryFile memory;
+  if (!memory.is_open()) {
+    return EnvironmentError("cannot write '{}': {}", file.string(), std::strerror(errno));
+  }
+  RemoveDeadLinks(file);
+  const Temporary part{file.parent_path() / fmt::format("{}{}.mp4", HiddenName(file), getpid())};
   std::error_code failure;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failure);
-  const Temporary part{file.parent_path() /
-                       fmt::format(".{}.{}.mp4", file.filename().string(), getpid())};
-  cv::VideoWriter writer(part.path.string(), cv::CAP_FFMPEG,
-                         cv::VideoWriter::fourcc('a', 'v', 'c', '1'), kRate_hz, film.size());
+  std::filesystem::create_symlink(memory.path(), part.path, failure);
+  if (failure) {
+    return EnvironmentError("cannot write '{}': {}", file.string(), failure.message());
+  }
+  cv::VideoWriter writer;
+  {
+    const QuietStderr quiet;  // the encoder prints what it chose
+    writer.open(part.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
+                kRate_hz, film.size());
+  }
   if (!writer.isOpened()) {
     return EnvironmentError(
         "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",
@@ -210,10 +319,12 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
     for (int i = 0; i < kLast; ++i) show(page);
   }
   writer.release();
-  std::filesystem::rename(part.path, file, failure);
-  if (failure) {
-    return EnvironmentError("cannot write '{}': {}", file.string(), failure.message());
+  TSDFPP_ASSIGN(const std::string bytes, memory.Read());
+  if (!IsWholeVideo(bytes)) {
+    return EnvironmentError("cannot write '{}': the video is cut off after {} bytes", file.string(),
+                            bytes.size());
   }
+  TSDFPP_RETURN_IF_ERROR(WriteFile(file, bytes));
   video.seconds = static_cast<double>(video.frames) / kRate_hz;
   return video;
 }

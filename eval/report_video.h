@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "core/error.h"
 
@@ -16,8 +17,12 @@ struct ReportVideo {
 
 // Writes an MP4 (H.264): colour and masks, each map as it grows, and at the end the removal. Its
 // stills are the comparison's evaluated frames. Errors: kData where `run` has no recording or a
-// still cannot be read; kEnvironment where OpenCV has no H.264 encoder or the disk refuses.
+// still cannot be read, or is of an interrupted run; kEnvironment where OpenCV has no H.264 encoder
+// or the disk refuses: then no file is there.
 Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
                                        const std::filesystem::path& file);
+
+// Whether the bytes are an MP4 file from its beginning to its end, with its index.
+bool IsWholeVideo(std::string_view bytes);
 
 }  // namespace tsdfpp

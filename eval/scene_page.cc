@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -23,7 +24,8 @@ constexpr int kJpegQuality = 85;
 
 cv::Mat Shrunk(const cv::Mat& image, int width) {
   cv::Mat small;
-  cv::resize(image, small, {width, image.rows * width / image.cols}, 0, 0, cv::INTER_AREA);
+  cv::resize(image, small, {width, std::max(1, image.rows * width / image.cols)}, 0, 0,
+             cv::INTER_AREA);
   return small;
 }
 

@@ -1,6 +1,18 @@
 #include "eval/scene_truth.h"
 
+#include <algorithm>
+
+#include "core/limits.h"
+#include "core/one_line.h"
+#include "metrics/mesh_tools.h"
+
 namespace tsdfpp {
+
+namespace {
+
+constexpr double kSquareCentimetres = 1e4;  // in a square metre
+
+}  // namespace
 
 Expected<SceneTruth> SceneTruth::Create(FrameSource& source, const TruthOptions& options) {
   TSDFPP_ASSIGN(std::vector<TrueModel> models, source.Truth());
@@ -9,6 +21,13 @@ Expected<SceneTruth> SceneTruth::Create(FrameSource& source, const TruthOptions&
   SceneTruth truth;
   for (TrueModel& model : models) {
     const InstanceId id = model.info.id;
+    // A model in another unit would take more samples than there is memory.
+    const double samples =
+        SurfaceArea(model.mesh_O) * kSquareCentimetres * options.sampling.fine_per_cm2;
+    constexpr double kMostSamples = 1e15;  // as a whole number
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(
+        &Limits::mesh_elements, static_cast<std::int64_t>(std::min(samples, kMostSamples)),
+        fmt::format("the true surface of {}", Quoted(model.info.name)), "samples"));
     const auto& surface = truth.surfaces_.emplace_back(
         std::make_unique<TruthSurface>(std::move(model), options.closed));
     truth.trackers_.emplace_back(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/folders.h"
 #include "mapper/pipeline.h"
 #include "sequence/cofusion_layout.h"
 
@@ -77,8 +78,8 @@ RevealPlan PaperPlan(const SequenceInfo& info) {
 
 bool IsForeignCofusion(const std::filesystem::path& path) {
   std::error_code ignored;
-  return cofusion::IsCofusion(path) && !std::filesystem::exists(path / cofusion::kSequence) &&
-         !std::filesystem::exists(path / cofusion::kModels);
+  return cofusion::IsCofusion(path) && !IsThere(path / cofusion::kSequence) &&
+         !IsThere(path / cofusion::kModels);
 }
 
 Expected<std::vector<TrueModel>> ReconstructTruth(
@@ -101,7 +102,11 @@ Expected<std::vector<TrueModel>> ReconstructTruth(
                   source.IsSensed() ? source.ReadTrue(index) : source.Read(index));
     if (frame.mask.empty()) return DataError("{}: frame {} has no mask", info.name, index);
     for (Alone& object : objects) {
-      if (const auto only = OnlyOf(frame, object.info)) object.pipeline->Process(*only);
+      if (const auto only = OnlyOf(frame, object.info)) {
+        const auto step = object.pipeline->Process(*only);
+        if (!step)
+          return DataError("{}: {}: {}", info.name, object.info.name, step.error().message);
+      }
     }
     if (progress) progress(i + 1, info.frame_count);
   }

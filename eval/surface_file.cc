@@ -44,7 +44,7 @@ Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& p
   } else if (ending == ".obj" || ending == ".stl") {
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
     TSDFPP_ASSIGN(const RawMesh raw,
-                  ending == ".obj" ? ReadObj(path, bytes) : ReadStl(path, bytes));
+                  ending == ".obj" ? ReadObj(path, bytes, Materials::kSkip) : ReadStl(path, bytes));
     parts.emplace_back();
     parts.front().mesh = MeshOf(raw);
   } else {

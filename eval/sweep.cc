@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "eval/cell_run.h"
 #include "eval/folder_lock.h"
 #include "eval/program_identity.h"
@@ -87,11 +88,11 @@ Expected<void> WriteSequences(const SweepPlan& plan, const fs::path& out) {
 // What killed processes were just writing (core/files.h).
 void RemoveHalves(const fs::path& out) {
   std::error_code ignored;
-  std::vector<fs::path> halves;
-  for (const auto& entry : fs::recursive_directory_iterator(out, ignored)) {
-    if (entry.path().extension() == ".part") halves.push_back(entry.path());
+  const auto files = ListFilesBelow(out);
+  if (!files) return;
+  for (const fs::path& file : *files) {
+    if (file.extension() == ".part") fs::remove(file, ignored);
   }
-  for (const fs::path& half : halves) fs::remove(half, ignored);
 }
 
 Expected<void> Work(const std::vector<Task>& tasks, const CellStore& store, int threads,

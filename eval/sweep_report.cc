@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/json_text.h"
 
 namespace tsdfpp {
 namespace {
@@ -256,9 +257,16 @@ std::string SweepText(const SweepResult& result, const std::vector<Condition>& c
 
 Expected<void> WriteSweep(const SweepResult& result, const std::filesystem::path& out) {
   const std::vector<Condition> conditions = ConditionsOf(result);
+  // The last one says that the others are of the same cells, so an old one goes first.
+  std::error_code failure;
+  std::filesystem::remove(out / "results.json", failure);
+  if (failure) {
+    return EnvironmentError("{}: cannot be removed ({})", (out / "results.json").string(),
+                            failure.message());
+  }
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "results.csv", SweepCsv(result)));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "summary.txt", SweepText(result, conditions)));
-  return WriteFile(out / "results.json", SweepJson(result, conditions).dump(1) + "\n");
+  return WriteFile(out / "results.json", JsonText(SweepJson(result, conditions), 1) + "\n");
 }
 
 }  // namespace tsdfpp

@@ -13,6 +13,9 @@
 #include <cstdio>
 #include <cstring>
 
+#include "core/guard.h"
+#include "core/one_line.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -27,13 +30,13 @@ constexpr const char* kError = "error ";  // followed by the kind, a blank and t
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
   Channel channel(descriptor);
-  const Expected<void> result = body(channel);
+  // What is thrown must not unwind the parent's frames, of which this process has a copy.
+  const Expected<void> result = Guarded([&] { return body(channel); });
   if (result) {
     channel.Send(kDone);
   } else {
-    std::string sentence = result.error().message;
-    std::replace(sentence.begin(), sentence.end(), '\n', ' ');
-    channel.Send(fmt::format("{}{} {}", kError, static_cast<int>(result.error().kind), sentence));
+    channel.Send(fmt::format("{}{} {}", kError, static_cast<int>(result.error().kind),
+                             OneLine(result.error().message)));
   }
   std::fflush(nullptr);
   // Without the destructors of what the parent shares.
@@ -156,8 +159,14 @@ Expected<std::optional<Workers::Message>> Workers::Next() {
         child.finished = true;
       } else if (line->starts_with(kError)) {
         const std::string rest = line->substr(std::strlen(kError));
-        return tl::unexpected(
-            Error{static_cast<ErrorKind>(rest.front() - '0'), rest.substr(rest.find(' ') + 1)});
+        const int kind = rest.empty() ? 0 : rest.front() - '0';
+        const bool known = kind >= static_cast<int>(ErrorKind::kUsage) &&
+                           kind <= static_cast<int>(ErrorKind::kInternal);
+        const std::size_t blank = rest.find(' ');
+        return tl::unexpected(Error{known ? static_cast<ErrorKind>(kind) : ErrorKind::kInternal,
+                                    blank == std::string::npos
+                                        ? "a worker process failed without a word"
+                                        : rest.substr(blank + 1)});
       } else {
         return Message{static_cast<int>(i), *line};
       }

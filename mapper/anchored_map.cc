@@ -13,6 +13,7 @@
 #include "mapper/cover.h"
 #include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
+#include "mapper/lattice_range.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
@@ -87,6 +88,7 @@ void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 }
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  RequireReach(*this, frame, labels);
   const FrameView view(frame, labels);
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);

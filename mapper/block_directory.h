@@ -26,7 +26,13 @@ struct Index3 {
   }
 };
 
-// 21 bits an axis, which at 1 cm reaches 80 km from the origin.
+// Blocks of maps are at most this far from the origin along each axis (mapper/lattice_range.h),
+// which at 1 cm are 84 km; no grid stores one beyond kFurthestStored, whose neighbours are packed
+// as well.
+inline constexpr int kFurthestBlock = (1 << 20) - 16;
+inline constexpr int kFurthestStored = (1 << 20) - 2;
+
+// 21 bits an axis.
 inline std::uint64_t PackIndex(const Index3& index) {
   constexpr std::int64_t kOffset = 1 << 20;
   constexpr std::uint64_t kMask = (1ULL << 21U) - 1;

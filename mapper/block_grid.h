@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -78,8 +79,11 @@ class BlockGrid {
     return Add(index, std::make_unique<Block>());
   }
 
-  // The block must not be there yet.
+  // The block must not be there yet. Aborts beyond kFurthestStored, where neighbours would wrap.
   Block& Add(const Index3& index, std::unique_ptr<Block> block) {
+    for (const int along : {index.x, index.y, index.z}) {
+      if (along < -kFurthestStored || along > kFurthestStored) std::abort();
+    }
     directory_.Set(index, static_cast<std::int32_t>(entries_.size()));
     entries_.push_back({index, std::move(block)});
     return *entries_.back().block;

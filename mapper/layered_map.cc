@@ -36,6 +36,29 @@ std::optional<VoxelValue> ValueOf(const TsdfGrid& grid, const Index3& voxel) {
                     block->ColourAt(place)};
 }
 
+ObjectMove LayeredMap::MoveTo(InstanceId id, const Pose& T_WO) const {
+  ObjectMove move;
+  const auto of = volumes_.find(id);
+  if (of == volumes_.end() || !of->second.T_WO_birth) return move;
+  const ObjectVolume& volume = of->second;
+  if (SameNumbers(*volume.T_WO_birth, T_WO)) return move;
+  if (SameNumbers(*volume.T_WO, T_WO)) {
+    move.T_WL = volume.T_WL;
+    return move;
+  }
+  move.T_WL = move.T = T_WO * volume.T_WO_birth->inverse();
+  move.blocks = &volume.grid;
+  return move;
+}
+
+std::map<InstanceId, Pose> LayeredMap::MovedLattices() const {
+  std::map<InstanceId, Pose> lattices;
+  for (const auto& [id, volume] : volumes_) {
+    if (!volume.lattice_is_world) lattices.emplace(id, volume.T_WL);
+  }
+  return lattices;
+}
+
 std::vector<InstanceId> LayeredMap::Objects() const {
   std::vector<InstanceId> ids;
   for (const auto& [id, volume] : volumes_) {

@@ -10,6 +10,9 @@ namespace tsdfpp {
 class LayeredMap : public MapRepresentation {
  public:
   const MapConfig& config() const override { return config_; }
+  // Of volumes that stay in their objects' lattices.
+  ObjectMove MoveTo(InstanceId id, const Pose& T_WO) const override;
+  std::map<InstanceId, Pose> MovedLattices() const override;
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
   TriangleMesh ObjectMesh(InstanceId id) const override;

@@ -9,6 +9,7 @@
 
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
+#include "mapper/lattice_range.h"
 #include "mapper/layered_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
@@ -30,6 +31,7 @@ std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
 }
 
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  RequireReach(*this, frame, labels);
   const FrameView view(frame, labels);
   const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
     return {Pose::Identity(), &lists_.directory()};
@@ -153,6 +155,11 @@ void LiteralMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
     if (lists_.Find(index)->IsEmpty()) empty.push_back(index);
   }
   lists_.Erase(empty);
+}
+
+ObjectMove LiteralMap::MoveTo(InstanceId id, const Pose& T_WO) const {
+  const auto of = volumes_.find(id);
+  return of == volumes_.end() ? ObjectMove{} : MoveOfValues(of->second, T_WO);
 }
 
 void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {

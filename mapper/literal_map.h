@@ -15,6 +15,7 @@ class LiteralMap final : public MapRepresentation {
   Method method() const override { return Method::kTsdfppLiteral; }
   const MapConfig& config() const override { return config_; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
+  ObjectMove MoveTo(InstanceId id, const Pose& T_WO) const override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
   Expected<void> Rename(InstanceId from, InstanceId to) override;

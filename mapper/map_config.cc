@@ -112,7 +112,7 @@ Expected<MovedVoxels> MovedVoxelsFromName(std::string_view name) {
 }
 
 Expected<void> MapConfig::Validate() const {
-  TSDFPP_RETURN_IF_ERROR(InRange("voxel_m", voxel_m, 0.0005, 1.0));
+  TSDFPP_RETURN_IF_ERROR(InRange("voxel_m", voxel_m, kSmallestVoxel_m, kLargestVoxel_m));
   TSDFPP_RETURN_IF_ERROR(InRange("trunc_front_voxels", trunc_front_voxels, 1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("trunc_back_voxels", trunc_back_voxels, 1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("vote_band_voxels", vote_band_voxels, 1, 100));

@@ -72,6 +72,9 @@ std::string_view ResamplingName(Resampling resampling);
 // Errors: kUsage.
 Expected<Resampling> ResamplingFromName(std::string_view name);
 
+inline constexpr double kSmallestVoxel_m = 0.0005;
+inline constexpr double kLargestVoxel_m = 1;
+
 struct MapConfig {
   double voxel_m = 0.01;
   double trunc_front_voxels = 10;  // F / h

@@ -1,6 +1,7 @@
 #include "mapper/map_file.h"
 
 #include "core/files.h"
+#include "core/plain_name.h"
 #include "mapper/section_file.h"
 #include "mapper/volume_store.h"
 
@@ -9,6 +10,7 @@ namespace {
 
 constexpr const char* kConfigSection = "CONF";
 constexpr const char* kRunSection = "RUN ";
+constexpr int kGreatestFrame = 1'000'000'000;  // what users of the number can add to
 
 void PutText(std::string_view text, std::string& bytes) {
   PutBytes(static_cast<std::uint32_t>(text.size()), bytes);
@@ -43,7 +45,7 @@ std::string RunToBytes(const MappedRun& run) {
   return bytes;
 }
 
-Expected<MappedRun> RunFromBytes(std::string_view all) {
+Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range) {
   ByteReader bytes(all);
   MappedRun run;
   run.sequence = GetText(bytes);
@@ -63,10 +65,14 @@ Expected<MappedRun> RunFromBytes(std::string_view all) {
     const auto count = bytes.Get<std::uint32_t>();
     for (std::uint32_t k = 0; k < count && bytes.ok(); ++k) {
       const auto frame = bytes.Get<std::int32_t>();
-      TSDFPP_ASSIGN(poses[frame], LoadPose(bytes));
+      TSDFPP_ASSIGN(poses[frame], LoadPose(bytes, range));
     }
   }
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
+  TSDFPP_RETURN_IF_ERROR(CheckObjects(run.objects, "its list"));
+  if (run.last_frame < -1 || run.last_frame > kGreatestFrame) {
+    return DataError("its last frame is {}, expected -1 to {}", run.last_frame, kGreatestFrame);
+  }
   return run;
 }
 
@@ -131,7 +137,7 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
   const auto settings = SettingsFromText(*settings_text);
   if (!settings) return tl::unexpected(InSection(where, kConfigSection, settings.error()));
   if (const auto run_bytes = take(kRunSection)) {
-    auto run = RunFromBytes(*run_bytes);
+    auto run = RunFromBytes(*run_bytes, LatticeRange(settings->config.voxel_m));
     if (!run) return tl::unexpected(InSection(where, kRunSection, run.error()));
     loaded.run = std::move(*run);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mapper/anchored_map.h"
+#include "mapper/lattice_range.h"
 #include "mapper/literal_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
@@ -74,6 +75,7 @@ Expected<void> LayeredMap::Rename(InstanceId from, InstanceId to) {
 Expected<void> LayeredMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                                const Pose& T_WO) {
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
+  TSDFPP_RETURN_IF_ERROR(CheckAddition(config_, id, volume, T_WL, T_WO));
   ObjectVolume& added = volumes_[id];
   added.T_WO = T_WO;
   // T_WL = T_WO * T_WO(birth)^-1
@@ -98,6 +100,7 @@ Expected<void> TsdfppMap::Rename(InstanceId from, InstanceId to) {
 Expected<void> TsdfppMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                               const Pose& T_WO) {
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
+  TSDFPP_RETURN_IF_ERROR(CheckAddition(config_, id, volume, T_WL, T_WO));
   ObjectVolume& added = volumes_[id];
   added.T_WO = T_WO;
   added.grid = InWorldLattice(volume, T_WL, config_);
@@ -143,6 +146,7 @@ Expected<void> LiteralMap::Add(InstanceId id, const TsdfGrid& volume, const Pose
                                const Pose& T_WO) {
   active_.all_are_stale = true;
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
+  TSDFPP_RETURN_IF_ERROR(CheckAddition(config_, id, volume, T_WL, T_WO));
   ObjectVolume& added = volumes_[id];
   added.T_WO = T_WO;
   added.grid = InWorldLattice(volume, T_WL, config_);
@@ -171,6 +175,7 @@ Expected<void> SingleFieldMap::Rename(InstanceId from, InstanceId to) {
 Expected<void> SingleFieldMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                                    const Pose& T_WO) {
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, IsKnown(id)));
+  TSDFPP_RETURN_IF_ERROR(CheckAddition(config_, id, volume, T_WL, T_WO));
   T_WO_.insert_or_assign(id, T_WO);
   const TsdfGrid arrivals = InWorldLattice(volume, T_WL, config_);
   for (const auto* entry : arrivals.Sorted()) {

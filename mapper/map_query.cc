@@ -9,7 +9,8 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kPointsPerTask = 256;
-constexpr double kFurthestVoxel = 8e6;  // what block indices of 21 bits hold
+// Further out no voxel is, and indices stay far from the ends of their 21 bits.
+constexpr double kFurthestVoxel = double{kBlockSide} * (kFurthestBlock + 1);
 
 std::size_t At8(int i) { return static_cast<std::size_t>(i); }
 

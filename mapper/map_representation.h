@@ -2,6 +2,7 @@
 // it is shared, so a comparison isolates the map. The rules are in docs/map.md.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -44,11 +45,13 @@ class MapRepresentation {
   virtual const MapConfig& config() const = 0;
 
   // Paper III-E. The first pose given to an object is its pose at birth and moves nothing; nor does
-  // one whose numbers equal the last. Objects must be given in increasing id within a frame.
+  // one whose numbers equal the last. Objects must be given in increasing id within a frame. Poses
+  // and what they move must be such as CheckReach() lets pass (mapper/lattice_range.h).
   virtual void SetObjectPose(InstanceId id, const Pose& T_WO) = 0;
 
   // Paper III-F. Fuses depth, colour and labels (CV_16UC1, object ids as associated with the map;
-  // pixels kNoInstance are left out) of a frame, whose own mask is not read.
+  // pixels kNoInstance are left out) of a frame, whose own mask is not read. Aborts where
+  // CheckFrameForm() or CheckReach() refuse it (mapper/lattice_range.h).
   virtual void Fuse(const Frame& frame, const cv::Mat& labels) = 0;
 
   // Takes the object out of the map; unknown ids change nothing.
@@ -63,9 +66,16 @@ class MapRepresentation {
   // Puts a volume into the map as a new object whose pose is T_WO, with the volume's lattice at
   // T_WL; it arrives as if it had moved there (docs/map.md, "Adding an object"). The voxel size
   // must be the map's, and every block must hold an observed voxel. Errors: kUsage where the id is
-  // in the map (a pose given is enough), the background or no id; the map is then unchanged.
+  // in the map (a pose given is enough), the background or no id; kData where a part would lie
+  // beyond the map's range or a pose is not rigid; the map is then unchanged.
   virtual Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                              const Pose& T_WO) = 0;
+
+  // What SetObjectPose(id, T_WO) would move, and where to.
+  virtual ObjectMove MoveTo(InstanceId id, const Pose& T_WO) const = 0;
+
+  // T_WL of the objects whose lattice is not the world's now.
+  virtual std::map<InstanceId, Pose> MovedLattices() const { return {}; }
 
   // A deep copy.
   virtual std::unique_ptr<MapRepresentation> Clone() const = 0;

@@ -220,7 +220,7 @@ Expected<void> SingleFieldMap::Load(const Sections& sections) {
   const auto count = poses.Get<std::uint32_t>();
   for (std::uint32_t i = 0; i < count && poses.ok(); ++i) {
     const auto id = poses.Get<InstanceId>();
-    TSDFPP_ASSIGN(const Pose T_WO, LoadPose(poses));
+    TSDFPP_ASSIGN(const Pose T_WO, LoadPose(poses, LatticeRange(config_.voxel_m)));
     T_WO_.insert_or_assign(id, T_WO);
   }
   if (!poses.AtEnd()) return DataError("its poses have another length than they say");

@@ -1,14 +1,65 @@
 #include "mapper/object_volume.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+
+#include "mapper/block_set.h"
 
 namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kLargestTable = 1U << 22U;  // block pointers, 32 MiB
 
+// Blocks of a box that are asked one by one: more only where an object was seen at places far from
+// each other, between which there is nothing.
+constexpr double kMostInBox = 1 << 22;
+
 std::size_t At(int i) { return static_cast<std::size_t>(i); }
+
+// Those blocks of a box that `touches` holds of, which it does only near a moved block: each is
+// asked for what is near it.
+std::vector<Index3> TouchedFarApart(const VoxelReader& reader, const Pose& T, double voxel_m,
+                                    const BlockBox& box,
+                                    const std::function<bool(const Index3&)>& touches) {
+  // A block touches another whose middle is at most half its own side away along each axis, the
+  // half diagonal of the turned block, and two voxels: 11.6 voxels, in any direction times sqrt(3).
+  constexpr double kReach_voxels = 21;
+  constexpr double kMiddle = (kBlockSide - 1) / 2.0;
+  constexpr std::size_t kBlocksAtOnce = 4096;
+  const auto clean = [](std::vector<Index3>& blocks) {
+    std::sort(blocks.begin(), blocks.end());
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  };
+  std::vector<Index3> touched;
+  std::vector<Index3> near;
+  const auto& entries = reader.grid().entries();
+  for (std::size_t from = 0; from < entries.size(); from += kBlocksAtOnce) {
+    near.clear();
+    const std::size_t end = std::min(entries.size(), from + kBlocksAtOnce);
+    for (std::size_t i = from; i < end; ++i) {
+      const Index3& index = entries[i].index;
+      const Eigen::Vector3d middle =
+          double{kBlockSide} * Eigen::Vector3d(index.x, index.y, index.z) +
+          Eigen::Vector3d::Constant(kMiddle);
+      const Eigen::Vector3d moved = T * (middle * voxel_m) / voxel_m;
+      const Index3 low = BlockOf(FloorOf(moved - Eigen::Vector3d::Constant(kReach_voxels)));
+      const Index3 high = BlockOf(FloorOf(moved + Eigen::Vector3d::Constant(kReach_voxels)));
+      for (int z = low.z; z <= high.z; ++z) {
+        for (int y = low.y; y <= high.y; ++y) {
+          for (int x = low.x; x <= high.x; ++x) {
+            if (box.Holds({x, y, z})) near.push_back({x, y, z});
+          }
+        }
+      }
+    }
+    clean(near);
+    std::copy_if(near.begin(), near.end(), std::back_inserter(touched), touches);
+  }
+  clean(touched);
+  return touched;
+}
 
 }  // namespace
 
@@ -120,9 +171,19 @@ std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, do
     }
     return false;
   };
-  for (int z = block_of(box.min().z() - 1); z <= block_of(box.max().z() + 1); ++z) {
-    for (int y = block_of(box.min().y() - 1); y <= block_of(box.max().y() + 1); ++y) {
-      for (int x = block_of(box.min().x() - 1); x <= block_of(box.max().x() + 1); ++x) {
+  BlockBox candidates;
+  candidates.Extend(
+      {block_of(box.min().x() - 1), block_of(box.min().y() - 1), block_of(box.min().z() - 1)});
+  candidates.Extend(
+      {block_of(box.max().x() + 1), block_of(box.max().y() + 1), block_of(box.max().z() + 1)});
+  const auto& [first, last, is_empty] = candidates;
+  const auto side = [](int from, int to) { return double{1} + to - from; };
+  if (side(first.x, last.x) * side(first.y, last.y) * side(first.z, last.z) > kMostInBox) {
+    return TouchedFarApart(reader, T, voxel_m, candidates, touches);
+  }
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) {
         if (touches({x, y, z})) blocks.push_back({x, y, z});
       }
     }

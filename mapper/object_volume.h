@@ -1,6 +1,7 @@
 // The TSDF of one object in its own lattice (paper III-A, "object volume").
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -29,6 +30,24 @@ inline void PlaceLattice(ObjectVolume& volume) {
       volume.lattice_is_world ? Pose::Identity() : *volume.T_WO * volume.T_WO_birth->inverse();
 }
 
+// What a pose would do to what a map holds of an object.
+struct ObjectMove {
+  Pose T_WL = Pose::Identity();  // where the object's lattice would be
+  // What would move, by T, from its lattice to the world; nullptr where nothing does.
+  const TsdfGrid* blocks = nullptr;
+  Pose T = Pose::Identity();
+  std::function<bool(const Index3&)> is_moved;  // of the blocks; empty where all are
+};
+
+// What a new pose does where values move and the lattice is always the world's.
+inline ObjectMove MoveOfValues(const ObjectVolume& volume, const Pose& T_WO) {
+  ObjectMove move;
+  if (!volume.T_WO || SameNumbers(*volume.T_WO, T_WO)) return move;
+  move.T = T_WO * volume.T_WO->inverse();
+  move.blocks = &volume.grid;
+  return move;
+}
+
 // Reads voxels of a grid by index through a dense table of block pointers over the grid's bounding
 // box: for many reads of one object. The grid must not change meanwhile.
 class VoxelReader {
@@ -48,6 +67,7 @@ class VoxelReader {
                    static_cast<std::size_t>(at.x)];
   }
   bool empty() const { return grid_->empty(); }
+  const TsdfGrid& grid() const { return *grid_; }
   // Lowest and highest block index, both included.
   Index3 low() const { return low_; }
   Index3 high() const { return {low_.x + size_.x - 1, low_.y + size_.y - 1, low_.z + size_.z - 1}; }

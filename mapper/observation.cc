@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 namespace tsdfpp {
 namespace {
@@ -16,9 +17,12 @@ constexpr std::size_t kBlocksPerTask = 256;
 constexpr int kTileRowsPerTask = 4;
 // A block that fills more of the image than this many tiles is looked at without asking them.
 constexpr int kMostTiles = 64;
-// Rounding in single precision is far less.
+// Rounding in single precision is far less near the origin; see Extent::rounding_m for elsewhere.
 constexpr float kSlack_px = 1;
 constexpr float kRelativeSlack = 1e-4F;
+// Of the sums by which this plan and the kernels find a voxel before the camera: nine roundings
+// here and five there, of half a last place each.
+constexpr float kRounding = 7 * std::numeric_limits<float>::epsilon();
 
 void Require(bool condition) {
   if (!condition) std::abort();
@@ -42,6 +46,8 @@ struct Extent {
   Interval v;
   float middle_u = 0;
   float middle_v = 0;
+  float rounding_m = 0;  // how far off the kernels may find a voxel, along each axis
+  float slack_px = kSlack_px;
   bool before_camera = false;
 };
 
@@ -53,11 +59,15 @@ Extent ExtentOf(const FrameView& frame, const CameraFromLattice& T_CL, const Ind
   const float y = static_cast<float>(block.y * kBlockSide) * voxel + half;
   const float z = static_cast<float>(block.z * kBlockSide) * voxel + half;
   std::array<float, 3> middle;
+  float summed = 0;
   for (std::size_t r = 0; r < 3; ++r) {
     const auto& m = T_CL.rows[r];
     middle[r] = m[0] * x + m[1] * y + m[2] * z + m[3];
+    summed = std::max(summed, std::abs(m[3]));
   }
   Extent extent;
+  // A row of a rotation is at most 1 in each place.
+  extent.rounding_m = kRounding * (summed + std::abs(x) + std::abs(y) + std::abs(z) + 3 * half);
   const float safe_z = std::max(middle[2], kNearest_m);
   extent.middle_u = fx * middle[0] / safe_z + cx;
   extent.middle_v = fy * middle[1] / safe_z + cy;
@@ -72,6 +82,10 @@ Extent ExtentOf(const FrameView& frame, const CameraFromLattice& T_CL, const Ind
   for (const float corner_z : corner[2]) extent.z.Extend(corner_z);
   extent.before_camera = extent.z.low >= kNearest_m;
   if (!extent.before_camera) return extent;
+  // A pixel in the image moves by at most this when its point does.
+  const float px_per_m = (std::max(fx, fy) + static_cast<float>(frame.width + frame.height)) /
+                         std::max(extent.z.low - extent.rounding_m, kNearest_m);
+  extent.slack_px = std::max(kSlack_px, extent.rounding_m * px_per_m);
   for (std::size_t i = 0; i < 8; ++i) {
     const float inverse = 1 / corner[2][i];
     extent.u.Extend(fx * corner[0][i] * inverse + cx);
@@ -86,10 +100,10 @@ Tile TilesUnder(const FrameView& frame, const Extent& extent) {
     const float last = static_cast<float>(size - 1);
     return static_cast<int>(std::min(std::max(0.0F, pixel), last)) / kTile_px;
   };
-  const int left = tile_at(extent.u.low - kSlack_px, frame.width);
-  const int right = tile_at(extent.u.high + kSlack_px, frame.width);
-  const int top = tile_at(extent.v.low - kSlack_px, frame.height);
-  const int bottom = tile_at(extent.v.high + kSlack_px, frame.height);
+  const int left = tile_at(extent.u.low - extent.slack_px, frame.width);
+  const int right = tile_at(extent.u.high + extent.slack_px, frame.width);
+  const int top = tile_at(extent.v.low - extent.slack_px, frame.height);
+  const int bottom = tile_at(extent.v.high + extent.slack_px, frame.height);
   Tile all;
   if ((right - left + 1) * (bottom - top + 1) > kMostTiles) {
     all.nearest = 0;
@@ -118,20 +132,20 @@ struct Verdict {
 
 Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, float back) {
   const Extent extent = ExtentOf(frame, *block.T_CL, block.index, voxel);
-  const float slack_m = kRelativeSlack * (std::abs(extent.z.high) + back);
+  const float slack_m = kRelativeSlack * (std::abs(extent.z.high) + back) + extent.rounding_m;
   Verdict verdict;
   // Written so that a camera pose that is not a number sees nothing.
   if (!(extent.z.high + slack_m >= kNearest_m)) return verdict;
   if (extent.before_camera) {
-    if (extent.u.high < -kSlack_px || extent.v.high < -kSlack_px ||
-        extent.u.low > static_cast<float>(frame.width) + kSlack_px ||
-        extent.v.low > static_cast<float>(frame.height) + kSlack_px) {
+    if (extent.u.high < -extent.slack_px || extent.v.high < -extent.slack_px ||
+        extent.u.low > static_cast<float>(frame.width) + extent.slack_px ||
+        extent.v.low > static_cast<float>(frame.height) + extent.slack_px) {
       return verdict;
     }
-    verdict.all_in_view = extent.z.low - slack_m >= kNearest_m && extent.u.low >= kSlack_px &&
-                          extent.v.low >= kSlack_px &&
-                          extent.u.high <= static_cast<float>(frame.width - 1) - kSlack_px &&
-                          extent.v.high <= static_cast<float>(frame.height - 1) - kSlack_px;
+    verdict.all_in_view = extent.z.low - slack_m >= kNearest_m && extent.u.low >= extent.slack_px &&
+                          extent.v.low >= extent.slack_px &&
+                          extent.u.high <= static_cast<float>(frame.width - 1) - extent.slack_px &&
+                          extent.v.high <= static_cast<float>(frame.height - 1) - extent.slack_px;
     const Tile seen = TilesUnder(frame, extent);
     // Along the ray what is behind is at least as far behind as along the axis.
     verdict.behind_m = seen.farthest + back + slack_m;

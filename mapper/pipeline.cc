@@ -1,9 +1,18 @@
 #include "mapper/pipeline.h"
 
+#include <algorithm>
 #include <chrono>
+#include <limits>
+#include <utility>
+
+#include "mapper/lattice_range.h"
 
 namespace tsdfpp {
 namespace {
+
+// Voxels from the origin beyond which a coordinate in single precision is off by more than a
+// sixteenth of one.
+constexpr double kExactVoxels = 1 << 20;
 
 class StopWatch {
  public:
@@ -51,6 +60,7 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
                    std::unique_ptr<MapRepresentation> map,
                    std::map<InstanceId, std::map<int, Pose>> trajectories)
     : config_(config), map_(std::move(map)), trajectories_(std::move(trajectories)) {
+  is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
   }
@@ -76,17 +86,26 @@ std::map<InstanceId, Pose> Pipeline::Track(const Frame& frame) const {
   return motions;
 }
 
-StepTimes Pipeline::Process(const Frame& frame) {
-  StepTimes times;
-  StopWatch watch;
+std::map<InstanceId, Pose> Pipeline::PosesAfter(const Frame& frame) const {
+  std::map<InstanceId, Pose> poses = T_WO_;
   if (config_.poses == PoseSource::kIcp) {
     for (const auto& [id, T_O] : Track(frame)) {
       const auto known = T_WO_.find(id);
-      T_WO_[id] = known == T_WO_.end() ? T_O : Pose(T_O * known->second);
+      poses[id] = known == T_WO_.end() ? T_O : Pose(T_O * known->second);
     }
   } else {
-    for (const auto& [id, T_WO] : frame.T_WO) T_WO_[id] = T_WO;
+    for (const auto& [id, T_WO] : frame.T_WO) poses[id] = T_WO;
   }
+  return poses;
+}
+
+Expected<StepTimes> Pipeline::Process(const Frame& frame) {
+  StepTimes times;
+  StopWatch watch;
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, frame.mask));
+  std::map<InstanceId, Pose> poses = PosesAfter(frame);
+  TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, frame.mask, poses));
+  T_WO_ = std::move(poses);
   times.track_s = watch.Lap();
   for (const auto& [id, T_WO] : T_WO_) {
     map_->SetObjectPose(id, T_WO);
@@ -95,7 +114,28 @@ StepTimes Pipeline::Process(const Frame& frame) {
   times.update_poses_s = watch.Lap();
   map_->Fuse(frame, frame.mask);
   times.fuse_s = watch.Lap();
+  CountWhileEmpty(frame);
+  farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
   return times;
+}
+
+void Pipeline::CountWhileEmpty(const Frame& frame) {
+  if (!is_empty_) return;
+  is_empty_ = map_->Memory().blocks == 0;
+  if (is_empty_) in_vain_.Add(frame, frame.mask);
+}
+
+std::vector<std::string> Pipeline::Remarks() const {
+  std::vector<std::string> remarks;
+  if (is_empty_) remarks.push_back("the map is empty: " + in_vain_.Text());
+  const double voxels = farthest_m_ / config_.map.voxel_m;
+  if (voxels > kExactVoxels) {
+    remarks.push_back(fmt::format(
+        "the camera is up to {:.6g} m from the origin along an axis, where single precision rounds "
+        "by up to {:.2g} voxels, which blurs surfaces; poses nearer to the origin would help",
+        farthest_m_, voxels * std::numeric_limits<float>::epsilon() / 2));
+  }
+  return remarks;
 }
 
 }  // namespace tsdfpp

@@ -294,7 +294,13 @@ std::vector<MeshPart*> PartsIn(const BlockSet& blocks, const GridMesh& mesh) {
   if (blocks.bounds().is_empty) return parts;
   const std::vector<std::uint64_t>& keys = mesh.keys();
   auto key = keys.begin();
-  const auto& [low, high, is_empty] = blocks.bounds();
+  // Boxes that were moved may reach beyond what can be packed; no part is there.
+  const auto clamped = [](const Index3& index) {
+    const auto along = [](int i) { return std::clamp(i, -kFurthestStored, kFurthestStored); };
+    return Index3{along(index.x), along(index.y), along(index.z)};
+  };
+  const Index3 low = clamped(blocks.bounds().low);
+  const Index3 high = clamped(blocks.bounds().high);
   for (int z = low.z; z <= high.z; ++z) {
     for (int y = low.y; y <= high.y; ++y) {
       const std::uint64_t first = PackIndex({low.x, y, z});

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "core/limits.h"
 #include "mapper/byte_stream.h"
 
 namespace tsdfpp {
@@ -148,15 +149,33 @@ std::string PackSections(const Sections& sections) {
 Expected<Sections> UnpackSections(std::string_view file, const std::string& where) {
   TSDFPP_ASSIGN(const std::uint32_t count, ReadHeader(file, where));
   TSDFPP_ASSIGN(const std::vector<Chunk> chunks, ReadChunks(file, count, where));
-  std::vector<std::string> unpacked(chunks.size());
+  // What the parts unfold to is known before any memory is taken for it: a part of zeros takes a
+  // thousandth of its size.
+  std::int64_t unfolded = 0;
+  Sections sections;
+  std::map<std::string_view, std::size_t> sizes;
+  std::vector<std::size_t> places(chunks.size());  // of each part in its section
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    unfolded += chunks[i].raw_size;
+    std::size_t& size = sizes[chunks[i].name];
+    places[i] = size;
+    size += chunks[i].raw_size;
+  }
+  TSDFPP_RETURN_IF_ERROR(
+      CheckLimit(&Limits::map_bytes, unfolded, where, "bytes of a map once it is unfolded"));
+  for (const auto& [name, size] : sizes) sections[std::string(name)].resize(size);
+  std::vector<std::string*> texts(chunks.size());
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    texts[i] = &sections[std::string(chunks[i].name)];
+  }
   std::atomic<bool> good = true;
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, chunks.size(), 1),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          unpacked[i].resize(chunks[i].raw_size);
           uLongf size = chunks[i].raw_size;
-          const int status = uncompress(reinterpret_cast<Bytef*>(unpacked[i].data()), &size,
+          char* to = texts[i]->data() + places[i];
+          const int status = uncompress(reinterpret_cast<Bytef*>(to), &size,
                                         reinterpret_cast<const Bytef*>(chunks[i].bytes.data()),
                                         static_cast<uLong>(chunks[i].bytes.size()));
           if (status != Z_OK || size != chunks[i].raw_size) good = false;
@@ -164,10 +183,6 @@ Expected<Sections> UnpackSections(std::string_view file, const std::string& wher
       },
       tbb::simple_partitioner());
   if (!good) return DataError("{}: holds compressed data that cannot be unpacked", where);
-  Sections sections;
-  for (std::size_t i = 0; i < chunks.size(); ++i) {
-    sections[std::string(chunks[i].name)] += unpacked[i];
-  }
   return sections;
 }
 

@@ -3,12 +3,14 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
 
 #include "mapper/allocation.h"
 #include "mapper/freeing.h"
+#include "mapper/lattice_range.h"
 #include "mapper/layered_map.h"
 #include "mapper/map_invariants.h"
 #include "mapper/mesh_tools.h"
@@ -48,6 +50,7 @@ std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
 }
 
 void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  RequireReach(*this, frame, labels);
   const FrameView view(frame, labels);
   const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
     return {Pose::Identity(), &field_.directory()};
@@ -166,6 +169,21 @@ void SingleFieldMap::Remove(InstanceId id) {
   FreeEmpty(Vacate(id, config_.removed_voxels));
   T_WO_.erase(id);
   CheckInDebugBuilds(*this);
+}
+
+ObjectMove SingleFieldMap::MoveTo(InstanceId id, const Pose& T_WO) const {
+  ObjectMove move;
+  const auto known = T_WO_.find(id);
+  if (known == T_WO_.end() || SameNumbers(known->second, T_WO) || rule_ == FieldRule::kStatic) {
+    return move;
+  }
+  move.T = T_WO * known->second.inverse();
+  move.blocks = &field_;
+  move.is_moved = [this, id](const Index3& index) {
+    const auto& labels = labels_.Find(index)->id;
+    return std::find(labels.begin(), labels.end(), id) != labels.end();
+  };
+  return move;
 }
 
 void SingleFieldMap::SetObjectPose(InstanceId id, const Pose& T_WO) {

@@ -28,6 +28,7 @@ class SingleFieldMap final : public MapRepresentation {
   Method method() const override;
   const MapConfig& config() const override { return config_; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
+  ObjectMove MoveTo(InstanceId id, const Pose& T_WO) const override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
   Expected<void> Rename(InstanceId from, InstanceId to) override;

@@ -11,6 +11,7 @@
 #include "mapper/cover.h"
 #include "mapper/freeing.h"
 #include "mapper/index_kernels.h"
+#include "mapper/lattice_range.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 
@@ -207,6 +208,11 @@ bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
   return other_active;
 }
 
+ObjectMove TsdfppMap::MoveTo(InstanceId id, const Pose& T_WO) const {
+  const auto of = volumes_.find(id);
+  return of == volumes_.end() ? ObjectMove{} : MoveOfValues(of->second, T_WO);
+}
+
 void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
   ObjectVolume& volume = volumes_[id];
   const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
@@ -279,6 +285,7 @@ void TsdfppMap::Activate(InstanceId id) {
 }
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  RequireReach(*this, frame, labels);
   const FrameView view(frame, labels);
   const FrameFreeing freeing(volumes_);
   BlockVotes votes;

@@ -12,6 +12,7 @@ class TsdfppMap final : public LayeredMap {
 
   Method method() const override { return Method::kTsdfpp; }
   void SetObjectPose(InstanceId id, const Pose& T_WO) override;
+  ObjectMove MoveTo(InstanceId id, const Pose& T_WO) const override;
   void Fuse(const Frame& frame, const cv::Mat& labels) override;
   void Remove(InstanceId id) override;
   Expected<void> Rename(InstanceId from, InstanceId to) override;

@@ -6,16 +6,14 @@
 #include <bit>
 #include <cmath>
 
+#include "core/limits.h"
+
 namespace tsdfpp {
 namespace {
 
 // Blocks that are packed together, each kind of number by itself, which compresses better.
 constexpr std::size_t kBlocksPerGroup = 64;
 constexpr std::size_t kIndexBytes = 3 * sizeof(std::int32_t);
-// Well inside what PackIndex can hold, neighbours included.
-constexpr int kFurthestBlock = (1 << 20) - 16;
-constexpr double kRigidTolerance = 1e-6;  // poses from files have nine decimals
-constexpr double kFurthest_m = 1e5;       // voxels there are still numbered by 32 bits
 
 void PutIndex(const Index3& index, std::string& bytes) {
   PutBytes(static_cast<std::int32_t>(index.x), bytes);
@@ -171,6 +169,10 @@ void SaveGrid(const TsdfGrid& grid, std::string& bytes) {
 Expected<TsdfGrid> LoadGrid(ByteReader& bytes, const MapConfig& config) {
   const auto blocks = bytes.Get<std::uint64_t>();
   if (blocks > bytes.left() / kIndexBytes) return DataError("it has too few blocks");
+  // A block that is nearly empty takes some fifty times its place in the file.
+  TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::map_bytes,
+                                    static_cast<std::int64_t>(blocks * sizeof(TsdfBlock)),
+                                    "its blocks", "bytes"));
   const std::size_t groups = (blocks + kBlocksPerGroup - 1) / kBlocksPerGroup;
   std::vector<std::string_view> group_bytes;
   for (std::size_t g = 0; g < groups; ++g) {
@@ -206,16 +208,16 @@ void SavePose(const Pose& T, std::string& bytes) {
   }
 }
 
-Expected<Pose> LoadPose(ByteReader& bytes) {
+Expected<Pose> LoadPose(ByteReader& bytes, const LatticeRange& range) {
   Pose T = Pose::Identity();
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 4; ++c) T.matrix()(r, c) = bytes.Get<double>();
   }
-  const Eigen::Matrix3d R = T.linear();
-  const double skew = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  const bool rigid = T.matrix().allFinite() && skew < kRigidTolerance && R.determinant() > 0;
-  const bool is_near = T.translation().cwiseAbs().maxCoeff() < kFurthest_m;
-  if (!bytes.ok() || !rigid || !is_near) return DataError("a pose is not rigid or too far away");
+  if (!bytes.ok()) return DataError("it ends within a pose");
+  TSDFPP_RETURN_IF_ERROR(CheckRigid(T, "a"));
+  if (!range.Holds(T.translation())) {
+    return DataError("a pose is at {}", range.Beyond(T.translation()));
+  }
   return T;
 }
 
@@ -233,6 +235,8 @@ void SaveVolumes(const ObjectVolumes& volumes, std::string& bytes) {
 
 Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config) {
   ObjectVolumes volumes;
+  const LatticeRange range(config.voxel_m);
+  std::size_t blocks = 0;
   const auto count = bytes.Get<std::uint32_t>();
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto id = bytes.Get<InstanceId>();
@@ -243,11 +247,20 @@ Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config) 
       const auto is_there = bytes.Get<std::uint8_t>();
       if (is_there > 1) return DataError("an object's pose is neither there nor not");
       if (is_there == 0) continue;
-      TSDFPP_ASSIGN(*pose, LoadPose(bytes));
+      TSDFPP_ASSIGN(*pose, LoadPose(bytes, range));
     }
     if (volume.T_WO_birth && !volume.T_WO) return DataError("an object has lost its pose");
     PlaceLattice(volume);
     TSDFPP_ASSIGN(volume.grid, LoadGrid(bytes, config));
+    ObjectMove placement;
+    placement.T = volume.T_WL;
+    if (!volume.lattice_is_world) placement.blocks = &volume.grid;
+    TSDFPP_RETURN_IF_ERROR(CheckMoved(range, placement, kPlacementSlack_blocks,
+                                      fmt::format("object {}'s poses take a part of it to", id)));
+    blocks += volume.grid.entries().size();
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::map_bytes,
+                                      static_cast<std::int64_t>(blocks * sizeof(TsdfBlock)),
+                                      "its blocks", "bytes"));
   }
   return volumes;
 }

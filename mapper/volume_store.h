@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "mapper/byte_stream.h"
+#include "mapper/lattice_range.h"
 #include "mapper/map_config.h"
 #include "mapper/volume_fusion.h"
 #include "mapper/voxel_list.h"
@@ -20,10 +21,11 @@ void SaveGrid(const TsdfGrid& grid, std::string& bytes);
 Expected<TsdfGrid> LoadGrid(ByteReader& bytes, const MapConfig& config);
 
 void SavePose(const Pose& T, std::string& bytes);
-// Errors: kData, a fragment, where it is not rigid or beyond 100 km.
-Expected<Pose> LoadPose(ByteReader& bytes);
+// Errors: kData, a fragment, where it is not rigid or beyond the range.
+Expected<Pose> LoadPose(ByteReader& bytes, const LatticeRange& range);
 
-// Values, T_WO at birth and now; where the lattice is follows from these.
+// Values, T_WO at birth and now; where the lattice is follows from these. Errors: kData, a
+// fragment, also where that is beyond the range.
 void SaveVolumes(const ObjectVolumes& volumes, std::string& bytes);
 Expected<ObjectVolumes> LoadVolumes(ByteReader& bytes, const MapConfig& config);
 

@@ -6,6 +6,7 @@
 
 #include "mapper/cover.h"
 #include "mapper/freeing.h"
+#include "mapper/lattice_range.h"
 #include "mapper/map_invariants.h"
 #include "mapper/pull_back.h"
 #include "mapper/ray_pass.h"
@@ -22,6 +23,7 @@ void VolumesMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 }
 
 void VolumesMap::Fuse(const Frame& frame, const cv::Mat& labels) {
+  RequireReach(*this, frame, labels);
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused =
       FuseIntoVolumes(FrameView(frame, labels), config_, volumes_);
@@ -43,6 +45,8 @@ std::vector<Listing> VolumesMap::ListAt(const Eigen::Vector3i& voxel) const {
         volume.lattice_is_world
             ? v
             : Eigen::Vector3d((volume.T_WL.inverse() * (config_.voxel_m * v)) / config_.voxel_m);
+    // Beyond, the directory's keys would wrap; nothing is there.
+    if (!(q.cwiseAbs().maxCoeff() < kFurthestStored * double{kBlockSide})) continue;
     if (!CoversPoint(volume.grid, q, config_.back())) continue;
     if (const auto distance = DistanceAtPoint(volume.grid, q)) order.emplace_back(*distance, id);
   }

@@ -26,6 +26,19 @@ def fenced(path):
     return "```\n" + path.read_text().rstrip("\n") + "\n```\n"
 
 
+def check_run(path):
+    """Refuses a file that tsdfpp compare or map left where that run, or the next one, was interrupted (run.json)."""
+    note, summary = path.with_name("run.json"), path.with_name("summary.json")
+    again = f"the run in {path.parent} was interrupted: run the command again"
+    if not note.exists():
+        if path.with_name(".tsdfpp-moving").exists() or (summary.exists() and "run" in json.loads(summary.read_text())):
+            raise ValueError(again)
+        return
+    for file in json.loads(note.read_text())["files"]:
+        if file["name"] == path.name and file["bytes"] not in (None, path.stat().st_size):
+            raise ValueError(f"{path} has {path.stat().st_size} bytes, expected {file['bytes']}; {again}")
+
+
 def cells_of(line):
     """Of a table of aligned columns: they stand at least two blanks apart."""
     return re.split(r"\s{2,}", line.strip())

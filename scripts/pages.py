@@ -38,6 +38,7 @@ def made_text(out, entry):
     source = out / entry["from"]
     kind = entry.get("as") or {".csv": "csv", ".txt": "fenced"}.get(source.suffix, "text")
     try:
+        page_text.check_run(source)
         return page_text.text_of(source, kind if "page" in entry else None, entry.get("without", ()))
     except (OSError, ValueError, KeyError) as error:
         raise Fault(f"{entry.get('name') or entry['path']} cannot be made of {entry['from']}: {error}") from error

@@ -18,7 +18,7 @@ double Apart(const Pose& a, const Pose& b) {
 
 }  // namespace
 
-std::map<InstanceId, int> AssignIds(std::map<int, Image>& images) {
+Expected<std::map<InstanceId, int>> AssignIds(std::map<int, Image>& images) {
   int next = 0;
   for (const auto& [number, image] : images) {
     for (const Instance& instance : image.instances) next = std::max(next, instance.obj_id);
@@ -46,7 +46,11 @@ std::map<InstanceId, int> AssignIds(std::map<int, Image>& images) {
       }
       for (Instance* instance : instances) {
         if (instance->id != kNoInstance) continue;
-        instance->id = static_cast<InstanceId>(known.empty() ? obj_id : ++next);
+        const int id = known.empty() ? obj_id : ++next;
+        if (id >= kNoInstance) {
+          return DataError("image {}: its objects need more than {} ids", number, kNoInstance - 1);
+        }
+        instance->id = static_cast<InstanceId>(id);
         known.push_back({instance->id, image.T_WC * instance->T_CO});
         objects[instance->id] = obj_id;
       }

@@ -4,6 +4,7 @@
 #include <map>
 #include <vector>
 
+#include "core/error.h"
 #include "core/types.h"
 
 namespace tsdfpp::bop {
@@ -23,8 +24,8 @@ struct Image {
 // Sets the ids of all instances and returns obj_id by id. An object that never has two instances in
 // one image has its obj_id as id. Of others the first instance has it, further ones the next free
 // ids after all obj_ids. An instance continues the one whose last pose in the world was nearest
-// (metres + kTurnWeight_m * radians), the nearest pairs first.
-std::map<InstanceId, int> AssignIds(std::map<int, Image>& images);
+// (metres + kTurnWeight_m * radians), the nearest pairs first. Errors: kData where ids run out.
+Expected<std::map<InstanceId, int>> AssignIds(std::map<int, Image>& images);
 
 inline constexpr double kTurnWeight_m = 0.05;
 

@@ -12,7 +12,9 @@ inline constexpr const char* kTruth = "scene_gt.json";
 inline constexpr const char* kTruthInfo = "scene_gt_info.json";
 inline constexpr const char* kModelsInfo = "models/models_info.json";
 inline constexpr const char* kBackgroundModel = "models/background.ply";  // ours, world frame
-inline constexpr int kMostObjects = 30000;    // obj_id and what follows are instance ids
+inline constexpr int kMostObjects = 30000;  // obj_id and what follows are instance ids
+// In one image; which instance continues which takes time with the square.
+inline constexpr std::size_t kMostInstances = 1000;
 inline constexpr double kMillimetres = 1000;  // in a metre
 
 // Relative to the scene's folder: image and, in the image's list of scene_gt.json, instance.

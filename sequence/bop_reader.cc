@@ -3,7 +3,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/bop_instances.h"
 #include "sequence/bop_layout.h"
@@ -51,9 +53,7 @@ Expected<Pose> PoseOf(const nlohmann::json& json, const char* rotation, const ch
 
 // A file's members by image number.
 Expected<std::map<int, nlohmann::json>> ReadByImage(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object()) return DataError("{}: not a JSON object", path.string());
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   std::map<int, nlohmann::json> images;
   for (const auto& [key, value] : json.items()) {
     const auto number = ParseWholeNumber(key);
@@ -68,12 +68,12 @@ class BopOpener {
   BopOpener(fs::path scene, const SequenceOptions& options, SequenceNotes& notes)
       : scene_(std::move(scene)), options_(options), notes_(notes) {
     sequence_.format = DatasetFormat::kBop;
-    const fs::path absolute = fs::absolute(scene_ / "").lexically_normal().parent_path();
+    const fs::path absolute = AbsolutePath(scene_ / "").lexically_normal().parent_path();
     sequence_.size_source = "as the first depth image";
     sequence_.rate_hz = kUsualRate_hz;
     dataset_ = Exists(scene_ / "models") ? scene_ : absolute.parent_path().parent_path();
     // A scene's own name is a number only.
-    sequence_.name = absolute.filename().string();
+    sequence_.name = NameOfFolder(absolute);
     if (dataset_ != scene_) sequence_.name = NameOfFolder(dataset_) + "-" + sequence_.name;
   }
 
@@ -86,7 +86,11 @@ class BopOpener {
           fmt::format("{}: no {}, objects are not known", sequence_.name, bop::kTruth));
     }
     if (options_.check) TSDFPP_RETURN_IF_ERROR(CheckObjectPoses());
-    objects_ = bop::AssignIds(images_);
+    auto objects = bop::AssignIds(images_);
+    if (!objects) {
+      return DataError("{}: {}", (scene_ / bop::kTruth).string(), objects.error().message);
+    }
+    objects_ = std::move(*objects);
     TSDFPP_RETURN_IF_ERROR(SetObjects());
     TSDFPP_RETURN_IF_ERROR(SetMasks());
     sequence_.truth = [objects = objects_, dataset = dataset_](const SequenceInfo& info) {
@@ -150,6 +154,10 @@ class BopOpener {
       const std::string where = fmt::format("{}: image {}", path.string(), number);
       if (image == images_.end()) return DataError("{} is not in {}", where, bop::kCamera);
       if (!list.is_array()) return DataError("{}: not a list of objects", where);
+      if (list.size() > bop::kMostInstances) {
+        return DataError("{}: lists {} objects, expected {} at most", where, list.size(),
+                         bop::kMostInstances);
+      }
       int place = 0;
       for (const nlohmann::json& json : list) {
         const std::string entry = fmt::format("{}, object {}", where, place);
@@ -203,9 +211,7 @@ class BopOpener {
     const fs::path path = dataset_ / bop::kModelsInfo;
     nlohmann::json models = nlohmann::json::object();
     if (Exists(path)) {
-      TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-      models = nlohmann::json::parse(text, nullptr, false);
-      if (!models.is_object()) return DataError("{}: not a JSON object", path.string());
+      TSDFPP_ASSIGN(models, ReadJsonObject(path));
     }
     std::map<int, int> instances;  // by obj_id
     for (const auto& [id, obj_id] : objects_) {
@@ -219,6 +225,9 @@ class BopOpener {
         semantic_class = model->contains("class") && model->at("class").is_string()
                              ? model->at("class").get<std::string>()
                              : semantic_class;
+        const std::string what = fmt::format("{}: object {}", path.string(), obj_id);
+        TSDFPP_RETURN_IF_ERROR(CheckPlainName(name, what));
+        TSDFPP_RETURN_IF_ERROR(CheckLabel(semantic_class, what + ": the class"));
       }
       const int nth = ++instances[obj_id];
       if (nth > 1) name += fmt::format("_{}", nth);

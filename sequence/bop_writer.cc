@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/ply.h"
 #include "sequence/bop_layout.h"
 #include "sequence/dataset_writers.h"
@@ -105,10 +106,10 @@ class BopWriter : public DatasetWriter {
                          {"fy", camera.fy},
                          {"height", camera.height},
                          {"width", camera.width}};
-    TSDFPP_RETURN_IF_ERROR(WriteFile(folder_ / "camera.json", common.dump(2) + "\n"));
-    TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kCamera), cameras_.dump(1) + "\n"));
-    TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kTruth), truth_.dump(1) + "\n"));
-    TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kTruthInfo), infos_.dump(1) + "\n"));
+    TSDFPP_RETURN_IF_ERROR(WriteFile(folder_ / "camera.json", JsonText(common, 2) + "\n"));
+    TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kCamera), JsonText(cameras_, 1) + "\n"));
+    TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kTruth), JsonText(truth_, 1) + "\n"));
+    TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kTruthInfo), JsonText(infos_, 1) + "\n"));
     TSDFPP_RETURN_IF_ERROR(WriteModels());
     for (const auto& [id, frames] : without_pose_) {
       if (frames == 0) continue;
@@ -196,8 +197,7 @@ class BopWriter : public DatasetWriter {
         info[std::string("size_") + kAxes[axis]] = extent.max[axis] - extent.min[axis];
       }
     }
-    return WriteFile(folder_ / bop::kModelsInfo,
-                     infos.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    return WriteFile(folder_ / bop::kModelsInfo, JsonText(infos, 2) + "\n");
   }
 
   // Our PLY files say their unit in a comment.

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 namespace {
 
 Expected<Intrinsics> Read(const fs::path& path, bool signed_fy) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::text_bytes));
   std::vector<double> numbers;
   const char* at = text.data();
   const char* const end = at + text.size();

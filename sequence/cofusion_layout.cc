@@ -60,7 +60,7 @@ std::optional<ObjectInfo> ObjectOf(const std::string& file_name, const std::stri
   const std::size_t dash = middle->rfind('-');
   if (dash == std::string_view::npos || dash == 0) return std::nullopt;
   const auto id = WholeNumber<InstanceId>(middle->substr(dash + 1));
-  if (!id) return std::nullopt;
+  if (!id || *id == kNoInstance) return std::nullopt;
   const std::string name(middle->substr(0, dash));
   return ObjectInfo{*id, name, name};
 }

@@ -7,12 +7,15 @@
 #include <utility>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/calibration.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/image_files.h"
 #include "sequence/plausibility.h"
 #include "sequence/sequence_json.h"
+#include "sequence/text_lines.h"
 #include "sequence/trajectory_file.h"
 
 namespace tsdfpp {
@@ -27,11 +30,7 @@ bool Exists(const fs::path& path) {
 // The sorted names of the files in a folder; none where it is not one.
 std::vector<std::string> FileNames(const fs::path& folder) {
   std::vector<std::string> names;
-  std::error_code code;
-  for (const auto& entry : fs::directory_iterator(folder, code)) {
-    names.push_back(entry.path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
+  for (const fs::path& entry : EntriesOf(folder)) names.push_back(entry.filename().string());
   return names;
 }
 
@@ -72,9 +71,11 @@ class CofusionSource : public FrameSource {
         return DataError("{}: the intrinsics differ from those in {}",
                          (folder_ / cofusion::kSequence).string(), cofusion::kCalibration);
       }
+      TSDFPP_RETURN_IF_ERROR(
+          CheckPossibleCamera(record.info.intrinsics, (folder_ / cofusion::kSequence).string()));
       return Adopt(record);
     }
-    info_.name = fs::absolute(folder_ / "").lexically_normal().parent_path().filename().string();
+    info_.name = NameOfFolder(folder_);
     info_.intrinsics = camera;
     TSDFPP_ASSIGN(std::tie(info_.first_index, info_.frame_count), NumbersOfImages(folder_));
     if (camera.width == 0) {
@@ -86,7 +87,7 @@ class CofusionSource : public FrameSource {
     TSDFPP_RETURN_IF_ERROR(
         CheckCamera(info_.intrinsics, (folder_ / cofusion::kCalibration).string()));
     NameObjects();
-    return {};
+    return CheckObjects(info_.objects, folder_.string());
   }
 
   const SequenceInfo& info() const override { return info_; }
@@ -187,6 +188,7 @@ class CofusionSource : public FrameSource {
             path.string());
       }
       if (object->id == kBackground && object->name == "cam") continue;
+      TSDFPP_RETURN_IF_ERROR(CheckPlainName(object->name, path.string()));
       TSDFPP_ASSIGN(Trajectory trajectory, ReadTrajectory(path));
       if (!objects_.emplace(object->id, std::move(trajectory)).second) {
         return DataError("{}: a second trajectory of object {}", path.string(), object->id);

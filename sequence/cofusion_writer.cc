@@ -4,6 +4,8 @@
 #include <set>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/plain_name.h"
 #include "core/ply.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/image_files.h"
@@ -56,10 +58,10 @@ class HashingWriter {
 Expected<void> RemoveStrangers(const fs::path& folder, const SequenceRecord& record) {
   std::vector<fs::path> strangers;
   std::error_code code;
-  for (const auto& entry : fs::recursive_directory_iterator(folder, code)) {
-    const std::string file = entry.path().lexically_relative(folder).string();
-    if (entry.is_directory() || file == "lock" || record.hashes.contains(file)) continue;
-    strangers.push_back(entry.path());
+  TSDFPP_ASSIGN(const std::vector<fs::path> there, ListFilesBelow(folder));
+  for (const fs::path& path : there) {
+    const std::string file = path.lexically_relative(folder).string();
+    if (file != "lock" && !record.hashes.contains(file)) strangers.push_back(path);
   }
   for (const fs::path& stranger : strangers) {
     fs::remove(stranger, code);
@@ -82,10 +84,8 @@ Expected<void> CheckObjectsFit(const std::vector<ObjectInfo>& objects) {
       return UsageError("object '{}': id {}, a Co-Fusion mask holds 0 to {}", object.name,
                         object.id, cofusion::kMaxId);
     }
-    if (object.name.empty() ||
-        object.name.find_first_of(std::string("/\n\0", 3)) != object.name.npos) {
-      return UsageError("object {}: the name '{}' cannot be part of a file name", object.id,
-                        object.name);
+    if (auto named = CheckPlainName(object.name, fmt::format("object {}", object.id)); !named) {
+      return UsageError("{}", named.error().message);
     }
     if (object.id == kBackground && object.name == "cam") {
       return UsageError("object 0: the name 'cam' is the camera's in a Co-Fusion set");

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <set>
 
+#include "core/limits.h"
+#include "core/plain_name.h"
 #include "sequence/image_files.h"
 #include "sequence/integer_images.h"
 #include "sequence/plausibility.h"
@@ -135,7 +137,8 @@ double RateOf(const std::vector<double>& times_s) {
   if (steps.empty()) return kUsualRate_hz;
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
-  return 1 / *middle;
+  const double rate_hz = 1 / *middle;
+  return std::isfinite(rate_hz) ? rate_hz : kUsualRate_hz;
 }
 
 Pose MirroredInY(const Pose& T_WC) {
@@ -186,6 +189,8 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
                                                         SequenceNotes& notes) {
   auto& frames = sequence.frames;
   if (frames.empty()) return DataError("{}: no frames", sequence.name);
+  TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::frames, static_cast<std::int64_t>(frames.size()),
+                                    sequence.name, "frames"));
   // Names sort otherwise where their numbers have no leading zeros.
   std::stable_sort(frames.begin(), frames.end(),
                    [](const FrameFiles& a, const FrameFiles& b) { return a.number < b.number; });
@@ -227,6 +232,7 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
   if (sequence.objects.empty()) sequence.objects = NamedByIds(IdsIn(sequence));
   info.objects.push_back({kBackground, "background", "background"});
   for (const ObjectInfo& object : sequence.objects) info.objects.push_back(object);
+  TSDFPP_RETURN_IF_ERROR(CheckObjects(info.objects, sequence.name));
   if (!sequence.has_masks) notes.push_back(fmt::format("{}: no masks", sequence.name));
   return std::make_unique<FileSource>(std::move(sequence), std::move(info));
 }

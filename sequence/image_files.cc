@@ -1,77 +1,45 @@
 #include "sequence/image_files.h"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
-#include <mutex>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <vector>
 
-#include "core/files.h"
+#include "core/decode_image.h"
+#include "core/exr_header.h"
+#include "core/one_line.h"
 #include "core/types.h"
-#include "sequence/exr_header.h"
 #include "sequence/image_encoders.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
 namespace {
 
-// OpenCV looks at this variable when it first meets an EXR file, and refuses the file without it.
-void EnableExr() {
-  static std::once_flag once;
-  std::call_once(once, [] { setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1); });
-}
+// A camera has more than one row and column: with one, what maps do between pixels has no meaning.
+constexpr std::int64_t kLeastSide_px = 2;
 
-// OpenCV and the codecs below it print their own words about a damaged image to stderr, where ours
-// belong, and offer no hook. While this lives, what the process prints there is dropped.
-class QuietStderr {
- public:
-  QuietStderr() : lock_(Mutex()), saved_(dup(STDERR_FILENO)) {
-    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (saved_ >= 0 && nowhere >= 0) dup2(nowhere, STDERR_FILENO);
-    if (nowhere >= 0) close(nowhere);
+// The size that the header says; an empty `expected` takes any of a camera.
+Expected<void> CheckHeaderSize(const ImageHeader& header, cv::Size expected,
+                               const std::string& size_source, const std::string& file) {
+  if (!expected.empty() && (header.width != expected.width || header.height != expected.height)) {
+    return DataError("{}: the image is {}x{}, expected {}x{} ({})", file, header.width,
+                     header.height, expected.width, expected.height, size_source);
   }
-  ~QuietStderr() {
-    if (saved_ < 0) return;
-    dup2(saved_, STDERR_FILENO);
-    close(saved_);
+  if (header.width < kLeastSide_px || header.height < kLeastSide_px) {
+    return DataError("{}: the image is {}x{}, expected {} pixels or more each way", file,
+                     header.width, header.height, kLeastSide_px);
   }
-  QuietStderr(const QuietStderr&) = delete;
-  QuietStderr& operator=(const QuietStderr&) = delete;
-
- private:
-  static std::mutex& Mutex() {
-    static std::mutex mutex;
-    return mutex;
-  }
-  std::lock_guard<std::mutex> lock_;  // two at once would restore each other's silence
-  int saved_;
-};
-
-// What `decode` makes of an image; empty where it cannot.
-template <typename Function>
-cv::Mat Quietly(const Function& decode) {
-  try {
-    const QuietStderr quiet;
-    return decode();
-  } catch (const cv::Exception&) {
-    return {};
-  }
+  return {};
 }
 
 Expected<cv::Mat> Decode(const fs::path& path, cv::Size expected,
                          const std::string& size_source = "calibration.txt") {
-  std::error_code code;
-  if (!fs::exists(path, code)) return DataError("{}: no such image", path.string());
-  cv::Mat image = Quietly([&] { return cv::imread(path.string(), cv::IMREAD_UNCHANGED); });
-  if (image.empty()) return DataError("{}: cannot be decoded as an image", path.string());
-  TSDFPP_RETURN_IF_ERROR(CheckImageSize(image, expected, size_source, path.string()));
-  return image;
+  return ReadImageFile(path, DecodeAs::kAsItIs, [&](const ImageHeader& header, std::string_view) {
+    return CheckHeaderSize(header, expected, size_source, path.string());
+  });
 }
 
 cv::Mat SwapRedAndBlue(const cv::Mat& image) {
@@ -123,21 +91,21 @@ float MillimetreMedian(const cv::Mat& depth) {
 }
 
 // Depth must be one floating-point channel, Y, or three, R, G and B.
-Expected<void> CheckDepthChannels(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
+Expected<void> CheckDepthChannels(std::string_view bytes, const std::string& file) {
+  const auto header = ReadExrHeader(bytes);
+  if (!header) return {};  // not an EXR file: its type says what it is
   std::set<std::string> names;
-  for (const ExrChannel& channel : ExrChannels(bytes)) {
+  for (const ExrChannel& channel : header->channels) {
     names.insert(channel.name);
     if (channel.type == ExrType::kInteger) {
       return DataError("{}: depth of an integer type (channel {}), expected 32-bit float metres",
-                       path.string(), channel.name);
+                       file, OneLine(channel.name, 100));
     }
   }
-  if (names.empty()) return {};  // not an EXR file: the decoder says what it is
   const bool colours = names.contains("R") && names.contains("G") && names.contains("B");
   if (!colours && names != std::set<std::string>{"Y"}) {
-    return DataError("{}: depth in channels {}, expected Y, or R, G and B", path.string(),
-                     fmt::join(names, " "));
+    return DataError("{}: depth in channels {}, expected Y, or R, G and B", file,
+                     OneLine(fmt::format("{}", fmt::join(names, " ")), 100));
   }
   return {};
 }
@@ -170,11 +138,7 @@ Expected<void> CheckImageSize(const cv::Mat& image, cv::Size expected,
 Expected<cv::Mat> ReadImage(const fs::path& path) { return Decode(path, {}); }
 
 Expected<cv::Mat> DecodeColour(const std::string& bytes, const std::string& file) {
-  const cv::Mat image = Quietly([&] {
-    return cv::imdecode(std::vector<unsigned char>(bytes.begin(), bytes.end()),
-                        cv::IMREAD_UNCHANGED);
-  });
-  if (image.empty()) return DataError("{}: cannot be decoded as an image", file);
+  TSDFPP_ASSIGN(const cv::Mat image, DecodeImage(bytes, file));
   return ColourOf(image, file);
 }
 
@@ -223,7 +187,6 @@ Expected<cv::Mat> ReadColour(const fs::path& path, cv::Size expected,
 }
 
 Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
-  EnableExr();
   std::error_code code;
   if (!fs::exists(path, code)) {
     for (const char* extension : {".png", ".pgm", ".tiff", ".tif"}) {
@@ -234,8 +197,11 @@ Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
       }
     }
   }
-  if (fs::exists(path, code)) TSDFPP_RETURN_IF_ERROR(CheckDepthChannels(path));
-  TSDFPP_ASSIGN(cv::Mat depth, Decode(path, expected));
+  const auto check = [&](const ImageHeader& header, std::string_view bytes) -> Expected<void> {
+    TSDFPP_RETURN_IF_ERROR(CheckDepthChannels(bytes, path.string()));
+    return CheckHeaderSize(header, expected, "calibration.txt", path.string());
+  };
+  TSDFPP_ASSIGN(cv::Mat depth, ReadImageFile(path, DecodeAs::kAsItIs, check));
   if (depth.depth() != CV_32F) {
     return DataError("{}: depth is {}, expected 32-bit float metres", path.string(),
                      ImageTypeName(depth));

@@ -3,6 +3,11 @@
 #include <fstream>
 #include <set>
 
+#include "core/files.h"
+#include "core/folders.h"
+#include "core/limits.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 #include "sequence/calibration.h"
 #include "sequence/dataset_readers.h"
 #include "sequence/image_files.h"
@@ -24,20 +29,23 @@ class KlgSource : public DatasetSource {
  public:
   Expected<void> Open(const fs::path& file, const SequenceOptions& options, SequenceNotes& notes) {
     file_ = file;
+    TSDFPP_RETURN_IF_ERROR(CheckRegularFile(file));
     in_.open(file, std::ios::binary);
     TSDFPP_ASSIGN(KlgIndex index, ReadKlgIndex(file));
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(
+        &Limits::frames, static_cast<std::int64_t>(index.entries.size()), file.string(), "frames"));
     if (index.bytes_after > 0) {
       notes.push_back(fmt::format("{}: {} bytes follow the last of its {} frames", file.string(),
                                   index.bytes_after, index.entries.size()));
     }
-    const fs::path folder = fs::absolute(file).parent_path();
+    const fs::path folder = AbsolutePath(file).parent_path();
     TSDFPP_RETURN_IF_ERROR(SetCamera(folder, options, notes));
     TSDFPP_RETURN_IF_ERROR(SetPoses(folder, index, options, notes));
     if (entries_.empty()) {
       return DataError("{}: no frame of {} is within its times",
                        (folder / "groundtruth.txt").string(), file.filename().string());
     }
-    info_.name = file.stem().string();
+    info_.name = OneLine(file.stem().string(), kMostNameBytes);
     info_.first_index = 0;
     info_.frame_count = static_cast<int>(entries_.size());
     std::vector<double> times;
@@ -178,6 +186,7 @@ class KlgSource : public DatasetSource {
       for (const InstanceId id : cv::Mat_<InstanceId>(*mask)) ids.insert(id);
     }
     ids.erase(kBackground);
+    ids.erase(kNoInstance);
     ids.erase(kNoInstance);
     return {ids.begin(), ids.end()};
   }

@@ -24,6 +24,11 @@ class KlgWriter : public DatasetWriter {
       out_.open(folder_ / kRecording, std::ios::binary);
       Put(static_cast<std::int32_t>(info_.frame_count));
     }
+    constexpr double kMostSeconds = 9e12;  // as microseconds in 64 bits
+    if (!(std::abs(frame.time_s) < kMostSeconds)) {
+      return DataError("frame {}: its time, {} s, does not fit a klg file", frame.index,
+                       frame.time_s);
+    }
     const auto time_us = static_cast<std::int64_t>(std::llround(frame.time_s * 1e6));
     const std::string name = fmt::format("frame {}", frame.index);
     if (count_ > 0 && time_us <= last_us_) {
@@ -41,6 +46,7 @@ class KlgWriter : public DatasetWriter {
     Put(static_cast<std::int32_t>(colour.size()));
     out_.write(depth.data(), static_cast<std::streamsize>(depth.size()));
     out_.write(colour.data(), static_cast<std::streamsize>(colour.size()));
+    if (!out_) return EnvironmentError("{}: cannot be written", (folder_ / kRecording).string());
     if (!frame.mask.empty()) {
       TSDFPP_RETURN_IF_ERROR(WriteEncoded(folder_ / fmt::format("mask/{:06d}.png", count_),
                                           EncodePng(frame.mask, name)));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/data_folder.h"
 #include "sequence/bop_layout.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_reader.h"
@@ -141,6 +142,7 @@ Expected<std::unique_ptr<FrameSource>> OpenSequence(const fs::path& path,
   } else {
     TSDFPP_ASSIGN(format, DetectFormat(path));
   }
+  if (fs::is_directory(path, code)) TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(path));
   if (format == DatasetFormat::kCofusion) return OpenCofusionSet(path, options);
   SequenceNotes unheard;
   TSDFPP_ASSIGN(auto source, OpenOthers(path, format, options, notes ? *notes : unheard));

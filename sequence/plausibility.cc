@@ -206,6 +206,23 @@ Expected<void> CheckCamera(const Intrinsics& camera, const std::string& where) {
   return {};
 }
 
+Expected<void> CheckPossibleCamera(const Intrinsics& camera, const std::string& where) {
+  const auto is_side = [](int side) { return side >= 1 && side <= kLargestCameraSide_px; };
+  if (!is_side(camera.width) || !is_side(camera.height)) {
+    return DataError("{}: images of {}x{} pixels, expected sides from 1 to {}", where, camera.width,
+                     camera.height, kLargestCameraSide_px);
+  }
+  const bool finite = std::isfinite(camera.fx) && std::isfinite(camera.fy) &&
+                      std::isfinite(camera.cx) && std::isfinite(camera.cy);
+  if (!finite || !(camera.fx > 0) || !(camera.fy > 0)) {
+    return DataError(
+        "{}: focal lengths {:g} and {:g} and principal point ({:g}, {:g}), expected finite numbers "
+        "and focal lengths above 0",
+        where, camera.fx, camera.fy, camera.cx, camera.cy);
+  }
+  return {};
+}
+
 Expected<void> CheckFrames(FrameSource& source, const std::vector<Pose>& T_WC,
                            std::optional<double> units_per_m) {
   const SequenceInfo& info = source.info();

@@ -18,6 +18,11 @@ inline constexpr double kFarthestPrincipalPoint = 0.15;
 // Errors: kData, beginning with `where`.
 Expected<void> CheckCamera(const Intrinsics& camera, const std::string& where);
 
+// What every camera is, also one that a user made up: sides of 1 to kLargestCameraSide_px pixels,
+// finite numbers, focal lengths above 0. Errors: kData, beginning with `where`.
+inline constexpr int kLargestCameraSide_px = 16384;
+Expected<void> CheckPossibleCamera(const Intrinsics& camera, const std::string& where);
+
 // The median depth of a frame must lie between these.
 inline constexpr double kNearestMedian_m = 0.05;
 inline constexpr double kFarthestMedian_m = 50.0;

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
-#include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/dataset_readers.h"
 #include "sequence/pose_matrix.h"
@@ -16,17 +17,19 @@ struct ReplicaCamera {
 };
 
 Expected<ReplicaCamera> ReadCameraJson(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
-  const auto json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object()) return DataError("{}: not a JSON object", path.string());
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   try {
     const auto& camera = json.contains("camera") ? json.at("camera") : json;
-    const ReplicaCamera read{{camera.at("w").get<int>(), camera.at("h").get<int>(),
-                              camera.at("fx").get<double>(), camera.at("fy").get<double>(),
-                              camera.at("cx").get<double>(), camera.at("cy").get<double>()},
-                             camera.at("scale").get<double>()};
+    const auto side = [&](const char* key) {
+      constexpr int kMostSide = 1 << 20;  // beyond any image
+      return static_cast<int>(WholeIn(camera.at(key), 1, kMostSide).value_or(0));
+    };
+    const ReplicaCamera read{
+        {side("w"), side("h"), camera.at("fx").get<double>(), camera.at("fy").get<double>(),
+         camera.at("cx").get<double>(), camera.at("cy").get<double>()},
+        camera.at("scale").get<double>()};
     if (!(read.units_per_m > 0) || read.camera.width <= 0 || read.camera.height <= 0) {
-      return DataError("{}: w, h and scale must be over 0", path.string());
+      return DataError("{}: w, h and scale must be over 0, w and h whole numbers", path.string());
     }
     return read;
   } catch (const nlohmann::json::exception&) {
@@ -42,7 +45,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
   std::error_code code;
   fs::path params = folder / "cam_params.json";
   if (!fs::exists(params, code)) {
-    params = fs::absolute(folder / "").lexically_normal().parent_path().parent_path() /
+    params = AbsolutePath(folder / "").lexically_normal().parent_path().parent_path() /
              "cam_params.json";
   }
   ReplicaCamera camera;

@@ -1,9 +1,15 @@
 #include "sequence/sequence_json.h"
 
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "core/data_folder.h"
 #include "core/files.h"
+#include "core/json_text.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace {
@@ -13,12 +19,27 @@ using Json = nlohmann::ordered_json;
 constexpr int kSchemaVersion = 2;
 constexpr int kOldestSchemaVersion = 1;
 constexpr const char* kGenerator = "tsdfpp";
+constexpr int kGreatestFrame = 1'000'000'000;  // what users of the numbers can add to
+constexpr int kLeastSide_px = 2;
 
-// nlohmann's own conversion would wrap a number that does not fit.
+// nlohmann's own conversion would wrap a number that does not fit. Throws as that does where the
+// value is of another type.
+template <typename T>
+T WholeOf(const Json& json, const char* what, std::int64_t lowest, std::int64_t highest) {
+  const auto number = WholeIn(json, lowest, highest);
+  if (!number) {
+    throw std::out_of_range(fmt::format("{} is {}, expected a whole number from {} to {}", what,
+                                        JsonShown(json), lowest, highest));
+  }
+  return static_cast<T>(*number);
+}
+
 InstanceId IdOf(const Json& json) {
-  const auto id = json.get<std::int64_t>();
-  if (id < 0 || id >= kNoInstance) throw std::out_of_range(fmt::format("object id {}", id));
-  return static_cast<InstanceId>(id);
+  return WholeOf<InstanceId>(json, "an object's id", 0, kNoInstance - 1);
+}
+
+std::int64_t CountOf(const Json& json, const char* what) {
+  return WholeOf<std::int64_t>(json, what, 0, std::numeric_limits<std::int64_t>::max());
 }
 
 Json ResidualJson(const Residual& residual) {
@@ -29,10 +50,13 @@ Json ResidualJson(const Residual& residual) {
 }
 
 Residual ResidualOf(const Json& json) {
-  return {json.at("mean_m").get<double>(),          json.at("p99_m").get<double>(),
-          json.at("max_m").get<double>(),           json.at("limit_m").get<double>(),
-          json.at("checked").get<std::int64_t>(),   json.at("excluded").get<std::int64_t>(),
-          json.at("violations").get<std::int64_t>()};
+  return {json.at("mean_m").get<double>(),
+          json.at("p99_m").get<double>(),
+          json.at("max_m").get<double>(),
+          json.at("limit_m").get<double>(),
+          CountOf(json.at("checked"), "checked"),
+          CountOf(json.at("excluded"), "excluded"),
+          CountOf(json.at("violations"), "violations")};
 }
 
 Json CertificateJson(const Certificate& certificate) {
@@ -44,9 +68,10 @@ Json CertificateJson(const Certificate& certificate) {
 }
 
 Certificate CertificateOf(const Json& json) {
-  return {json.at("frames").get<int>(), json.at("ray_frames").get<int>(),
+  return {WholeOf<int>(json.at("frames"), "frames", 0, kGreatestFrame),
+          WholeOf<int>(json.at("ray_frames"), "ray_frames", 0, kGreatestFrame),
           ResidualOf(json.at("model")), ResidualOf(json.at("ray_depth")),
-          json.at("wrong_ids").get<std::int64_t>()};
+          CountOf(json.at("wrong_ids"), "wrong_ids")};
 }
 
 // `version` is the schema's.
@@ -55,18 +80,23 @@ SequenceRecord FromJson(const Json& json, int version) {
   SequenceInfo& info = record.info;
   info.name = json.at("scene").get<std::string>();
   const Json& camera = json.at("intrinsics");
-  info.intrinsics = {camera.at("width").get<int>(), camera.at("height").get<int>(),
-                     camera.at("fx").get<double>(), camera.at("fy").get<double>(),
-                     camera.at("cx").get<double>(), camera.at("cy").get<double>()};
+  const std::int64_t most_side = CurrentLimits().image_side;
+  info.intrinsics = {WholeOf<int>(camera.at("width"), "width", kLeastSide_px, most_side),
+                     WholeOf<int>(camera.at("height"), "height", kLeastSide_px, most_side),
+                     camera.at("fx").get<double>(),
+                     camera.at("fy").get<double>(),
+                     camera.at("cx").get<double>(),
+                     camera.at("cy").get<double>()};
   info.rate_hz = json.at("rate_hz").get<double>();
-  info.first_index = json.at("first_index").get<int>();
-  info.frame_count = json.at("frame_count").get<int>();
+  info.first_index = WholeOf<int>(json.at("first_index"), "first_index", -1, kGreatestFrame);
+  info.frame_count = WholeOf<int>(json.at("frame_count"), "frame_count", 0, CurrentLimits().frames);
   for (const Json& object : json.at("objects")) {
     info.objects.push_back({IdOf(object.at("id")), object.at("name").get<std::string>(),
                             object.at("class").get<std::string>()});
   }
   if (const Json& reveal = json.at("reveal"); !reveal.is_null()) {
-    info.reveal = RevealPlan{reveal.at("frame").get<int>(), {}};
+    info.reveal =
+        RevealPlan{WholeOf<int>(reveal.at("frame"), "the reveal's frame", 0, kGreatestFrame), {}};
     for (const Json& id : reveal.at("removed")) info.reveal->removed.push_back(IdOf(id));
   }
   GeneratorInfo& generator = record.generator;
@@ -109,7 +139,7 @@ std::string SequenceToJson(const SequenceRecord& record) {
   json["schema_version"] = kSchemaVersion;
   json["generator"] = kGenerator;
   json["version"] = generator.version;
-  json["scene"] = info.name;
+  json["scene"] = OneLine(info.name, kMostNameBytes);  // which the reader takes
   json["seed"] = generator.seed ? Json(*generator.seed) : Json(nullptr);
   json["intrinsics"] = {{"width", info.intrinsics.width}, {"height", info.intrinsics.height},
                         {"fx", info.intrinsics.fx},       {"fy", info.intrinsics.fy},
@@ -134,21 +164,20 @@ std::string SequenceToJson(const SequenceRecord& record) {
   for (const auto& [file, hash] : record.hashes) hashes[file] = hash;
   json["files"]["fnv1a64"] = std::move(hashes);
   // Names may come from anywhere: bytes that are not UTF-8 are replaced rather than thrown at us.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return JsonText(json, 2) + "\n";
 }
 
 Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::json_bytes));
   const std::string file = path.string();
-  const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) return DataError("{}: not a JSON object", file);
+  TSDFPP_ASSIGN(const Json json, ParseOrderedJsonObject(text, file));
   if (!json.contains("generator") || json["generator"] != kGenerator) {
     return DataError("{}: 'generator' is not \"{}\"", file, kGenerator);
   }
   const Json version = json.value("schema_version", Json(nullptr));
   if (!version.is_number_integer() || version < kOldestSchemaVersion || version > kSchemaVersion) {
     return DataError("{}: 'schema_version' is {}, this program reads {} to {}", file,
-                     version.is_null() ? "missing" : version.dump(), kOldestSchemaVersion,
+                     version.is_null() ? "missing" : JsonShown(version), kOldestSchemaVersion,
                      kSchemaVersion);
   }
   try {
@@ -156,6 +185,18 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
     if (!(record.info.rate_hz > 0) || record.info.frame_count < 1 || record.info.first_index < 0) {
       return DataError("{}: expected rate_hz and frame_count over 0 and first_index 0 or more",
                        file);
+    }
+    const Intrinsics& camera = record.info.intrinsics;
+    if (!(camera.fx > 0) || !(camera.fy > 0) || !std::isfinite(camera.fx) ||
+        !std::isfinite(camera.fy) || !std::isfinite(camera.cx) || !std::isfinite(camera.cy) ||
+        !std::isfinite(record.info.rate_hz)) {
+      return DataError("{}: expected finite intrinsics with fx and fy over 0, and a finite rate",
+                       file);
+    }
+    TSDFPP_RETURN_IF_ERROR(CheckLabel(record.info.name, file + ": 'scene'"));
+    TSDFPP_RETURN_IF_ERROR(CheckObjects(record.info.objects, file));
+    for (const auto& [listed, hash] : record.hashes) {
+      TSDFPP_RETURN_IF_ERROR(CheckRelativePath(listed, file + ": 'fnv1a64'"));
     }
     return record;
   } catch (const std::exception& exception) {

@@ -64,7 +64,8 @@ bool IsOurSequence(const std::filesystem::path& folder);
 std::string SequenceToJson(const SequenceRecord& record);
 
 // Errors: kData, naming file and field: not JSON, another generator or schema version, a field that
-// is missing or of another type.
+// is missing or of another type, an object whose name cannot be a file's, a name or id there twice
+// (core/plain_name.h), a listed file outside of the sequence.
 Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path);
 
 }  // namespace tsdfpp

@@ -7,11 +7,13 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <vector>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/sequence_json.h"
 
@@ -20,11 +22,12 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kNotes = "notes";
+constexpr const char* kNotesAside = "notes-aside";
 constexpr const char* kSet = "set";
 
 // An absolute path without a trailing slash has a file name and a folder it stands in.
 fs::path Normal(const fs::path& out) {
-  const fs::path folder = fs::absolute(out).lexically_normal();
+  const fs::path folder = AbsolutePath(out).lexically_normal();
   return folder.has_filename() ? folder : folder.parent_path();
 }
 
@@ -114,11 +117,10 @@ Expected<void> StagingFolder::Make() {
   mine_ = true;
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(path_));
   // What a killed process was just writing (core/files.h).
-  std::vector<fs::path> halves;
-  for (const auto& entry : fs::recursive_directory_iterator(root_, code)) {
-    if (entry.path().extension() == ".part") halves.push_back(entry.path());
+  TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFilesBelow(root_));
+  for (const fs::path& file : files) {
+    if (file.extension() == ".part") fs::remove(file, code);
   }
-  for (const fs::path& half : halves) fs::remove(half, code);
   return {};
 }
 
@@ -126,13 +128,13 @@ void StagingFolder::RemoveAbandoned() {
   const std::string prefix = Sibling("").filename().string();
   std::error_code code;
   std::vector<fs::path> abandoned;
-  for (const auto& entry : fs::directory_iterator(out_.parent_path(), code)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::path& entry : EntriesOf(out_.parent_path())) {
+    const std::string name = entry.filename().string();
     const auto making = ProcessOf(name, prefix, ".part");
     // An earlier sequence that was moved aside goes only where another is in its place.
     const auto replacing = fs::exists(out_, code) ? ProcessOf(name, prefix, ".old") : std::nullopt;
     const auto process = making ? making : replacing;
-    if (process && IsAbandoned(entry.path(), *process)) abandoned.push_back(entry.path());
+    if (process && IsAbandoned(entry, *process)) abandoned.push_back(entry);
   }
   for (const fs::path& folder : abandoned) fs::remove_all(folder, code);
 }
@@ -172,10 +174,30 @@ Expected<void> StagingFolder::Clear() {
   return MakeWritableFolder(path_);
 }
 
+bool StagingFolder::Exchange() {
+  // Were this process killed in between, its notes would say of the earlier set, which stands in
+  // path_ then, what is true of the new one.
+  const fs::path aside = root_ / kNotesAside;
+  std::error_code ignored;
+  if (kind_ == Kind::kShared) fs::rename(notes(), aside, ignored);
+  if (renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, out_.c_str(), RENAME_EXCHANGE) == 0) {
+    fs::remove_all(root_, ignored);
+    return true;
+  }
+  if (kind_ == Kind::kShared) fs::rename(aside, notes(), ignored);
+  return false;
+}
+
 Expected<void> StagingFolder::TakeThePlace() {
-  const fs::path old = Sibling(fmt::format("{}.old", getpid()));
   std::error_code code;
   const bool replaces = fs::exists(out_, code);
+  // In one stroke, so that there is a sequence at every moment.
+  if (replaces && Exchange()) {
+    mine_ = false;
+    return {};
+  }
+  // Where the file system cannot, the earlier one stands aside for a moment.
+  const fs::path old = Sibling(fmt::format("{}.old", getpid()));
   if (replaces) fs::rename(out_, old, code);
   if (!code) {
     fs::rename(path_, out_, code);

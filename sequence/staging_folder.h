@@ -39,8 +39,9 @@ class StagingFolder {
   // Leaves it for a later process, whatever happens.
   void Keep() { keep_ = true; }
 
-  // Puts it in out's place. An earlier folder is moved aside first, so that a failure leaves it as
-  // it was. Errors: kEnvironment.
+  // Puts it in out's place, and removes the earlier folder. Both change places in one stroke where
+  // the file system can do that; else the earlier one is moved aside first, so that a failure
+  // leaves it as it was. Errors: kEnvironment.
   Expected<void> TakeThePlace();
 
  private:
@@ -48,6 +49,8 @@ class StagingFolder {
   // The folders of this name that processes left which were killed.
   void RemoveAbandoned();
   Expected<void> Lock();
+  // False where the file system cannot exchange two folders: then all is as before.
+  bool Exchange();
 
   std::filesystem::path out_;
   Kind kind_;

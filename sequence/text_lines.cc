@@ -4,12 +4,15 @@
 #include <charconv>
 
 #include "core/files.h"
+#include "core/folders.h"
+#include "core/one_line.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
 
 Expected<std::vector<TextLine>> ReadTextLines(const fs::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::text_bytes));
   constexpr std::string_view kBlanks = " \t\r,";
   std::vector<TextLine> lines;
   std::string_view rest = text;
@@ -64,16 +67,12 @@ Expected<std::vector<double>> ReadNumbers(const fs::path& path) {
 
 std::vector<std::string> NamesIn(const fs::path& folder) {
   std::vector<std::string> names;
-  std::error_code code;
-  for (fs::directory_iterator at(folder, code), end; !code && at != end; at.increment(code)) {
-    names.push_back(at->path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
+  for (const fs::path& entry : EntriesOf(folder)) names.push_back(entry.filename().string());
   return names;
 }
 
 std::string NameOfFolder(const fs::path& folder) {
-  return fs::absolute(folder / "").lexically_normal().parent_path().filename().string();
+  return OneLine(OwnName(folder), kMostNameBytes);
 }
 
 }  // namespace tsdfpp

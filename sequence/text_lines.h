@@ -31,7 +31,7 @@ Expected<std::vector<double>> ReadNumbers(const std::filesystem::path& path);
 // The sorted names of what lies in a folder; none where it is not one.
 std::vector<std::string> NamesIn(const std::filesystem::path& folder);
 
-// The folder's own name, also where the path ends with a slash or is ".".
+// The folder's own name, also where the path ends with a slash or is ".", as text of one line.
 std::string NameOfFolder(const std::filesystem::path& folder);
 
 }  // namespace tsdfpp

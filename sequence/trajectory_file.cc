@@ -22,7 +22,7 @@ std::string TrajectoryToText(const Trajectory& trajectory, const std::string& wh
 }
 
 Expected<Trajectory> ReadTrajectory(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::text_bytes));
   Trajectory trajectory;
   std::string_view rest = text;
   for (int number = 1; !rest.empty(); ++number) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/data_folder.h"
 #include "sequence/calibration.h"
 #include "sequence/dataset_readers.h"
 #include "sequence/image_files.h"
@@ -34,6 +35,10 @@ Expected<double> TimeOf(const fs::path& path, const TextLine& line, std::size_t 
   return *time_s;
 }
 
+std::string WhereOf(const fs::path& path, const TextLine& line) {
+  return fmt::format("{}:{}", path.string(), line.number);
+}
+
 Expected<std::vector<TimedFile>> ReadList(const fs::path& path) {
   TSDFPP_ASSIGN(const std::vector<TextLine> lines, ReadTextLines(path));
   std::vector<TimedFile> files;
@@ -43,6 +48,7 @@ Expected<std::vector<TimedFile>> ReadList(const fs::path& path) {
                        line.words.size());
     }
     TSDFPP_ASSIGN(const double time_s, TimeOf(path, line, 0));
+    TSDFPP_RETURN_IF_ERROR(CheckRelativePath(line.words[1], WhereOf(path, line)));
     files.push_back({time_s, line.words[1]});
   }
   if (files.empty()) return DataError("{}: holds no images", path.string());
@@ -76,6 +82,9 @@ Expected<std::vector<Association>> ReadAssociations(const fs::path& folder, cons
       return DataError("{}:{}: {} words, expected a time and a file twice", path.string(),
                        line.number, line.words.size());
     }
+    for (const std::size_t word : {1U, 3U}) {
+      TSDFPP_RETURN_IF_ERROR(CheckRelativePath(line.words[word], WhereOf(path, line)));
+    }
     if (pairs.empty()) {
       TSDFPP_ASSIGN(depth_first, DepthIsFirst(folder, path, line.words[1], line.words[3]));
     }
@@ -90,8 +99,13 @@ Expected<std::vector<Association>> ReadAssociations(const fs::path& folder, cons
 }
 
 // As TUM's associate.py: of all pairs within the limit the nearest in time first, each image once.
-std::vector<Association> Associate(const std::vector<TimedFile>& colour,
-                                   const std::vector<TimedFile>& depth) {
+// Errors: kData where there are so many pairs that the times cannot be right.
+Expected<std::vector<Association>> Associate(const std::vector<TimedFile>& colour,
+                                             const std::vector<TimedFile>& depth,
+                                             const fs::path& folder) {
+  // At the limit a camera takes some 40 pictures in twice the time.
+  constexpr std::size_t kMostPairsAnImage = 100;
+  const std::size_t most_pairs = kMostPairsAnImage * (colour.size() + depth.size());
   struct Candidate {
     double apart_s;
     std::size_t c;
@@ -106,6 +120,10 @@ std::vector<Association> Associate(const std::vector<TimedFile>& colour,
     for (std::size_t d = begin;
          d < depth.size() && depth[d].time_s <= colour[c].time_s + kAssociationLimit_s; ++d) {
       candidates.push_back({std::abs(depth[d].time_s - colour[c].time_s), c, d});
+      if (candidates.size() > most_pairs) {
+        return DataError("{}: over {} images an image within {} s, expected times of a recording",
+                         folder.string(), kMostPairsAnImage, kAssociationLimit_s);
+      }
     }
   }
   std::stable_sort(candidates.begin(), candidates.end(),
@@ -131,7 +149,7 @@ Expected<std::vector<Association>> Pairs(const fs::path& folder, SequenceNotes& 
   }
   TSDFPP_ASSIGN(const std::vector<TimedFile> colour, ReadList(folder / "rgb.txt"));
   TSDFPP_ASSIGN(const std::vector<TimedFile> depth, ReadList(folder / "depth.txt"));
-  std::vector<Association> pairs = Associate(colour, depth);
+  TSDFPP_ASSIGN(std::vector<Association> pairs, Associate(colour, depth, folder));
   if (pairs.empty()) {
     return DataError(
         "{}: no colour image is within {} s of a depth image; colour is from {:.3f} to {:.3f} s, "

@@ -34,6 +34,9 @@ struct RawMaterial {
 struct Companion {
   std::string name;            // as it stands in the file that names it
   std::filesystem::path path;  // where that is
+  // Relative, and inside the folder above the mesh's own (so that "../textures" is found), links
+  // included. Others are not opened.
+  bool inside = true;
 };
 
 struct RawMesh {
@@ -49,9 +52,13 @@ struct RawMesh {
 // A file of more triangles is refused while it is read.
 inline constexpr std::size_t kMaxImportedTriangles = 1000000;
 
+// Whether an OBJ's material libraries are read.
+enum class Materials { kRead, kSkip };
+
 // `file` is the name for messages (of an OBJ, its folder is where material libraries are looked
 // for). Errors: kData, naming file and line: see ImportMesh.
-Expected<RawMesh> ReadObj(const std::filesystem::path& file, std::string_view bytes);
+Expected<RawMesh> ReadObj(const std::filesystem::path& file, std::string_view bytes,
+                          Materials materials = Materials::kRead);
 Expected<RawMesh> ReadStl(const std::filesystem::path& file, std::string_view bytes);
 
 }  // namespace tsdfpp

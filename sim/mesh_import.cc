@@ -5,10 +5,10 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "core/decode_image.h"
 #include "core/files.h"
 #include "core/ply.h"
 #include "sim/mesh_repair.h"
@@ -69,17 +69,12 @@ Expected<void> CheckSize(const std::string& file, const RawMesh& mesh, double sc
 }
 
 Expected<std::shared_ptr<const TextureImage>> LoadPicture(const std::filesystem::path& path) {
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-  cv::Mat image;
-  try {
-    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1,
-                          const_cast<char*>(bytes.data()));
-    if (!bytes.empty()) image = cv::imdecode(encoded, cv::IMREAD_COLOR);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) return DataError("{}: is no picture that can be read", path.string());
+  TSDFPP_ASSIGN(cv::Mat image, ReadImageFile(path, DecodeAs::kColour));
   const double shrink = static_cast<double>(kMostPictureSide_px) / std::max(image.rows, image.cols);
+  if (std::min(image.rows, image.cols) * shrink < 1) {
+    return DataError("{}: the picture is {}x{}, too long for its width", path.string(), image.cols,
+                     image.rows);
+  }
   if (shrink < 1) cv::resize(image, image, {}, shrink, shrink, cv::INTER_AREA);
   cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
   auto picture = std::make_shared<TextureImage>();

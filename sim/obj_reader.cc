@@ -4,7 +4,9 @@
 #include <set>
 #include <string>
 
+#include "core/data_folder.h"
 #include "core/files.h"
+#include "core/one_line.h"
 #include "sim/mesh_files.h"
 #include "sim/profile_shapes.h"
 #include "sim/text_scanner.h"
@@ -38,7 +40,8 @@ std::string RestOf(std::string_view line, std::string_view first_word) {
 
 class ObjReader {
  public:
-  explicit ObjReader(const std::filesystem::path& path) : path_(path), file_(path.string()) {}
+  ObjReader(const std::filesystem::path& path, Materials materials)
+      : path_(path), file_(path.string()), wanted_(materials), above_(path.parent_path() / "..") {}
 
   Expected<RawMesh> Read(std::string_view text);
 
@@ -57,12 +60,16 @@ class ObjReader {
   Expected<double> ReadNumber(std::string_view word);
   Expected<void> CutFace(const std::vector<Corner>& corners);
   Expected<void> AddTriangle(const Corner& a, const Corner& b, const Corner& c);
+  Companion Find(const std::filesystem::path& from, const std::string& name) const;
   void ReadLibrary(const std::string& name);
   void AddRemarks();
   int MaterialNamed(const std::string& name);
 
   std::filesystem::path path_;
   std::string file_;
+  Materials wanted_;
+  DataFolder above_;                 // of the mesh's folder
+  std::set<std::string> libraries_;  // read
   int line_ = 0;
   RawMesh mesh_;
   std::vector<std::optional<Eigen::Vector3d>> colours_;  // as written, per vertex
@@ -213,12 +220,35 @@ int ObjReader::MaterialNamed(const std::string& name) {
   return entry->second;
 }
 
+// Stands for the name of the mesh's folder in a path from the folder above it.
+constexpr const char* kMeshFolder = "\x01";
+
+// Where a path is that a file in the folder `from` (as seen from the folder above the mesh's) says.
+Companion ObjReader::Find(const std::filesystem::path& from, const std::string& name) const {
+  const std::filesystem::path seen = (from / name).lexically_normal();
+  const std::filesystem::path folder = path_.parent_path();
+  if (seen.is_absolute() || seen.begin() == seen.end() || *seen.begin() == "..") {
+    return {name, folder / name, false};
+  }
+  const bool beside = *seen.begin() == kMeshFolder;
+  const std::filesystem::path path =
+      beside ? folder / seen.lexically_relative(kMeshFolder) : folder / ".." / seen;
+  return {name, path, above_.CheckLinks(path).has_value()};
+}
+
 void ObjReader::ReadLibrary(const std::string& name) {
+  if (wanted_ == Materials::kSkip || !libraries_.insert(name).second) return;
   std::string plain = name;
   std::replace(plain.begin(), plain.end(), '\\', '/');
-  const std::filesystem::path path = path_.parent_path() / plain;
-  mesh_.companions.push_back({plain, path});
-  const auto bytes = ReadFile(path);
+  const Companion library = Find(kMeshFolder, plain);
+  const std::filesystem::path path = library.path;
+  const std::filesystem::path from =
+      (std::filesystem::path(kMeshFolder) / plain).lexically_normal().parent_path();
+  mesh_.companions.push_back(library);
+  const auto bytes =
+      library.inside
+          ? ReadFile(path, &Limits::text_bytes)
+          : DataError("{}: expected a relative path inside the folder above the mesh's", plain);
   if (!bytes) {
     mesh_.remarks.push_back(
         fmt::format("{}: its material library cannot be read ({}), so its "
@@ -254,8 +284,16 @@ void ObjReader::ReadLibrary(const std::string& name) {
       std::string picture =
           words[1].starts_with('-') ? std::string(words.back()) : RestOf(line, words[0]);
       std::replace(picture.begin(), picture.end(), '\\', '/');
-      material->picture = path.parent_path() / picture;
-      mesh_.companions.push_back({picture, material->picture});
+      const Companion found = Find(from, picture);
+      mesh_.companions.push_back(found);
+      if (found.inside) {
+        material->picture = found.path;
+      } else {
+        mesh_.remarks.push_back(
+            fmt::format("{}: the picture {} of material {} is not looked at, expected a relative "
+                        "path inside the folder above the mesh's",
+                        path.string(), Quoted(picture), Quoted(material->name)));
+      }
     }
   }
 }
@@ -325,8 +363,9 @@ Expected<RawMesh> ObjReader::Read(std::string_view text) {
 
 }  // namespace
 
-Expected<RawMesh> ReadObj(const std::filesystem::path& path, std::string_view bytes) {
-  return ObjReader(path).Read(bytes);
+Expected<RawMesh> ReadObj(const std::filesystem::path& path, std::string_view bytes,
+                          Materials materials) {
+  return ObjReader(path, materials).Read(bytes);
 }
 
 }  // namespace tsdfpp

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/folders.h"
 #include "core/toml_reader.h"
 #include "sim/random_scene.h"
 #include "sim/scene_object_config.h"
@@ -163,7 +164,7 @@ Expected<SceneConfig> LoadSceneConfig(const std::filesystem::path& path,
     TSDFPP_ASSIGN(const RandomSceneConfig random, ReadRandomScene(root, path.string()));
     return DrawRandomScene(random, seed.value_or(random.seed));
   }
-  return ReadScene(root, path.string(), std::filesystem::absolute(path).parent_path(), seed);
+  return ReadScene(root, path.string(), AbsolutePath(path).parent_path(), seed);
 }
 
 Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/toml_reader.h"
 #include "sim/mesh_files.h"
 
@@ -29,10 +30,10 @@ Expected<std::vector<fs::path>> Companions(const fs::path& mesh) {
   for (const Companion& companion : raw.companions) {
     std::error_code code;
     if (!fs::is_regular_file(companion.path, code)) continue;
-    if (fs::path(companion.name).is_absolute() || !IsText(companion.name)) {
+    if (!companion.inside || !IsText(companion.name)) {
       spdlog::warn(
-          "{}: refers to '{}', which a sequence cannot take along: rendered again elsewhere, the "
-          "mesh will lack it; expected a relative path in UTF-8",
+          "{}: refers to '{}', which a sequence cannot take along: the mesh lacks it; expected a "
+          "relative path in UTF-8 inside the folder above the mesh's",
           mesh.string(), companion.name);
       continue;
     }
@@ -74,7 +75,7 @@ class Collector {
  private:
   // Where the file will be.
   Expected<std::string> Take(const fs::path& named) {
-    const fs::path file = fs::absolute(named).lexically_normal();
+    const fs::path file = AbsolutePath(named).lexically_normal();
     if (const auto taken = taken_.find(file); taken != taken_.end()) return taken->second;
     std::vector<fs::path> group{file};
     TSDFPP_ASSIGN(const std::vector<fs::path> companions, Companions(file));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <system_error>
 
+#include "core/folders.h"
 #include "core/toml_reader.h"
 #include "sim/random_scene.h"
 #include "sim/scene_config.h"
@@ -25,18 +26,16 @@ SceneFile Describe(const std::filesystem::path& path, const Config& config, bool
 }  // namespace
 
 Expected<std::vector<SceneFile>> SceneFiles(const std::filesystem::path& folder) {
-  std::error_code status;
   std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, status)) {
-    if (entry.path().extension() == ".toml") paths.push_back(entry.path());
+  for (const std::filesystem::path& entry : EntriesOf(folder)) {
+    if (entry.extension() == ".toml") paths.push_back(entry);
   }
-  if (status || paths.empty()) {
+  if (paths.empty()) {
     return UsageError("{}: {}, expected a folder with scenes", folder.string(),
-                      !std::filesystem::exists(folder, status)         ? "no such folder"
-                      : !std::filesystem::is_directory(folder, status) ? "is a file"
-                                                                       : "holds no .toml file");
+                      !IsThere(folder)    ? "no such folder"
+                      : !IsFolder(folder) ? "is a file"
+                                          : "holds no .toml file");
   }
-  std::sort(paths.begin(), paths.end());
   std::vector<SceneFile> files;
   for (const std::filesystem::path& path : paths) {
     TSDFPP_ASSIGN(const toml::table root, ParseTomlFile(path));

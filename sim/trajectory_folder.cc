@@ -29,7 +29,7 @@ std::string Lines(const std::vector<Pose>& poses) {
 // `take` says is wrong is reported with the line.
 Expected<void> ForEachPose(const std::filesystem::path& path,
                            const std::function<std::string(std::string_view, const Pose&)>& take) {
-  TSDFPP_ASSIGN(const std::string text, ReadFile(path));
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::text_bytes));
   std::string_view rest(text);
   for (int line = 1; !rest.empty(); ++line) {
     const std::size_t end = rest.find('\n');

@@ -10,6 +10,8 @@
 #include <string>
 
 #include "core/files.h"
+#include "core/guard.h"
+#include "core/json_text.h"
 #include "core/ply.h"
 #include "eval/adapters/open3d_peer.h"
 #include "eval/adapters/voxel_block_grid.h"
@@ -80,18 +82,20 @@ Expected<void> Map(const Arguments& arguments) {
         WritePly(arguments.out / "meshes" / fmt::format("{:06d}", index) / "scene.ply",
                  scalable ? scalable->Triangles() : grid->Triangles()));
   }
-  return WriteFile(arguments.out / "timing.json", timing.dump() + "\n");
+  return WriteFile(arguments.out / "timing.json", JsonText(timing) + "\n");
 }
 
 int Run(int argc, char** argv) {
   const auto arguments = Parse(argc, argv);
   const Expected<void> done = arguments ? Map(*arguments) : tl::unexpected(arguments.error());
   if (done) return 0;
-  std::fprintf(stderr, "tsdfpp_open3d: %s\n", done.error().message.c_str());
+  PrintError("tsdfpp_open3d", done.error().message);
   return static_cast<int>(done.error().kind);
 }
 
 }  // namespace
 }  // namespace tsdfpp
 
-int main(int argc, char** argv) { return tsdfpp::Run(argc, argv); }
+int main(int argc, char** argv) {
+  return tsdfpp::GuardedMain("tsdfpp_open3d", [&] { return tsdfpp::Run(argc, argv); });
+}

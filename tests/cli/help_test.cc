@@ -51,12 +51,13 @@ TEST(CommandDoctor, SaysWhatRenders) {
   const std::string renderer = parsed.at("gl").at("renderer");
   EXPECT_FALSE(renderer.empty());
   EXPECT_GE(parsed.at("cores").get<int>(), 1);
-  for (const char* name : {"mujoco", "opencv", "pcl", "open3d", "eigen", "tsdfpp"}) {
+  for (const char* name : {"mujoco", "opencv", "pcl", "open3d", "eigen", "tsdfpp", "children"}) {
     EXPECT_FALSE(parsed.at(name).get<std::string>().empty()) << name;
   }
   const CommandOutput text = RunTsdfpp({"doctor"}, folder.path());
   EXPECT_EQ(text.exit_code, 0);
   EXPECT_NE(text.out.find(renderer), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("adapters ended by a watching process"), std::string::npos) << text.out;
 
   const CommandOutput osmesa = RunTsdfpp({"doctor"}, folder.path(), {{"MUJOCO_GL", "osmesa"}});
   EXPECT_EQ(osmesa.exit_code, 0) << osmesa.err;
@@ -101,11 +102,12 @@ TEST(CommandJson, IsAllThatStdoutHolds) {
   EXPECT_FALSE(std::filesystem::exists((folder / "map") / "mesh" / "house-2.ply"));
 }
 
-// Every file of a folder but stats.json, whose times differ.
+// Every file of a folder but stats.json, whose times differ, and run.json, whose run does.
 std::map<std::string, std::string> FilesOf(const std::filesystem::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file() || entry.path().filename() == "stats.json") continue;
+    const std::string name = entry.path().filename();
+    if (!entry.is_regular_file() || name == "stats.json" || name == "run.json") continue;
     files[std::filesystem::relative(entry.path(), folder)] = ReadFile(entry.path()).value();
   }
   return files;

@@ -133,23 +133,24 @@ class MalformedCorpus : public testing::Test {
 fs::path MalformedCorpus::original_;
 
 void MalformedCorpus::Toml() {
-  RefuseScenes("TOML", "", "scene.toml",
-               {{"", "'name' is missing", kUsage},
-                {std::string("\0\1\2\xff", 4), "not valid TOML", kUsage},
-                {"\xff\xfe n", "not valid TOML", kUsage},
-                {std::string(kScene).substr(0, 100), "not valid TOML", kUsage},
-                {std::string(kScene) + "[[object\n", "not valid TOML", kUsage},
-                {std::string(20000, '['), "not valid TOML", kUsage},
-                {std::string(kScene) + "name = \"again\"\n", "not valid TOML", kUsage},
-                {With("frames = 3", "frames = 3e300"), "'frames'", kUsage},
-                {With("frames = 3", "frames = 9223372036854775807"), "'frames'", kUsage},
-                {With("rate_hz = 10", "rate_hz = nan"), "'rate_hz'", kUsage},
-                {With("width = 64", "width = -64"), "'camera.width'", kUsage},
-                {With("f = 50.0", "f = inf"), "'camera.f'", kUsage},
-                {With("target = [0.0, 0.0, 0.74]", "target = [0.0]"), "'camera.target'", kUsage},
-                {With("id = 1", "id = 1e9"), "'object[0].id'", kUsage},
-                {With("model = \"mug\"", "model = [\"mug\"]"), "'object[0].model'", kUsage},
-                {With("name = \"thing\"", "name = \"../thing\""), "'object[0].name'", kUsage}});
+  RefuseScenes(
+      "TOML", "", "scene.toml",
+      {{"", "'name' is missing", kUsage},
+       {std::string("\0\1\2\xff", 4), "not valid TOML", kUsage},
+       {"\xff\xfe n", "not valid TOML", kUsage},
+       {std::string(kScene).substr(0, 100), "not valid TOML", kUsage},
+       {std::string(kScene) + "[[object\n", "not valid TOML", kUsage},
+       {std::string(20000, '['), "tables and lists within one another, over the limit", kUsage},
+       {std::string(kScene) + "name = \"again\"\n", "not valid TOML", kUsage},
+       {With("frames = 3", "frames = 3e300"), "'frames'", kUsage},
+       {With("frames = 3", "frames = 9223372036854775807"), "'frames'", kUsage},
+       {With("rate_hz = 10", "rate_hz = nan"), "'rate_hz'", kUsage},
+       {With("width = 64", "width = -64"), "'camera.width'", kUsage},
+       {With("f = 50.0", "f = inf"), "'camera.f'", kUsage},
+       {With("target = [0.0, 0.0, 0.74]", "target = [0.0]"), "'camera.target'", kUsage},
+       {With("id = 1", "id = 1e9"), "'object[0].id'", kUsage},
+       {With("model = \"mug\"", "model = [\"mug\"]"), "'object[0].model'", kUsage},
+       {With("name = \"thing\"", "name = \"../thing\""), "'object[0].name'", kUsage}});
 }
 
 // There is no reader for MJCF: a scene is composed by the program itself.

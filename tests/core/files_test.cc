@@ -1,6 +1,7 @@
 #include "core/files.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 
@@ -59,6 +60,64 @@ TEST(Files, MissingFileAndFolderAreNamed) {
   const auto is_folder = ReadFile(folder.path());
   ASSERT_FALSE(is_folder.has_value());
   EXPECT_EQ(is_folder.error().message, folder.path().string() + ": is a folder, not a file");
+}
+
+TEST(Files, OnlyRegularFilesAreRead) {
+  const TempFolder folder;
+  // Opened, it would wait for somebody to write.
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  const auto pipe = ReadFile(folder / "pipe");
+  ASSERT_FALSE(pipe.has_value());
+  EXPECT_EQ(pipe.error().kind, ErrorKind::kData);
+  EXPECT_EQ(pipe.error().message,
+            (folder / "pipe").string() + ": is a pipe, expected a regular file");
+  const auto zero = ReadFile("/dev/zero");
+  ASSERT_FALSE(zero.has_value());
+  EXPECT_EQ(zero.error().message, "/dev/zero: is a device, expected a regular file");
+  EXPECT_FALSE(CheckRegularFile("/dev/null").has_value());
+  EXPECT_FALSE(CheckRegularFile(folder.path()).has_value());
+  // A file that says it is empty and is not.
+  EXPECT_FALSE(ReadFile("/proc/self/status").value().empty());
+}
+
+TEST(Files, TheLimitIsLookedAtBeforeTheBytes) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "x", "12345").has_value());
+  Limits limits;
+  limits.json_bytes = 4;
+  SetLimits(limits);
+  EXPECT_TRUE(ReadFile(folder / "x").has_value());
+  const auto large = ReadFile(folder / "x", &Limits::json_bytes);
+  limits.json_bytes = 5;
+  SetLimits(limits);
+  EXPECT_TRUE(ReadFile(folder / "x", &Limits::json_bytes).has_value());
+  SetLimits({});
+  ASSERT_FALSE(large.has_value());
+  EXPECT_EQ(large.error().message,
+            (folder / "x").string() +
+                ": 5 bytes, over the limit of 4 (TSDFPP_LIMITS=json_bytes=... raises it)");
+  // A terabyte that is not on the disk.
+  std::filesystem::resize_file(folder / "x", std::uintmax_t{1} << 40U);
+  EXPECT_FALSE(ReadFile(folder / "x").has_value());
+}
+
+TEST(Files, NamesUpToTheSystemsLengthAndInAnyBytes) {
+  const TempFolder folder;
+  for (const std::string& name :
+       {std::string(255, 'n'), std::string("\xff\xfe\n"), std::string(201, '\xe9')}) {
+    ASSERT_TRUE(WriteFile(folder / name, "bytes").has_value());
+    EXPECT_EQ(ReadFile(folder / name).value(), "bytes");
+  }
+  EXPECT_EQ(folder.Entries(), 3);
+  const std::string longer(256, 'n');
+  const auto read = ReadFile(folder / longer);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().message,
+            (folder / longer).string() + ": cannot be read (File name too long)");
+  const auto write = WriteFile(folder / longer, "bytes");
+  ASSERT_FALSE(write.has_value());
+  EXPECT_EQ(write.error().kind, ErrorKind::kEnvironment);
+  EXPECT_EQ(folder.Entries(), 3);
 }
 
 TEST(Files, UnwritablePlaceIsTheEnvironmentsFault) {

@@ -316,7 +316,7 @@ TEST(Gltf, MalformedFilesAreNamed) {
   EXPECT_EQ(ReadBytes(folder, "solid x").error().message,
             (folder / "f.glb").string() + ": not a .glb file: it does not begin with 'glTF'");
   EXPECT_EQ(ReadBytes(folder, Glb(json::array(), "")).error().message,
-            (folder / "f.glb").string() + ": its first chunk is not a JSON object");
+            (folder / "f.glb").string() + ": its first chunk: not a JSON object");
   EXPECT_EQ(ReadGlb(folder / "absent.glb").error().kind, ErrorKind::kData);
 }
 

@@ -155,6 +155,11 @@ TEST(Ply, MalformedFilesAreNamed) {
        "PLY property line 'property half w' cannot be read"},
       {vertices + "property list half int w\nend_header\n",
        "PLY property line 'property list half int w' cannot be read"},
+      // Elements that take no bytes would be counted for ever.
+      {"ply\nformat ascii 1.0\nelement junk 20\nend_header\n",
+       "20 elements 'junk' have no property, expected one at least"},
+      {"ply\nformat ascii 1.0\ncomment region 0 a\x1b[31m\nend_header\n",
+       "region 0 'a\\x1b[31m' holds a control character"},
       {vertices + "end_header\n0 0 0\n1 0 0\n", short_file},
       {vertices + "end_header\n0 0 0\n1 zero 0\n0 1 0\n", short_file},
       {vertices + "end_header\n0 0 0\n1 0 nan\n0 1 0\n", "a vertex has no finite x, y, z"},

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
@@ -13,9 +14,10 @@ class TempFolder {
  public:
   TempFolder() {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::path(testing::TempDir()) /
-            ("tsdfpp-" + std::string(info->test_suite_name()) + "-" + info->name() + "-" +
-             std::to_string(getpid()));
+    std::string name = "tsdfpp-" + std::string(info->test_suite_name()) + "-" + info->name() + "-" +
+                       std::to_string(getpid());
+    std::replace(name.begin(), name.end(), '/', '-');  // of a test with a parameter
+    path_ = std::filesystem::path(testing::TempDir()) / name;
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -152,5 +152,40 @@ TEST(TomlReader, FilesThatAreNotTomlAreNamedWithTheirPlace) {
       << bad.error().message;
 }
 
+// toml++ destroys tables within tables with a place on the stack for each.
+TEST(TomlDepth, IsLimitedBeforeAnythingIsMade) {
+  const auto dotted = [](int depth) {
+    std::string key = "a";
+    for (int i = 1; i < depth; ++i) key += ".a";
+    return key;
+  };
+  const auto said = [](const std::string& text) {
+    const auto table = ParseToml(text, "x.toml");
+    if (table) return std::string();
+    EXPECT_EQ(table.error().kind, ErrorKind::kUsage);
+    return table.error().message;
+  };
+  constexpr int kMany = 200'000;
+  std::string within;
+  for (int i = 0; i < 200; ++i) within += "{" + dotted(60) + " = ";
+  for (const std::string& text :
+       {"[" + dotted(kMany) + "]\n", dotted(kMany) + " = 1\n", "[[" + dotted(kMany) + "]]\n",
+        "x = {" + dotted(kMany) + " = 1}\n", "x = " + std::string(kMany, '['), "x = " + within,
+        "s = '''\n[\n'''\n[" + dotted(kMany) + "]\n"}) {
+    EXPECT_NE(said(text).find("tables and lists within one another, over the limit of 64"),
+              std::string::npos)
+        << said(text);
+  }
+  EXPECT_EQ(said("[" + dotted(60) + "]\n" + dotted(60) + " = [[1.5, 2.5], [3.5]]\n"), "");
+  // Dots and brackets in strings and comments are text.
+  const std::string dots(1000, '.');
+  const std::string brackets(1000, '[');
+  for (const std::string& text : {dots + brackets, "\\\"" + brackets}) {
+    EXPECT_EQ(said("s = \"" + text + "\"\n"), "") << text.substr(0, 9);
+  }
+  EXPECT_EQ(said("# " + dots + brackets + "\ns = '" + dots + brackets + "'\n"), "");
+  EXPECT_EQ(said("s = \"\"\"\n" + brackets + "\n\"\"\"\nt = '''\n" + brackets + "'''\n"), "");
+}
+
 }  // namespace
 }  // namespace tsdfpp

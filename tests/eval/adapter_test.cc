@@ -6,7 +6,6 @@
 
 #include <fstream>
 #include <set>
-#include <thread>
 
 #include "core/files.h"
 #include "core/ply.h"
@@ -25,81 +24,6 @@ namespace {
 using test::BoxSource;
 using test::TempFolder;
 namespace fs = std::filesystem;
-
-constexpr std::int64_t kMb = 1'000'000;
-const ChildLimits kRoomy{60, 2000 * kMb};
-
-ChildOutcome Shell(const TempFolder& folder, const std::string& script,
-                   const ChildLimits& limits = kRoomy) {
-  return RunChildProcess("it", {"sh", "-c", script}, folder.path(), folder / "log", limits);
-}
-
-TEST(ChildProcess, EndsWellAndIsMeasured) {
-  const TempFolder folder;
-  const ChildOutcome outcome = Shell(folder, "pwd; echo oops >&2; read x || echo no input");
-  EXPECT_FALSE(outcome.failure.has_value());
-  EXPECT_EQ(ReadFile(folder / "log").value_or(""),
-            fs::canonical(folder.path()).string() + "\noops\nno input\n");
-  EXPECT_GT(outcome.wall_s, 0);
-  EXPECT_GT(outcome.peak_bytes, 100'000);  // no shell is smaller
-}
-
-TEST(ChildProcess, FailuresAreSentences) {
-  const TempFolder folder;
-  const ChildOutcome code = Shell(folder, "echo first; echo 'no such model'; exit 3");
-  ASSERT_TRUE(code.failure.has_value());
-  EXPECT_EQ(code.failure->kind, ErrorKind::kData);
-  EXPECT_EQ(code.failure->message, "it: ended with exit code 3; " + (folder / "log").string() +
-                                       " ends with: no such model");
-  const ChildOutcome crash = Shell(folder, "kill -SEGV $$");
-  ASSERT_TRUE(crash.failure.has_value());
-  EXPECT_NE(crash.failure->message.find("was ended by signal 11"), std::string::npos);
-  EXPECT_NE(crash.failure->message.find("it said nothing"), std::string::npos);
-  const ChildOutcome missing =
-      RunChildProcess("it", {"/nowhere/mapper"}, folder.path(), folder / "log", kRoomy);
-  ASSERT_TRUE(missing.failure.has_value());
-  EXPECT_EQ(missing.failure->kind, ErrorKind::kEnvironment);
-  EXPECT_EQ(missing.failure->message,
-            "it: '/nowhere/mapper' cannot be run (No such file or directory)");
-}
-
-TEST(ChildProcess, WhatHangsIsEndedWithAllThatItStarted) {
-  const TempFolder folder;
-  const ChildOutcome outcome =
-      Shell(folder, "sleep 600 & echo $! > pid; sleep 600", {3, 2000 * kMb});
-  ASSERT_TRUE(outcome.failure.has_value());
-  EXPECT_NE(outcome.failure->message.find("ran longer than its limit of 3 s, and was ended"),
-            std::string::npos)
-      << outcome.failure->message;
-  EXPECT_LT(outcome.wall_s, 60);
-  const std::string pid = ReadFile(folder / "pid").value_or("");
-  ASSERT_FALSE(pid.empty());
-  // Killed: it is gone, or whoever adopted it still has to take note. On a busy machine the kernel
-  // takes a while.
-  constexpr int kMostLooks = 1000;
-  std::string state = "S";
-  for (int look = 0; look < kMostLooks && state != "Z" && !state.empty(); ++look) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    std::ifstream stat("/proc/" + pid.substr(0, pid.find('\n')) + "/stat");
-    std::string text;
-    state = std::getline(stat, text) ? text.substr(text.rfind(')') + 2, 1) : "";
-  }
-  EXPECT_TRUE(state == "Z" || state.empty()) << state;
-}
-
-TEST(ChildProcess, WhatEatsMemoryIsEnded) {
-  const TempFolder folder;
-  const ChildOutcome outcome =
-      RunChildProcess("it",
-                      {"/usr/bin/python3", "-c",
-                       "x = []\nwhile True:\n  x.append(bytearray(b'x') * 10_000_000)\n  "
-                       "import time; time.sleep(0.02)"},
-                      folder.path(), folder / "log", {60, 150 * kMb});
-  ASSERT_TRUE(outcome.failure.has_value());
-  EXPECT_NE(outcome.failure->message.find("more than its limit of 150 MB"), std::string::npos)
-      << outcome.failure->message;
-  EXPECT_GT(outcome.peak_bytes, 150 * kMb);
-}
 
 std::string Toml(const std::string& name, const std::string& command,
                  const std::string& more = "") {
@@ -135,12 +59,25 @@ TEST(Adapter, IsReadStrictlyAndWrittenBack) {
   const std::vector<std::pair<std::string, std::string>> wrong{
       {"name = \"x\"\n", "command"},
       {Toml("a b", "[\"x\"]"), "name is 'a b'"},
+      {Toml("a\\u0001b", "[\"x\"]"), "holds a control character"},
+      {Toml(std::string(101, 'n'), "[\"x\"]"), "is longer than 100 bytes"},
+      {Toml("-rf", "[\"x\"]"), "begins with a dot or a dash"},
+      {Toml("nul", "[\"x\"]"), "is the name of a device"},
+      {Toml("record", "[\"x\"]"), "of its own"},
+      {Toml("Summary.json", "[\"x\"]"), "of its own"},
+      {Toml("figure-close-gt.png", "[\"x\"]"), "of its own"},
+      {Toml("tsdf++-literal_paper_icp", "[\"x\"]"), "of its own"},
       {Toml("x", "[]"), "command is empty"},
       {Toml("x", "[\"x\"]", "colour = 1\n"), "colour"},
       {Toml("x", "[\"x\"]", "layout = \"bop\"\n"), "layout is bop"},
       {Toml("x", "[\"x\"]", "layout = \"disc\"\n"), "disc"},
       {Toml("x", "[\"x\"]", "time_limit_s = 0\n"), "time_limit_s is 0"},
       {Toml("x", "[\"x\"]", "memory_limit_mb = -1\n"), "memory_limit_mb is -1"},
+      {Toml("x", "[\"x\"]", "process_limit = 0\n"), "process_limit is 0, expected 1 to 30000"},
+      {Toml("x", "[\"x\"]", "log_limit_mb = 0\n"), "log_limit_mb is 0"},
+      {Toml("x", "[\"x\"]", "log_limit_mb = 1e9\n"), "log_limit_mb is 1000000000"},
+      {Toml("x", "[\"x\"]", "disk_limit_mb = -2\n"), "disk_limit_mb is -2"},
+      {Toml("x", "[\"x\"]", "memory_limit_mb = 1e200\n"), "expected above 0 and at most"},
       {Toml("x", "[\"x\"]", "scale = 0\n"), "scale is 0"},
       {Toml("x", "[\"x\"]", "match = \"luck\"\n"), "match is 'luck'"},
   };
@@ -158,6 +95,25 @@ TEST(Adapter, IsReadStrictlyAndWrittenBack) {
   ASSERT_FALSE(unknown.has_value());
   EXPECT_NE(unknown.error().message.find("unknown word '{sequenz'"), std::string::npos)
       << unknown.error().message;
+}
+
+// An adapter must not write over what compare itself leaves.
+TEST(Adapter, HasANameOfItsOwn) {
+  const TempFolder folder;
+  for (const char* name :
+       {"summary.json", "Summary.JSON", "frames.csv", "table.txt", "report.html", "report.mp4",
+        "run.json", "record", "frames", "gates.json", "figure-close-gt.png", "table-icp.png",
+        "tsdf_close_gt", "tsdf++-anchored_paper_icp", "not-yet-known_close_icp"}) {
+    ASSERT_TRUE(WriteFile(folder / "a.toml", Toml(name, "[\"x\"]")).has_value());
+    const auto result = ReadAdapter(folder / "a.toml");
+    ASSERT_FALSE(result.has_value()) << name;
+    EXPECT_NE(result.error().message.find("of its own"), std::string::npos)
+        << result.error().message;
+  }
+  for (const char* name :
+       {"mine", "tsdf", "open3d-scalable", "records", "close_gt", "my_close_gt2"}) {
+    EXPECT_EQ(Read(folder, Toml(name, "[\"x\"]")).name, name);
+  }
 }
 
 // A comparison of shell scripts that copy prepared meshes.
@@ -223,6 +179,16 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
       Script("talks", std::string(kCopy) + "; echo half > timing.json"),
       Script("lost",
              std::string(kCopy) + "; mkdir trajectories; echo 1 2 > trajectories/left-3.txt"),
+      Script("pipe", std::string(kCopy) + "; rm meshes/000003/scene.ply; "
+                                          "mkfifo meshes/000003/scene.ply"),
+      Script("link", std::string(kCopy) + "; rm meshes/000006/scene.ply; "
+                                          "ln -s $2/000006/scene.ply meshes/000006/scene.ply"),
+      Script("moves", "mv meshes away; rm -rf meshes; ln -s $2 meshes"),
+      Script("times", std::string(kCopy) + "; ln -s /dev/zero timing.json"),
+      Script("leaves", std::string(kCopy) + "; mkfifo queue; ln -s /dev/zero endless; "
+                                            "touch \"$(printf 'a\\377b')\""),
+      Script("cut", "printf '\\342\\202\\254%.0s' $(seq 100); printf '\\342\\202'; exit 3"),
+      Script("log", std::string(kCopy) + "; rm log.txt; mkfifo log.txt"),
       Script("last", kCopy),
   };
   const auto result = RunCompare(source, config, folder_ / "out", "the command", {});
@@ -236,8 +202,13 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
       {"half", "scene.ply"},
       {"silent", "meshes: no such folder"},
       {"late", "holds nothing for frame 3"},
-      {"talks", "timing.json is no JSON"},
-      {"lost", "left-3.txt"}};
+      {"talks", "talks/timing.json: not JSON"},
+      {"lost", "left-3.txt"},
+      {"pipe", "pipe/meshes/000003/scene.ply is a pipe, expected a file"},
+      {"link", "link/meshes/000006/scene.ply is a link, expected a file"},
+      {"moves", "moves/meshes is a link, expected a file"},
+      {"times", "times/timing.json is a link, expected a file"},
+      {"cut", "ended with exit code 3"}};
   const std::string table = SummaryTable(*result);
   const nlohmann::json summary = SummaryJson(*result, "the command");
   ASSERT_EQ(summary.at("adapters").size(), config.adapters.size());
@@ -260,6 +231,20 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
     EXPECT_NE(table.find("failed: " + run.failure->message), std::string::npos) << table;
     EXPECT_EQ(json.at("failure"), run.failure->message);
   }
+  // All of it can be written down, also half a character.
+  EXPECT_NO_THROW((void)summary.dump());
+  EXPECT_EQ(ReadFile(folder_ / "out/summary.json").value_or("").find(".tsdfpp-run"),
+            std::string::npos);
+  for (const char* gone :
+       {"leaves/queue", "leaves/endless", "log/log.txt", "pipe/meshes/000003/scene.ply"}) {
+    EXPECT_FALSE(fs::exists(fs::symlink_status(folder_ / "out" / gone))) << gone;
+  }
+  const auto& leaves = *std::find_if(result->adapters.begin(), result->adapters.end(),
+                                     [](const auto& run) { return run->config.name == "leaves"; });
+  EXPECT_EQ(leaves->remarks,
+            std::vector<std::string>{"3 links, pipes, devices or files with odd names are removed "
+                                     "from " +
+                                     (folder_ / "out/leaves").string()});
   // What an adapter is given: the frames, and nothing of the truth.
   const std::string seen = ReadFile(folder_ / "out/good/seen.txt").value_or("");
   EXPECT_NE(seen.find("Color0006.png"), std::string::npos) << seen;
@@ -311,7 +296,7 @@ constexpr double kAccuracy_m = 0.02;
 TEST(BundledAdapters, MapTheStaticWorld) {
   const TempFolder folder;
   const bool python = RunChildProcess("python", {"/usr/bin/python3", "-c", "import open3d"},
-                                      folder.path(), folder / "log", kRoomy)
+                                      folder.path(), folder / "log", {})
                           .failure == std::nullopt;
   const std::string methods = "open3d-scalable,open3d-scalable-back,open3d-voxelblockgrid";
   const nlohmann::json summary = CompareMini(folder, python ? methods + ",open3d-python" : methods);

@@ -167,7 +167,7 @@ TEST_F(SmallSet, AnUnsoundResultIsRefusedInASentence) {
   result = Result("m", 1, 1);
   result["hardware"].erase("cpu");
   refused(result, "a field is missing or wrong");
-  refused(json::array(), "is not JSON");
+  refused(json::array(), "not a JSON object");
   EXPECT_FALSE(Leaderboard(set_, folder_ / "none").has_value());
 }
 

@@ -176,8 +176,8 @@ TEST(Compare, WritesItsFilesAndEqualsTheWayOverDisk) {
     EXPECT_EQ(rows[2 + 2 * r][0], "40");
     EXPECT_EQ(rows[1 + 2 * r][1], kMethodNames[r]);
   }
-  std::set<std::string> expected{"frames.csv", "report.html", "summary.json", "figure-close-gt.png",
-                                 "table.txt"};
+  std::set<std::string> expected{"frames.csv",          "report.html", "summary.json",
+                                 "figure-close-gt.png", "table.txt",   "run.json"};
   for (const std::string& run : kFolders) {
     for (const char* file : {"mesh/background-0.ply", "mesh/house-2.ply", "mesh/scene.ply",
                              "trajectories/car-1.txt", "trajectories/house-2.txt"}) {
@@ -202,6 +202,7 @@ TEST(Compare, WritesItsFilesAndEqualsTheWayOverDisk) {
     ASSERT_EQ(command.exit_code, 0) << command.err;
     std::set<std::string> of_map = FilesBelow(map);
     EXPECT_EQ(of_map.erase("stats.json"), 1U);
+    EXPECT_EQ(of_map.erase("run.json"), 1U);
     EXPECT_EQ(of_map, FilesBelow(out / kFolders[r]));
     for (const std::string& file : of_map) {
       EXPECT_TRUE(BytesOf(map / file) == BytesOf(out / kFolders[r] / file))
@@ -235,8 +236,10 @@ TEST(Compare, TwiceTheSameWhateverTheThreads) {
     EXPECT_EQ(RowsWithoutTimes(folder / other), rows) << other;
     ASSERT_EQ(FilesBelow(folder / other), files) << other;
     for (const std::string& file : files) {
-      // Meshes, trajectories, pictures and the table; the rest holds times.
-      if (file == "frames.csv" || file == "summary.json" || file == "report.html") continue;
+      // Meshes, trajectories, pictures and the table; the rest holds times or the run's name.
+      if (file == "run.json" || file == "frames.csv" || file == "summary.json" ||
+          file == "report.html")
+        continue;
       EXPECT_TRUE(BytesOf(folder / other / file) == BytesOf(folder / "first" / file))
           << other << ": " << file;
     }
@@ -256,7 +259,7 @@ TEST(Compare, CommandsThreadsChangeNoByte) {
       ASSERT_EQ(command.exit_code, 0) << command.err;
       std::map<std::string, std::string> bytes;
       for (const std::string& file : FilesBelow(out)) {
-        if (file != "stats.json") bytes[file] = BytesOf(out / file);
+        if (file != "stats.json" && file != "run.json") bytes[file] = BytesOf(out / file);
       }
       if (first.empty()) first = bytes;
       EXPECT_GE(bytes.size(), 4U);

@@ -296,7 +296,7 @@ TEST(GateReportTest, ResultsComeBackForTheReport) {
   EXPECT_EQ(
       spoilt([](Json& j) { j["sabotages"][0].erase("caught"); }),
       "spoilt.json: sabotage 'frozen-object' does not say whether it was caught, and by what");
-  EXPECT_EQ(spoilt([](Json& j) { j = Json::array(); }), "spoilt.json is no JSON object");
+  EXPECT_EQ(spoilt([](Json& j) { j = Json::array(); }), "spoilt.json: not a JSON object");
   // No file but those of the folder of pictures.
   EXPECT_EQ(spoilt([](Json& j) { j["gates"][0]["explanation"]["picture"] = "../gates.json"; }),
             "{}");

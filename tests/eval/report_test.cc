@@ -413,6 +413,78 @@ TEST_F(Report, NothingInARunCanEndTheDataOfThePage) {
   EXPECT_EQ(data["reports"][0]["summary"]["sequence"], summary["sequence"]);
 }
 
+// What another run left there is not shown beside this one's.
+TEST_F(Report, AnInterruptedRunGetsASentence) {
+  TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
+  const auto expect = [&](const std::filesystem::path& run, const std::string& words) {
+    const auto page = MakeReportPage({run}, "c");
+    ASSERT_FALSE(page.has_value()) << words;
+    EXPECT_EQ(page.error().kind, ErrorKind::kData);
+    EXPECT_NE(page.error().message.find("holds an interrupted run"), std::string::npos)
+        << page.error().message;
+    EXPECT_NE(page.error().message.find(words), std::string::npos) << page.error().message;
+  };
+  const std::filesystem::path run = Copy("named");
+  json summary = json::parse(Text(run / "summary.json"));
+  summary["run"] = "0123456789abcdef";
+  const std::string text = summary.dump();
+  ASSERT_TRUE(WriteFile(run / "summary.json", text));
+  expect(run, "its run.json is missing");
+  EXPECT_FALSE(WriteReportVideo(run, run / "film.mp4").has_value());
+  json note{{"schema", 1}, {"command", "c"}, {"run", "0123456789abcdef"}, {"files", json::array()}};
+  for (const char* file :
+       {"summary.json", "frames.csv", "record/record.json", "record/record.bin"}) {
+    note["files"].push_back({{"name", file}, {"bytes", Text(run / file).size()}});
+  }
+  ASSERT_TRUE(WriteFile(run / "run.json", note.dump()));
+  // A picture that the run does not know is left out; of an older version's run all are taken.
+  ASSERT_TRUE(WriteFile(run / "table-gt.png", "another run's"));
+  const auto page = MakeReportPage({run}, "c");
+  ASSERT_TRUE(page.has_value()) << page.error().message;
+  EXPECT_EQ(page->html.find(Base64("another run's")), std::string::npos);
+
+  ASSERT_TRUE(WriteFile(run / "frames.csv", Text(run / "frames.csv") + "\n"));
+  expect(run, "frames.csv has");
+  note["run"] = "fedcba9876543210";
+  ASSERT_TRUE(WriteFile(run / "run.json", note.dump()));
+  expect(run, "its summary is of another run");
+  note["files"][0]["name"] = "../summary.json";
+  ASSERT_TRUE(WriteFile(run / "run.json", note.dump()));
+  const auto odd = MakeReportPage({run}, "c");
+  ASSERT_FALSE(odd.has_value());
+  EXPECT_NE(odd.error().message.find("a file lies elsewhere"), std::string::npos);
+  // An older recording beside a comparison that made none.
+  note["run"] = "0123456789abcdef";
+  note["files"] = json::array();
+  for (const char* file : {"summary.json", "frames.csv"}) {
+    note["files"].push_back({{"name", file}, {"bytes", nullptr}});
+  }
+  ASSERT_TRUE(WriteFile(run / "run.json", note.dump()));
+  expect(run, "record/record.bin is not of this run");
+}
+
+TEST(ReportVideo, ACutFileIsNone) {
+  const auto box = [](const std::string& name, std::size_t bytes, std::size_t length) {
+    std::string text;
+    for (const int shift : {24, 16, 8, 0}) text += static_cast<char>(length >> shift & 255U);
+    return text + name + std::string(bytes, 'x');
+  };
+  const std::string head = box("ftyp", 24, 32);
+  const std::string body = box("mdat", 100, 108);
+  const std::string index = box("moov", 50, 58);
+  EXPECT_TRUE(IsWholeVideo(head + body + index));
+  EXPECT_FALSE(IsWholeVideo(""));
+  EXPECT_FALSE(IsWholeVideo(head + body));
+  EXPECT_FALSE(IsWholeVideo(head + box("mdat", 100, 0)));  // its length was never filled in
+  EXPECT_FALSE(IsWholeVideo((head + body + index).substr(0, head.size() + body.size() + 30)));
+  EXPECT_FALSE(IsWholeVideo((head + body + index).substr(0, head.size() + body.size() + 4)));
+  EXPECT_FALSE(IsWholeVideo(head + box("mdat", 100, 7) + index));
+  EXPECT_FALSE(
+      IsWholeVideo(head + box("mdat", 100, 1) + index));  // a length of eight bytes: "xxxx"
+  const std::string wide = std::string("\0\0\0\x01mdat\0\0\0\0\0\0\0\x14", 16) + "1234";
+  EXPECT_TRUE(IsWholeVideo(head + wide + index));
+}
+
 TEST_F(Report, SpoiltFilesGetASentence) {
   struct Case {
     const char* name;
@@ -429,7 +501,7 @@ TEST_F(Report, SpoiltFilesGetASentence) {
       {"no-summary", [](const auto& run) { std::filesystem::remove(run / "summary.json"); },
        "has no summary.json"},
       {"no-json", [](const auto& run) { (void)WriteFile(run / "summary.json", "[1"); },
-       "is no JSON object"},
+       "not a JSON object"},
       {"schema",
        [&](const auto& run) { edit(run / "summary.json", [](json& s) { s["schema"] = 7; }); },
        "schema is 7, expected 1"},

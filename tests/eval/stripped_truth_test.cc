@@ -23,7 +23,7 @@ MappedFrames MapFrames(Method method, PoseSource poses, const SequenceInfo& info
   config.method = method;
   config.poses = poses;
   Pipeline pipeline(config, info.objects);
-  for (const Frame& frame : frames) pipeline.Process(frame);
+  for (const Frame& frame : frames) pipeline.Process(frame).value();
   return {SnapshotOf(pipeline.map(), pipeline.map().Objects()), pipeline.trajectories()};
 }
 

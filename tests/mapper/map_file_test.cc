@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include "core/files.h"
+#include "core/limits.h"
 #include "mapper/byte_stream.h"
 #include "mapper/section_file.h"
 #include "mapper/volume_store.h"
@@ -101,6 +102,80 @@ TEST_P(MapFile, ARunComesBack) {
               run.trajectories.at(kBrick).at(frame).matrix());
   }
   EXPECT_FALSE(Loaded(MapToBytes(*loaded.map)).run.has_value());
+}
+
+// Names become file names of what is written; the checksums of such a file are right.
+TEST(MapFileNames, ObjectsWithNamesThatEscapeAreRefused) {
+  const auto map = MakeMap(Method::kTsdf, ToyConfig());
+  const auto sentence = [&](const std::vector<ObjectInfo>& objects) {
+    MappedRun run = SomeRun();
+    run.objects = objects;
+    const auto loaded = MapFromBytes(MapToBytes(*map, &run), "map.tsdf");
+    return loaded ? std::string() : loaded.error().message;
+  };
+  EXPECT_EQ(sentence({{1, "brick", "toy"}}), "");
+  const std::string begin = "map.tsdf: section 'RUN ' is wrong: its list: object ";
+  EXPECT_EQ(
+      sentence({{1, "../../pwned", ""}}),
+      begin + "1: the name '../../pwned' holds a slash, expected one that can be a file's name");
+  for (const std::string& name :
+       {std::string(), std::string(".."), std::string("/x"), std::string("a\nb"),
+        std::string("\xff"), std::string("a\0b", 3), std::string(300, 'n')}) {
+    EXPECT_TRUE(sentence({{1, name, ""}}).starts_with(begin)) << name;
+  }
+  EXPECT_EQ(sentence({{1, "a", ""}, {1, "b", ""}}), begin + "1: its id is there twice");
+  EXPECT_EQ(sentence({{kNoInstance, "a", ""}}),
+            begin + "65535: the id 65535 stands for no object, expected one below");
+}
+
+// Zeros fold to a thousandth: what they unfold to is summed before memory is taken.
+TEST(MapFileSize, WhatUnfoldsToTooMuchIsRefused) {
+  constexpr std::size_t kBytes = 8U << 20U;
+  const std::string file = PackSections({{"ZERO", std::string(kBytes, '\0')}, {"MORE", "x"}});
+  EXPECT_LT(file.size(), kBytes / 100);
+  Limits limits;
+  limits.map_bytes = kBytes;
+  SetLimits(limits);
+  const auto over = UnpackSections(file, "map.tsdf");
+  limits.map_bytes = kBytes + 1;
+  SetLimits(limits);
+  const auto within = UnpackSections(file, "map.tsdf");
+  SetLimits({});
+  ASSERT_FALSE(over.has_value());
+  EXPECT_EQ(over.error().message,
+            "map.tsdf: 8388609 bytes of a map once it is unfolded, over the limit of 8388608 "
+            "(TSDFPP_LIMITS=map_bytes=... raises it)");
+  ASSERT_TRUE(within.has_value());
+  EXPECT_EQ(within->at("ZERO").size(), kBytes);
+  EXPECT_EQ(within->at("MORE"), "x");
+}
+
+// A block in memory is larger than in the file.
+TEST(MapFileSize, BlocksAreCountedBeforeTheyAreMade) {
+  Frame frame = DriveFrame(0);
+  for (int v = 0; v < frame.depth.rows; ++v) {
+    for (int u = 0; u < frame.depth.cols; ++u) {
+      if (u % 8 != 0 || v % 8 != 0) frame.depth.at<float>(v, u) = 0;  // few voxels a block
+    }
+  }
+  const auto map = MakeMap(Method::kVolumes, ToyConfig());
+  SetPosesThenFuse(*map, frame);
+  const std::string file = MapToBytes(*map);
+  Limits limits;
+  std::int64_t raw = 0;
+  const auto sections = UnpackSections(file, "map.tsdf").value();
+  for (const auto& [name, bytes] : sections) {
+    raw += static_cast<std::int64_t>(bytes.size());
+  }
+  ASSERT_LT(raw, static_cast<std::int64_t>(map->Memory().blocks * sizeof(TsdfBlock)));
+  limits.map_bytes = raw;
+  SetLimits(limits);
+  const auto loaded = MapFromBytes(file, "map.tsdf");
+  SetLimits({});
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_NE(loaded.error().message.find("its blocks: "), std::string::npos)
+      << loaded.error().message;
+  EXPECT_TRUE(MapFromBytes(file, "map.tsdf").has_value());
 }
 
 // Every byte of a file is under a checksum, so a file that differs in one is refused.

@@ -2,6 +2,7 @@
 // to say is asked of the reference, voxel by voxel, and of no kernel.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <set>
 
@@ -115,6 +116,46 @@ TEST_P(PlanBlocksTest, AllInViewIsSaidOfBlocksWithoutAVoxelOutside) {
   }
   EXPECT_GT(2 * in_view, inside) << "hardly any";
   EXPECT_LT(inside, planned.size()) << "none at the border";
+}
+
+// Far out single precision moves voxels by pixels: what is said to be in view is so for the kernel,
+// which then reads those pixels unasked. Returns of how many blocks it is said.
+std::size_t CheckAllInView(int parameter, int far) {
+  const MapConfig config = ToyConfig(1 + parameter % 4);
+  Frame frame = RenderToys(TableWithToys(), parameter);
+  frame.depth.setTo(2.0);  // a pixel says something of each voxel
+  const Index3 offset{far, parameter < 3 ? far : 0, -far};
+  frame.T_WC.translation() +=
+      Eigen::Vector3d(offset.x, offset.y, offset.z) * (kBlockSide * config.voxel_m);
+  const FrameView view(frame, frame.mask);
+  const CameraFromLattice T_CL(frame.T_WC, Pose::Identity(), true);
+  std::vector<Index3> blocks = BlocksOfBox();
+  for (Index3& block : blocks) {
+    block = {block.x + offset.x, block.y + offset.y, block.z + offset.z};
+  }
+  constexpr float kBehind_m = 3;  // behind depth, for all blocks of the box
+  std::size_t in_view = 0;
+  for (PlannedBlock block : PlanBlocks(view, blocks.size(), config.voxel(), kBehind_m,
+                                       [&](std::size_t i) -> BlockCandidate {
+                                         return {blocks[i], &T_CL, 1, true};
+                                       })) {
+    if (!block.all_in_view) continue;
+    ++in_view;
+    block.all_in_view = false;  // so that the kernel asks
+    BlockObservation seen;
+    EXPECT_TRUE(ObserveVoxels(
+        view.kernel, PlaceOf(T_CL, blocks[block.number], config.voxel(), block), kBehind_m, seen));
+    EXPECT_EQ(std::count(seen.pixel.begin(), seen.pixel.end(), -1), 0) << "block " << block.number;
+  }
+  return in_view;
+}
+
+TEST_P(PlanBlocksTest, AllInViewHoldsForTheKernelFarOut) {
+  EXPECT_GT(CheckAllInView(GetParam(), kFurthestBlock / 32), 0U) << "the test asks of nothing";
+  // As far out as this nothing is sure to be in view.
+  for (const int far : {kFurthestBlock / 4, kFurthestBlock - 16, -(kFurthestBlock - 16)}) {
+    CheckAllInView(GetParam(), far);
+  }
 }
 
 // What the plan tells the kernels of a block (that all of it is in view, from where on it is

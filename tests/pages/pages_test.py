@@ -131,6 +131,20 @@ class Pages(unittest.TestCase):
                       "row header, column sane: said nothing, found 'sane'"]:
             self.assertIn(place, printed)
 
+    def test_an_interrupted_run_is_no_source(self):
+        self.put("planted/summary.json", '{"run": "0123456789abcdef"}')
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 1)
+        self.assertIn("was interrupted: run the command again", printed)
+        self.put("planted/run.json", '{"files": [{"name": "speeds.csv", "bytes": 3}]}')
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 1)
+        self.assertIn("bytes, expected 3", printed)
+        size = (self.root / "planted/speeds.csv").stat().st_size
+        self.put("planted/run.json", '{"files": [{"name": "speeds.csv", "bytes": %d}]}' % size)
+        status, printed = self.run_it("check", "planted")
+        self.assertEqual(status, 0, printed)
+
     def test_a_command_that_fails(self):
         self.replace("docs/tables.toml", "cp planted/*", "exit 3; cp planted/*")
         for do in ("check", "make"):

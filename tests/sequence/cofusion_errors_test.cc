@@ -200,12 +200,29 @@ TEST(CofusionErrors, ForeignSet) {
   }
 }
 
+// A calibration of four numbers says nothing of the size, and sequence.json agrees.
+void TakeSizeAway(const fs::path& set) {
+  const std::string camera = ReadFile(set / "calibration.txt").value();
+  ASSERT_TRUE(WriteFile(set / "calibration.txt", camera.substr(0, camera.rfind(" 13 7"))));
+  std::string json = ReadFile(set / "sequence.json").value();
+  for (const std::string side : {"\"width\": 13", "\"height\": 7"}) {
+    const std::size_t at = json.find(side);
+    ASSERT_NE(at, std::string::npos) << json;
+    json.replace(at, side.size(), side.substr(0, side.find(' ')) + " 0");
+  }
+  ASSERT_TRUE(WriteFile(set / "sequence.json", json).has_value());
+}
+
 TEST(CofusionErrors, OurOwnSet) {
   const Case cases[] = {
       {[](const fs::path&) {}, ""},
       {Text("sequence.json", "{"), "@/sequence.json: not a JSON object"},
       {Text("calibration.txt", "564.3 1 6 3 13 7"),
        "@/sequence.json: the intrinsics differ from those in calibration.txt"},
+      {TakeSizeAway,
+       "@/sequence.json: a field is missing or of another type (width is 0, expected a whole "
+       "number "
+       "from 2 to 16384)"},
       {Text("trajectories/gt-boat-9.txt", ""),
        "@/trajectories/gt-boat-9.txt: object 9 is not listed in sequence.json"},
       {Remove("colour/Color0001.png"), "@/colour/Color0001.png: no such image"},

@@ -189,8 +189,9 @@ TEST(CofusionWriter, ObjectsThatDoNotFitAreNamed) {
     const char* sentence;
   } cases[] = {
       {{256, "x", ""}, "object 'x': id 256, a Co-Fusion mask holds 0 to 255"},
-      {{3, "a/b", ""}, "object 3: the name 'a/b' cannot be part of a file name"},
-      {{3, "", ""}, "object 3: the name '' cannot be part of a file name"},
+      {{3, "a/b", ""},
+       "object 3: the name 'a/b' holds a slash, expected one that can be a file's name"},
+      {{3, "", ""}, "object 3: the name '' is empty, expected one that can be a file's name"},
       {{2, "again", ""}, "object id 2 is there twice"},
   };
   for (const auto& [object, sentence] : cases) {

@@ -82,6 +82,12 @@ TEST(Malformed, Bop) {
            at + "depth/000001.png: the image is 32x24, expected 64x48 (as 000000.png)"},
           {Remove(scene + "rgb/000001.png"), at + "rgb/000001.png: no such image"},
           {Text("models/models_info.json", "[]"), "@/models/models_info.json: not a JSON object"},
+          {Json("models/models_info.json", [](auto& json) { json["8"]["name"] = "../../pwned"; }),
+           "@/models/models_info.json: object 8: the name '../../pwned' holds a slash, expected "
+           "one "
+           "that can be a file's name"},
+          {Json("models/models_info.json", [](auto& json) { json["8"]["class"] = "a\nb"; }),
+           "@/models/models_info.json: object 8: the class 'a b' holds a control character"},
       });
 }
 

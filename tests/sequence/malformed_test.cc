@@ -2,6 +2,8 @@
 // (malformed_bop_test.cc): each gives its sentence.
 #include "tests/sequence/malformed.h"
 
+#include <sys/stat.h>
+
 #include <fstream>
 
 #include "tests/sequence/other_sets.h"
@@ -38,6 +40,37 @@ TEST(Malformed, Tum) {
            "rgb/0.000000.png is 8-bit unsigned with 3 channels, expected one of them to be depth "
            "(16-bit unsigned with 1 channel)"},
           {Text("associations.txt", "\n"), "@/associations.txt: holds no images"},
+          {Text("associations.txt", "0 /dev/zero 0 depth/0.000000.png\n"),
+           "@/associations.txt:1: the path '/dev/zero' is absolute, expected one inside the data's "
+           "folder"},
+          {Text("associations.txt", "0 rgb/0.000000.png 0 depth/../../x.png\n"),
+           "@/associations.txt:1: the path 'depth/../../x.png' holds '..', expected one inside the "
+           "data's folder"},
+          {[](const fs::path& set) {
+             fs::remove(set / "associations.txt");
+             Text("rgb.txt", "0 ../other/0.png\n")(set);
+           },
+           "@/rgb.txt:1: the path '../other/0.png' holds '..', expected one inside the data's "
+           "folder"},
+          {[](const fs::path& set) {
+             fs::remove(set / "associations.txt");
+             std::string list;
+             for (int i = 0; i < 300; ++i) list += "0 rgb/0.000000.png\n";
+             Text("rgb.txt", list)(set);
+             Text("depth.txt", list)(set);
+           },
+           "@: over 100 images an image within 0.02 s, expected times of a recording"},
+          {[](const fs::path& set) {
+             fs::remove(set / "rgb/0.000000.png");
+             ASSERT_EQ(mkfifo((set / "rgb/0.000000.png").c_str(), 0600), 0);
+           },
+           "@/rgb/0.000000.png: is a pipe, expected a regular file"},
+          {[](const fs::path& set) {
+             fs::remove(set / "groundtruth.txt");
+             fs::create_symlink("/etc/passwd", set / "groundtruth.txt");
+           },
+           "@/groundtruth.txt: leads by a link to '/etc/passwd', outside of the data's folder "
+           "(--follow-links, or a copy in its place, reads it)"},
           {[](const fs::path& set) {
              fs::remove(set / "associations.txt");
              Text("rgb.txt", "9 rgb/0.000000.png\n")(set);
@@ -190,7 +223,7 @@ TEST(Malformed, Replica) {
           {Text("cam_params.json", "{\"camera\": {\"w\": 64}}"),
            "@/cam_params.json: expected numbers w h fx fy cx cy scale"},
           {Json("cam_params.json", [](nlohmann::json& json) { json["camera"]["scale"] = 0; }),
-           "@/cam_params.json: w, h and scale must be over 0"},
+           "@/cam_params.json: w, h and scale must be over 0, w and h whole numbers"},
           {Json("cam_params.json", [](nlohmann::json& json) { json["camera"]["w"] = 60; }),
            "@/results/depth000000.png: the image is 64x48, expected 60x48 (cam_params.json)"},
           // Metres where the file says millimetres.

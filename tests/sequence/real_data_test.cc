@@ -6,6 +6,7 @@
 #include <functional>
 #include <sstream>
 
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "sequence/open_sequence.h"
 #include "sequence/pose_matrix.h"
@@ -71,6 +72,14 @@ void ExpectMentions(const Error& error, const std::string& words) {
   EXPECT_NE(error.message.find(words), std::string::npos) << error.message;
 }
 
+// The sets below are put together of links to the shared data.
+struct FollowingLinks {
+  FollowingLinks() { SetLinkPolicy(LinkPolicy::kAnywhere); }
+  ~FollowingLinks() { SetLinkPolicy(LinkPolicy::kInside); }
+  FollowingLinks(const FollowingLinks&) = delete;
+  FollowingLinks& operator=(const FollowingLinks&) = delete;
+};
+
 // tum_fr1_rpy_subset without its poses, which `change` writes.
 void CopyOfTum(const fs::path& folder, const std::function<Pose(const Pose&)>& change) {
   const fs::path from = SharedData("tum_fr1_rpy_subset");
@@ -118,6 +127,7 @@ TEST(RealData, TumAsItIs) {
 }
 
 TEST(RealData, TumListsAndAssociationsAgree) {
+  const FollowingLinks follow;
   TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   const fs::path from = SharedData("tum_fr1_rpy_subset");
@@ -138,6 +148,7 @@ TEST(RealData, TumListsAndAssociationsAgree) {
 }
 
 TEST(RealData, TumInvertedPosesAreNamed) {
+  const FollowingLinks follow;
   TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   CopyOfTum(folder.path(), [](const Pose& T) { return T.inverse(); });
@@ -148,6 +159,7 @@ TEST(RealData, TumInvertedPosesAreNamed) {
 }
 
 TEST(RealData, TumMillimetrePositionsAreNamed) {
+  const FollowingLinks follow;
   TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   CopyOfTum(folder.path(), [](Pose T) {
@@ -158,6 +170,7 @@ TEST(RealData, TumMillimetrePositionsAreNamed) {
 }
 
 TEST(RealData, TumOpenGlAxesAreNamed) {
+  const FollowingLinks follow;
   TSDFPP_NEEDS_SHARED("tum_fr1_rpy_subset");
   const TempFolder folder;
   CopyOfTum(folder.path(), [](Pose T) {
@@ -250,6 +263,7 @@ void WriteAsScannet(const fs::path& folder, const std::function<Pose(const Pose&
 
 // README: 5.1 mm as camera-to-world, 39 mm inverted.
 TEST(RealData, RedwoodInScannetLayout) {
+  const FollowingLinks follow;
   TSDFPP_NEEDS_SHARED("open3d_redwood5");
   const TempFolder folder;
   WriteAsScannet(folder.path(), [](const Pose& T) { return T; });
@@ -261,6 +275,7 @@ TEST(RealData, RedwoodInScannetLayout) {
 }
 
 TEST(RealData, RedwoodInvertedIsNamed) {
+  const FollowingLinks follow;
   TSDFPP_NEEDS_SHARED("open3d_redwood5");
   const TempFolder folder;
   WriteAsScannet(folder.path(), [](const Pose& T) { return T.inverse(); });

@@ -80,5 +80,79 @@ TEST(SequenceJson, BadFilesAreNamed) {
   }
 }
 
+// Copying or printing it as deep as this overflows the stack.
+TEST(SequenceJson, DepthAndNumbersAreLimited) {
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  for (const char* field : {"\"schema_version\": 2", "\"seed\": 7", "\"rate_hz\": 12.5"}) {
+    const std::string name(field, std::string(field).find(':'));
+    std::string text = SequenceToJson(SomeRecord());
+    const std::size_t at = text.find(name);
+    ASSERT_NE(at, std::string::npos) << name;
+    text.replace(at + name.size() + 2, text.find('\n', at) - at - name.size() - 3, deep);
+    const TempFolder folder;
+    ASSERT_TRUE(WriteFile(folder / "s.json", text).has_value());
+    const auto read = ReadSequenceJson(folder / "s.json");
+    ASSERT_FALSE(read.has_value());
+    EXPECT_NE(read.error().message.find("lists and objects within one another, over the limit"),
+              std::string::npos)
+        << read.error().message;
+  }
+  for (const auto& [count, words] :
+       {std::pair("2147483647", "frame_count is 2147483647, expected a whole number from 0 to"),
+        {"4294967297", "frame_count is 4294967297"},
+        {"1e300", "frame_count is 1e+300"},
+        {"-1", "frame_count is -1"},
+        {"\"4\"", "frame_count is \"4\""}}) {
+    const std::string sentence =
+        SentenceAfter("\"frame_count\": 4", fmt::format("\"frame_count\": {}", count));
+    EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
+    EXPECT_LT(sentence.size(), 300U);
+  }
+  EXPECT_NE(SentenceAfter("\"width\": 13", "\"width\": 1").find("width is 1, expected a whole"),
+            std::string::npos);
+  EXPECT_NE(SentenceAfter("\"width\": 13", "\"width\": 30000").find("width is 30000"),
+            std::string::npos);
+  EXPECT_NE(SentenceAfter("\"fx\": 564.3", "\"fx\": 0.0").find("expected finite intrinsics"),
+            std::string::npos);
+}
+
+// The list is read file by file when the sequence is verified.
+TEST(SequenceJson, ListedFilesAreInside) {
+  for (const auto& [file, fault] : {std::pair("/dev/zero", "is absolute"),
+                                    {"../../etc/passwd", "holds '..'"},
+                                    {"models/../../x", "holds '..'"},
+                                    {"", "is empty"}}) {
+    const std::string sentence =
+        SentenceAfter("\"colour/Color0001.png\"", fmt::format("\"{}\"", file));
+    EXPECT_EQ(sentence, fmt::format("'fnv1a64': the path '{}' {}, expected one inside the data's "
+                                    "folder",
+                                    file, fault));
+  }
+}
+
+// Names become file names of what map and compare write.
+TEST(SequenceJson, NamesThatEscapeAreRefused) {
+  for (const auto& [name, fault] : {std::pair("../../../pwned", "holds a slash"),
+                                    {"/tmp/pwned", "holds a slash"},
+                                    {"..", "begins with a dot or a dash"},
+                                    {"", "is empty"},
+                                    {"a\\nb", "holds a control character"},
+                                    {"a\\u0001", "holds a control character"},
+                                    {"NUL", "is the name of a device"}}) {
+    const std::string sentence =
+        SentenceAfter("\"name\": \"car\"", fmt::format("\"name\": \"{}\"", name));
+    EXPECT_TRUE(sentence.starts_with("object 2: the name '")) << sentence;
+    EXPECT_NE(sentence.find(fault), std::string::npos) << sentence;
+    EXPECT_EQ(sentence.find('\n'), std::string::npos) << sentence;
+  }
+  const std::string long_name(300, 'n');
+  EXPECT_NE(SentenceAfter("\"name\": \"car\"", "\"name\": \"" + long_name + "\"")
+                .find("is longer than 100 bytes"),
+            std::string::npos);
+  EXPECT_EQ(SentenceAfter("\"id\": 1", "\"id\": 0"), "object 0: its id is there twice");
+  EXPECT_EQ(SentenceAfter("\"name\": \"car\"", "\"name\": \"background\""),
+            "object 2: its name 'background' is another object's too");
+}
+
 }  // namespace
 }  // namespace tsdfpp

@@ -120,6 +120,36 @@ TEST(StagingFolder, TheLockPassesOn) {
   EXPECT_TRUE(fs::exists(second.path()));
 }
 
+// At no moment is there no sequence, and the earlier one leaves nothing.
+TEST(StagingFolder, TheEarlierOneIsReplacedInOneStroke) {
+  for (const Kind kind : {Kind::kOwn, Kind::kShared}) {
+    const TempFolder folder;
+    const fs::path out = folder / "out";
+    ASSERT_TRUE(WriteFile(out / "file", "old").has_value());
+    ASSERT_TRUE(WriteFile(out / "older", "old").has_value());
+    std::atomic<bool> stop{false};
+    std::atomic<bool> missed{false};
+    std::thread looking([&] {
+      while (!stop) missed = missed || access((out / "file").c_str(), F_OK) != 0;
+    });
+    for (int i = 0; i < 50; ++i) {
+      StagingFolder staging(out, kind);
+      ASSERT_TRUE(staging.Make().has_value());
+      ASSERT_TRUE(WriteFile(staging.path() / "file", "new").has_value());
+      if (kind == Kind::kShared) {
+        ASSERT_TRUE(WriteFile(staging.notes() / "1.json", "noted").has_value());
+      }
+      ASSERT_TRUE(staging.TakeThePlace().has_value());
+    }
+    stop = true;
+    looking.join();
+    EXPECT_FALSE(missed);
+    EXPECT_EQ(ReadFile(out / "file"), "new");
+    EXPECT_FALSE(fs::exists(out / "older"));
+    EXPECT_EQ(Hidden(folder.path()), std::vector<std::string>{});
+  }
+}
+
 TEST(StagingFolder, AStoppedExportLeavesNothing) {
   const TempFolder folder;
   test::BoxSource source(5);

@@ -278,11 +278,11 @@ TEST_F(MeshImport, PicturesAreLaidOnByTextureCoordinates) {
   ImportedMesh mesh = Import(Write("c.obj", "mtllib lost.mtl\nusemtl q\n" + text));
   EXPECT_EQ(mesh.parts[0].colour, (Colour{51, 102, 153}));
   EXPECT_TRUE(Remarks(mesh.report, "drawn without the picture of material 'q'"));
-  EXPECT_TRUE(Remarks(mesh.report, "lost.png: no such file"));
+  EXPECT_TRUE(Remarks(mesh.report, "lost.png: no such image"));
   Write("bad.png", "this is no picture");
   Write("bad.mtl", "newmtl q\nKd red\nmap_Kd bad.png\nKd 2 nan 1\n");
   mesh = Import(Write("d.obj", "mtllib bad.mtl\nusemtl q\n" + text));
-  EXPECT_TRUE(Remarks(mesh.report, "bad.png: is no picture that can be read"));
+  EXPECT_TRUE(Remarks(mesh.report, "bad.png: cannot be decoded as an image"));
   EXPECT_TRUE(Remarks(mesh.report, "Kd of material 'q' is not three numbers from 0 to 1"));
   mesh = Import(Write("e.obj", "mtllib none.mtl\nusemtl q\ncurv 1 2\n" + text));
   EXPECT_TRUE(Remarks(mesh.report, "none.mtl: no such file), so its colours are not known"));

@@ -94,7 +94,7 @@ TEST_F(SceneInputFiles, WhatCannotBeTakenAlongIsLeftOut) {
   Write("b/cube.obj",
         "mtllib ../looks/\xff.mtl\nmtllib " + (folder_ / "looks/cube.mtl").string() + "\n" + kCube);
   const Files files = Collect(folder_ / "scene.toml").files;
-  EXPECT_TRUE(files.contains("inputs/3/b/cube.obj"));
+  EXPECT_TRUE(files.contains("inputs/3/cube.obj"));
   for (const auto& [place, file] : files) EXPECT_NE(file.extension(), ".mtl") << place;
 }
 

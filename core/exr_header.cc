@@ -1,5 +1,6 @@
-#include "sequence/exr_header.h"
+#include "core/exr_header.h"
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <optional>
@@ -53,18 +54,32 @@ std::vector<ExrChannel> ChannelsOf(std::string_view list) {
 
 }  // namespace
 
-std::vector<ExrChannel> ExrChannels(std::string_view bytes) {
+std::optional<ExrHeader> ReadExrHeader(std::string_view bytes) {
   constexpr std::uint32_t kMagic = 20000630;
   Cursor cursor(bytes);
-  if (cursor.TakeInt() != kMagic || !cursor.TakeInt()) return {};
+  if (cursor.TakeInt() != kMagic || !cursor.TakeInt()) return std::nullopt;
+  ExrHeader header;
   while (true) {
     const auto name = cursor.TakeText();
-    if (!name || name->empty() || !cursor.TakeText()) return {};
+    if (!name) return std::nullopt;
+    if (name->empty()) break;  // the header's end
+    if (!cursor.TakeText()) return std::nullopt;
     const auto size = cursor.TakeInt();
     const auto value = size ? cursor.Take(*size) : std::nullopt;
-    if (!value) return {};
-    if (*name == "channels") return ChannelsOf(*value);
+    if (!value) return std::nullopt;
+    if (*name == "channels") {
+      if (!header.channels.empty()) return std::nullopt;
+      header.channels = ChannelsOf(*value);
+    } else if (*name == "dataWindow") {
+      std::array<std::int32_t, 4> box{};  // the least x and y, the greatest x and y
+      if (header.width != 0 || value->size() != sizeof(box)) return std::nullopt;
+      std::memcpy(box.data(), value->data(), sizeof(box));
+      header.width = std::int64_t{box[2]} - box[0] + 1;
+      header.height = std::int64_t{box[3]} - box[1] + 1;
+    }
   }
+  if (header.channels.empty() || header.width < 1 || header.height < 1) return std::nullopt;
+  return header;
 }
 
 }  // namespace tsdfpp

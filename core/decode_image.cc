@@ -1,0 +1,66 @@
+#include "core/decode_image.h"
+
+#include <cstdlib>
+#include <limits>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/files.h"
+#include "core/quiet_stderr.h"
+
+namespace tsdfpp {
+namespace fs = std::filesystem;
+namespace {
+
+// OpenCV looks at this variable when it first meets an EXR file, and refuses the file without it.
+void EnableExr() {
+  static std::once_flag once;
+  std::call_once(once, [] { setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1); });
+}
+
+// Of an EXR image OpenCV reads files only; `path` is where the bytes are from, or empty.
+Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, DecodeAs as,
+                              const HeaderCheck& check, const fs::path& path) {
+  TSDFPP_ASSIGN(const ImageHeader header, ReadImageHeader(bytes, where));
+  if (check) TSDFPP_RETURN_IF_ERROR(check(header, bytes));
+  const int flags = as == DecodeAs::kColour ? cv::IMREAD_COLOR : cv::IMREAD_UNCHANGED;
+  const bool is_exr = header.format == ImageFormat::kExr;
+  cv::Mat image;
+  // What OpenCV counts the bytes with.
+  constexpr auto kMostBytes = static_cast<std::size_t>(std::numeric_limits<int>::max());
+  if (bytes.size() <= kMostBytes && !(is_exr && path.empty())) {
+    if (is_exr) EnableExr();
+    const QuietStderr quiet;
+    try {
+      if (is_exr) {
+        image = cv::imread(path.string(), flags);
+      } else {
+        image = cv::imdecode(
+            cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data())),
+            flags);
+      }
+    } catch (const std::exception&) {  // OpenCV's, and what its codecs throw
+      image.release();
+    }
+  }
+  if (image.empty()) return DataError("{}: cannot be decoded as an image", where);
+  return image;
+}
+
+}  // namespace
+
+Expected<cv::Mat> DecodeImage(std::string_view bytes, const std::string& where, DecodeAs as,
+                              const HeaderCheck& check) {
+  return DecodeBytes(bytes, where, as, check, {});
+}
+
+Expected<cv::Mat> ReadImageFile(const fs::path& path, DecodeAs as, const HeaderCheck& check) {
+  std::error_code code;
+  if (fs::status(path, code).type() == fs::file_type::not_found) {
+    return DataError("{}: no such image", path.string());
+  }
+  TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
+  return DecodeBytes(bytes, path.string(), as, check, path);
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,66 @@
+#include "core/folders.h"
+
+#include <algorithm>
+
+namespace tsdfpp {
+namespace fs = std::filesystem;
+namespace {
+
+Error CannotList(const fs::path& folder, const std::error_code& code) {
+  return {ErrorKind::kData,
+          fmt::format("{}: cannot be read as a folder ({})", folder.string(), code.message())};
+}
+
+}  // namespace
+
+Expected<std::vector<fs::path>> ListFolder(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  std::error_code code;
+  for (fs::directory_iterator at(folder, code), end; !code && at != end; at.increment(code)) {
+    entries.push_back(at->path());
+  }
+  if (code) return tl::unexpected(CannotList(folder, code));
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
+std::vector<fs::path> EntriesOf(const fs::path& folder) {
+  auto entries = ListFolder(folder);
+  return entries ? std::move(*entries) : std::vector<fs::path>();
+}
+
+Expected<std::vector<fs::path>> ListFilesBelow(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code code;
+  for (fs::recursive_directory_iterator at(folder, code), end; !code && at != end;
+       at.increment(code)) {
+    std::error_code ignored;
+    const bool is_link = at->is_symlink(ignored);
+    if (is_link || !at->is_directory(ignored)) files.push_back(at->path());
+  }
+  if (code) return tl::unexpected(CannotList(folder, code));
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+bool IsThere(const fs::path& path) {
+  std::error_code code;
+  return fs::exists(path, code);
+}
+
+bool IsFolder(const fs::path& path) {
+  std::error_code code;
+  return fs::is_directory(path, code);
+}
+
+fs::path AbsolutePath(const fs::path& path) {
+  std::error_code code;
+  const fs::path absolute = fs::absolute(path, code);
+  return code ? path : absolute;
+}
+
+std::string OwnName(const fs::path& folder) {
+  return AbsolutePath(folder / "").lexically_normal().parent_path().filename().string();
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,33 @@
+// The end of the line for exceptions: the project throws none, its libraries do.
+#pragma once
+
+#include <functional>
+#include <string_view>
+#include <type_traits>
+
+#include "core/error.h"
+
+namespace tsdfpp {
+
+// What is being handled, as an error; to be called within catch (...). Memory and files are the
+// environment's (kEnvironment), everything else a fault of the program (kInternal).
+Error ErrorOfException();
+
+// What `function` returns, an Expected, or the error of what it throws.
+template <typename Function>
+std::invoke_result_t<const Function&> Guarded(const Function& function) {
+  try {
+    return function();
+  } catch (...) {
+    return tl::unexpected(ErrorOfException());
+  }
+}
+
+// "<program>: <message>" on stderr: one line without control bytes, under 500 bytes.
+void PrintError(std::string_view program, std::string_view message);
+
+// The whole of a main(): takes the limits from the environment (core/limits.h), runs `body`, which
+// returns the exit code, and turns what is thrown into a sentence and its exit code.
+int GuardedMain(std::string_view program, const std::function<int()>& body);
+
+}  // namespace tsdfpp

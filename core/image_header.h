@@ -1,0 +1,26 @@
+// What an image file says about itself, read from its first bytes, before its pixels are.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace tsdfpp {
+
+enum class ImageFormat { kPng, kJpeg, kExr, kPnm, kTiff, kBmp, kWebp };
+
+struct ImageHeader {
+  ImageFormat format = ImageFormat::kPng;
+  std::int64_t width = 0;  // pixels, 1 or more
+  std::int64_t height = 0;
+  int channels = 0;  // as stored: a palette's is 3
+  int bits = 0;      // of a channel
+};
+
+// By the bytes, not by the file's name. `where` begins the sentence. Errors: kData where the format
+// is none of these, the header is cut short or says something that cannot be, and where the size is
+// over the limits image_side or image_pixels.
+Expected<ImageHeader> ReadImageHeader(std::string_view bytes, std::string_view where);
+
+}  // namespace tsdfpp

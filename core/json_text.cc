@@ -1,0 +1,117 @@
+#include "core/json_text.h"
+
+#include <algorithm>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "core/files.h"
+#include "core/one_line.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kMostShownJson = 100;
+
+// How deep lists and objects lie within one another, whatever else is wrong with the text.
+std::int64_t DepthOf(std::string_view text) {
+  std::int64_t depth = 0;
+  std::int64_t deepest = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') ++i;
+      if (c == '"') in_string = false;
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '[' || c == '{') {
+      deepest = std::max(deepest, ++depth);
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+// What the text holds; discarded where it is no JSON.
+template <typename Json>
+Expected<Json> ParseAs(std::string_view text, std::string_view where) {
+  TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::json_bytes, static_cast<std::int64_t>(text.size()),
+                                    where, "bytes of JSON"));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckLimit(&Limits::nesting, DepthOf(text), where, "lists and objects within one another"));
+  return Json::parse(text, nullptr, false);
+}
+
+template <typename Json>
+Expected<Json> ParseObjectAs(std::string_view text, std::string_view where) {
+  TSDFPP_ASSIGN(Json value, ParseAs<Json>(text, where));
+  if (!value.is_object()) return DataError("{}: not a JSON object", where);
+  return value;
+}
+
+template <typename Json>
+std::string TextOfJson(const Json& value, int indent) {
+  return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+template <typename Json>
+std::optional<std::int64_t> WholeNumberIn(const Json& value, std::int64_t lowest,
+                                          std::int64_t highest) {
+  if (!value.is_number_integer()) return std::nullopt;
+  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  if (value.is_number_unsigned() && value.template get<std::uint64_t>() > kMost) {
+    return std::nullopt;
+  }
+  const auto number = value.template get<std::int64_t>();
+  if (number < lowest || number > highest) return std::nullopt;
+  return number;
+}
+
+}  // namespace
+
+Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view where) {
+  TSDFPP_ASSIGN(nlohmann::json value, ParseAs<nlohmann::json>(text, where));
+  if (value.is_discarded()) return DataError("{}: not JSON", where);
+  return value;
+}
+
+Expected<nlohmann::json> ParseJsonObject(std::string_view text, std::string_view where) {
+  return ParseObjectAs<nlohmann::json>(text, where);
+}
+
+Expected<nlohmann::ordered_json> ParseOrderedJsonObject(std::string_view text,
+                                                        std::string_view where) {
+  return ParseObjectAs<nlohmann::ordered_json>(text, where);
+}
+
+Expected<nlohmann::json> ReadJsonObject(const std::filesystem::path& path) {
+  TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::json_bytes));
+  return ParseJsonObject(text, path.string());
+}
+
+std::string JsonText(const nlohmann::json& value, int indent) { return TextOfJson(value, indent); }
+
+std::string JsonText(const nlohmann::ordered_json& value, int indent) {
+  return TextOfJson(value, indent);
+}
+
+std::string JsonShown(const nlohmann::json& value) {
+  return OneLine(JsonText(value), kMostShownJson);
+}
+
+std::string JsonShown(const nlohmann::ordered_json& value) {
+  return OneLine(JsonText(value), kMostShownJson);
+}
+
+std::optional<std::int64_t> WholeIn(const nlohmann::json& value, std::int64_t lowest,
+                                    std::int64_t highest) {
+  return WholeNumberIn(value, lowest, highest);
+}
+
+std::optional<std::int64_t> WholeIn(const nlohmann::ordered_json& value, std::int64_t lowest,
+                                    std::int64_t highest) {
+  return WholeNumberIn(value, lowest, highest);
+}
+
+}  // namespace tsdfpp

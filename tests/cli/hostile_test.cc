@@ -1,0 +1,193 @@
+// Data that means ill, through the command: one sentence and the right exit code, in time, and
+// nothing outside of the folder that was asked for.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/files.h"
+#include "core/json_text.h"
+#include "core/one_line.h"
+#include "sequence/cofusion_writer.h"
+#include "tests/cli/run_command.h"
+#include "tests/core/temp_folder.h"
+#include "tests/sequence/box_source.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using test::CommandOutput;
+using test::kData;
+using test::kEnvironment;
+using test::kUsage;
+using test::RunTsdfpp;
+using Variables = std::map<std::string, std::string>;
+
+class Hostile : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(folder_ / "set");
+    test::BoxSource source(3);
+    ASSERT_TRUE(
+        WriteCofusion(source, {"0", std::nullopt, "none", "", ""}, folder_ / "set").has_value());
+  }
+
+  // Replaces what stands first in a file of the set.
+  void Spoil(const std::string& file, const std::string& from, const std::string& to) {
+    std::string text = ReadFile(folder_ / "set" / file).value();
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    ASSERT_TRUE(WriteFile(folder_ / "set" / file, text).has_value());
+  }
+
+  CommandOutput Map(const fs::path& set, const std::vector<std::string>& more = {},
+                    const Variables& variables = {}) {
+    std::vector<std::string> arguments{"map", set, "--out", folder_ / "a/b/out", "--voxel", "0.05"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTsdfpp(arguments, folder_.path(), variables);
+  }
+
+  static void ExpectSentence(const CommandOutput& output, int code, const std::string& words) {
+    EXPECT_EQ(output.exit_code, code) << output.err;
+    EXPECT_EQ(output.out, "");
+    EXPECT_NE(output.err.find(words), std::string::npos) << output.err;
+    EXPECT_TRUE(output.err.starts_with("tsdfpp: ")) << output.err;
+    ASSERT_FALSE(output.err.empty());
+    EXPECT_EQ(output.err.back(), '\n');
+    const std::string line = output.err.substr(0, output.err.size() - 1);
+    EXPECT_FALSE(HasControl(line)) << output.err;
+    EXPECT_TRUE(IsUtf8(line));
+    EXPECT_LT(output.err.size(), 500U);
+  }
+
+  // Regular files below the test's folder that lie neither in the set nor in the output.
+  std::vector<std::string> Strangers() const {
+    std::vector<std::string> found;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.path())) {
+      const std::string file = entry.path().lexically_relative(folder_.path()).string();
+      if (!entry.is_regular_file() || file.starts_with("set") || file.starts_with("a/b/out")) {
+        continue;
+      }
+      if (file != "stdout.txt" && file != "stderr.txt") found.push_back(file);
+    }
+    return found;
+  }
+
+  const test::TempFolder folder_;
+};
+
+TEST_F(Hostile, NamesDoNotLeadOutOfTheOutput) {
+  ASSERT_EQ(Map(folder_ / "set").exit_code, 0);
+  for (const char* name : {"../../../pwned", "/tmp/pwned", "..", "a\\nb", "\\u0001", ""}) {
+    SetUp();
+    const std::string json = ReadFile(folder_ / "set/sequence.json").value();
+    const std::size_t at = json.find("\"name\": \"") + 9;
+    Spoil("sequence.json", "\"name\": \"" + json.substr(at, json.find('"', at) - at) + "\"",
+          "\"name\": \"" + std::string(name) + "\"");
+    ExpectSentence(Map(folder_ / "set"), kData, "sequence.json: object 0: the name '");
+    EXPECT_EQ(Strangers(), std::vector<std::string>());
+  }
+}
+
+TEST_F(Hostile, ListedFilesAreInsideAndRegular) {
+  Spoil("sequence.json", "\"calibration.txt\"", "\"/dev/zero\"");
+  ExpectSentence(RunTsdfpp({"verify", folder_ / "set"}, folder_.path()), kData,
+                 "the path '/dev/zero' is absolute");
+  SetUp();
+  const fs::path camera = folder_ / "set/trajectories/gt-cam-0.txt";
+  fs::remove(camera);
+  ASSERT_EQ(mkfifo(camera.c_str(), 0600), 0);
+  ExpectSentence(Map(folder_ / "set"), kData, "gt-cam-0.txt: is a pipe");
+}
+
+TEST_F(Hostile, LinksThatLeadOutAreFollowedIfAsked) {
+  fs::rename(folder_ / "set/colour", folder_ / "elsewhere");
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "set/colour");
+  ExpectSentence(Map(folder_ / "set"), kData, "set/colour: leads by a link to '");
+  const CommandOutput followed = Map(folder_ / "set", {"--follow-links"});
+  EXPECT_EQ(followed.exit_code, 0) << followed.err;
+}
+
+TEST_F(Hostile, DepthAndSizesAreLimited) {
+  Spoil("sequence.json", "\"schema_version\": 2",
+        "\"schema_version\": " + std::string(200'000, '[') + std::string(200'000, ']'));
+  ExpectSentence(Map(folder_ / "set"), kData, "over the limit of 64");
+  SetUp();
+  Spoil("sequence.json", "\"frame_count\": 3", "\"frame_count\": 2147483647");
+  ExpectSentence(Map(folder_ / "set"), kData, "frame_count is 2147483647");
+  SetUp();
+  // A PNG that says it has 30,000 x 30,000 pixels.
+  const std::string side("\x00\x00\x75\x30", 4);
+  std::string png = ReadFile(folder_ / "set/colour/Color0001.png").value_or("");
+  const std::string image = png.empty() ? "colour/Color0000.png" : "colour/Color0001.png";
+  png = ReadFile(folder_ / "set" / image).value();
+  png.replace(16, 8, side + side);
+  ASSERT_TRUE(WriteFile(folder_ / "set" / image, png).has_value());
+  ExpectSentence(Map(folder_ / "set"), kData,
+                 "30000 pixels along a side of the image, over the limit of 16384");
+}
+
+TEST_F(Hostile, LimitsAreSetByTheEnvironment) {
+  ExpectSentence(Map(folder_ / "set", {}, {{"TSDFPP_LIMITS", "frames=2"}}), kData,
+                 "frame_count is 3, expected a whole number from 0 to 2");
+  ExpectSentence(Map(folder_ / "set", {}, {{"TSDFPP_LIMITS", "frame=2"}}), kUsage,
+                 "TSDFPP_LIMITS: 'frame=2' is no name=value");
+  EXPECT_EQ(Map(folder_ / "set", {}, {{"TSDFPP_LIMITS", "frames=3"}}).exit_code, 0);
+}
+
+// A path may hold any byte; what is printed of it is text all the same.
+TEST_F(Hostile, PathsThatAreNoText) {
+  const std::string odd = "b\xff\nc\x1b[31m";
+  fs::rename(folder_ / "set", folder_ / odd);
+  const CommandOutput output = RunTsdfpp(
+      {"map", folder_ / odd, "--out", folder_ / ("out" + odd), "--voxel", "0.05", "--json"},
+      folder_.path());
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_TRUE(IsUtf8(output.out));
+  EXPECT_TRUE(ParseJsonObject(output.out, "stdout").has_value()) << output.out;
+  fs::remove(folder_ / odd / "calibration.txt");
+  const CommandOutput refused = Map(folder_ / odd);
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_FALSE(HasControl(refused.err.substr(0, refused.err.size() - 1))) << refused.err;
+  EXPECT_TRUE(IsUtf8(refused.err));
+}
+
+TEST_F(Hostile, NamesThatAreTooLong) {
+  const std::string longer(300, 'n');
+  ExpectSentence(Map(folder_ / longer), kUsage, "no such scene");
+  for (const char* command : {"verify", "report"}) {
+    const CommandOutput output = RunTsdfpp({command, folder_ / longer}, folder_.path());
+    EXPECT_NE(output.exit_code, 0);
+    EXPECT_LT(output.err.size(), 500U);
+  }
+  const CommandOutput output =
+      RunTsdfpp({"map", folder_ / "set", "--out", folder_ / longer}, folder_.path());
+  ExpectSentence(output, kEnvironment, "the folder cannot be made");
+}
+
+TEST_F(Hostile, PipesThatAreTypedAreRefused) {
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  for (const auto& arguments :
+       {std::vector<std::string>{"metric", "trajectory", folder_ / "pipe", folder_ / "pipe"},
+        {"metric", "surface", (folder_ / "pipe.ply").string(), (folder_ / "pipe.ply").string()},
+        {"map", "--load", folder_ / "pipe", "--out", folder_ / "out"},
+        {"map", folder_ / "set", "--calibration", folder_ / "pipe", "--out", folder_ / "out"}}) {
+    if (arguments[1] == "surface" && !fs::exists(folder_ / "pipe.ply")) {
+      ASSERT_EQ(mkfifo((folder_ / "pipe.ply").c_str(), 0600), 0);
+    }
+    const CommandOutput output = RunTsdfpp(arguments, folder_.path());
+    EXPECT_NE(output.exit_code, 0);
+    EXPECT_NE(output.err.find("is a pipe, expected a regular file"), std::string::npos)
+        << output.err;
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp

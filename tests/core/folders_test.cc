@@ -1,0 +1,70 @@
+#include "core/folders.h"
+
+#include <gtest/gtest.h>
+
+#include "core/files.h"
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TempFolder;
+
+TEST(Folders, EntriesComeInOrder) {
+  const TempFolder folder;
+  for (const char* name : {"b/2", "a", "c", "b/1/x"}) {
+    ASSERT_TRUE(WriteFile(folder / name, "").has_value());
+  }
+  EXPECT_EQ(ListFolder(folder.path()).value(),
+            (std::vector<fs::path>{folder / "a", folder / "b", folder / "c"}));
+  EXPECT_EQ(ListFilesBelow(folder.path()).value(),
+            (std::vector<fs::path>{folder / "a", folder / "b/1/x", folder / "b/2", folder / "c"}));
+}
+
+TEST(Folders, WhatCannotBeReadIsAnErrorOrNone) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "file", "").has_value());
+  const std::string longer(300, 'n');
+  fs::create_symlink("circle", folder / "circle");
+  for (const fs::path& wrong : {folder / "none", folder / "file", folder / longer,
+                                folder / "circle", fs::path(folder / "file" / "below")}) {
+    const auto listed = ListFolder(wrong);
+    ASSERT_FALSE(listed.has_value()) << wrong;
+    EXPECT_EQ(listed.error().kind, ErrorKind::kData);
+    EXPECT_TRUE(
+        listed.error().message.starts_with(wrong.string() + ": cannot be read as a folder ("))
+        << listed.error().message;
+    EXPECT_TRUE(EntriesOf(wrong).empty());
+    EXPECT_FALSE(ListFilesBelow(wrong).has_value());
+    EXPECT_FALSE(IsFolder(wrong));
+  }
+  EXPECT_FALSE(IsThere(folder / longer));
+  EXPECT_FALSE(IsThere(folder / "circle"));
+  // A link that goes round is a file among the others, and nothing is entered twice.
+  fs::create_directory_symlink(folder.path(), folder / "up");
+  EXPECT_EQ(ListFilesBelow(folder.path()).value().size(), 3U);
+}
+
+TEST(Folders, NamesOfAnyPath) {
+  EXPECT_EQ(OwnName("/a/b"), "b");
+  EXPECT_EQ(OwnName("/a/b/"), "b");
+  EXPECT_EQ(OwnName("/a/b/."), "b");
+  EXPECT_EQ(OwnName("."), fs::current_path().filename().string());
+  EXPECT_EQ(AbsolutePath("/a/../b"), "/a/../b");
+  EXPECT_TRUE(AbsolutePath("x").is_absolute());
+}
+
+TEST(Folders, AWorkingFolderThatIsGoneIsNoException) {
+  const TempFolder folder;
+  const fs::path before = fs::current_path();
+  fs::create_directories(folder / "gone");
+  fs::current_path(folder / "gone");
+  fs::remove(folder / "gone");
+  EXPECT_EQ(AbsolutePath("x/y"), "x/y");
+  EXPECT_EQ(OwnName("x"), "x");
+  fs::current_path(before);
+}
+
+}  // namespace
+}  // namespace tsdfpp

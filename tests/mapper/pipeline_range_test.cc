@@ -1,0 +1,141 @@
+// The pipeline refuses what is no frame or lies too far out, and goes on as if it had not been
+// given; it says what it could make nothing of.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+#include "mapper/lattice_range.h"
+#include "mapper/map_file.h"
+#include "mapper/pipeline.h"
+#include "tests/mapper/dyadic_scene.h"
+#include "tests/mapper/every_method.h"
+
+namespace tsdfpp {
+namespace {
+
+Pipeline NewPipeline(Method method, PoseSource poses = PoseSource::kGiven) {
+  PipelineConfig config;
+  config.method = method;
+  config.map = DyadicConfig();
+  config.poses = poses;
+  return {config,
+          {{kBackground, "background", ""},
+           {kBrick, "brick", "toy"},
+           {kBall, "ball", "toy"},
+           {kTray, "tray", "toy"}}};
+}
+
+class PipelineRange : public EveryMethodTest {};
+TSDFPP_FOR_EVERY_METHOD(PipelineRange);
+
+TEST_P(PipelineRange, ARefusedFrameLeavesNoTrace) {
+  Pipeline undisturbed = NewPipeline(GetParam());
+  Pipeline disturbed = NewPipeline(GetParam());
+  const double beyond_m = 1.01 * LatticeRange(kDyadicVoxel_m).reach_m;
+  const std::vector<std::function<void(Frame&)>> faults{
+      [](Frame& f) { f.mask = cv::Mat(); },
+      [](Frame& f) { f.intrinsics = {}; },
+      [](Frame& f) { f.depth = f.depth.rowRange(0, 10); },
+      [&](Frame& f) { f.T_WC.translation().z() = beyond_m; },
+      [&](Frame& f) { f.T_WO.at(kTray).translation().x() = -beyond_m; },
+      [](Frame& f) {
+        f.T_WO.at(kTray).translation().x() = std::numeric_limits<double>::quiet_NaN();
+      },
+      [](Frame& f) { f.T_WC.linear() *= 2; },
+      [](Frame& f) { f.intrinsics.fx = 1e-30; },
+  };
+  for (int i = 0; i < 3; ++i) {
+    const Frame good = DyadicFrame(i);
+    for (std::size_t k = 0; k < faults.size(); ++k) {
+      Frame bad = DyadicFrame(i);
+      faults[k](bad);
+      const auto status = disturbed.Process(bad);
+      ASSERT_FALSE(status.has_value()) << k;
+      EXPECT_EQ(status.error().kind, ErrorKind::kData);
+      EXPECT_TRUE(status.error().message.starts_with(fmt::format("frame {}: ", i)))
+          << status.error().message;
+    }
+    ASSERT_TRUE(disturbed.Process(good).has_value());
+    ASSERT_TRUE(undisturbed.Process(good).has_value());
+    EXPECT_TRUE(MapToBytes(disturbed.map()) == MapToBytes(undisturbed.map())) << i;
+  }
+  EXPECT_EQ(disturbed.trajectories().size(), undisturbed.trajectories().size());
+  for (const auto& [id, poses] : undisturbed.trajectories()) {
+    const auto& others = disturbed.trajectories().at(id);
+    ASSERT_EQ(others.size(), poses.size());
+    for (const auto& [frame, T_WO] : poses) EXPECT_EQ(others.at(frame).matrix(), T_WO.matrix());
+  }
+  EXPECT_TRUE(disturbed.Remarks().empty());
+}
+
+// Poses that the frame brings along are not read.
+TEST_P(PipelineRange, TrackedPosesAreTheOnesThatAreChecked) {
+  Pipeline pipeline = NewPipeline(GetParam(), PoseSource::kIcp);
+  Frame frame = DyadicFrame(0);
+  frame.T_WO.at(kBrick).translation().x() = 1e30;
+  const auto status = pipeline.Process(frame);
+  ASSERT_TRUE(status.has_value()) << status.error().message;
+  frame.T_WC.translation().x() = 1e30;
+  EXPECT_FALSE(pipeline.Process(frame).has_value());
+}
+
+TEST_P(PipelineRange, AMapThatStaysEmptyIsSaidWithTheCounts) {
+  const auto remark_after = [](const std::function<void(Frame&)>& change) {
+    Pipeline pipeline = NewPipeline(GetParam());
+    for (int i = 0; i < 2; ++i) {
+      Frame frame = DyadicFrame(i);
+      frame.depth.setTo(0.5);
+      change(frame);
+      EXPECT_TRUE(pipeline.Process(frame).has_value());
+    }
+    const std::vector<std::string> remarks = pipeline.Remarks();
+    return remarks.empty() ? std::string() : remarks.front();
+  };
+  EXPECT_EQ(remark_after([](Frame&) {}), "");
+  // Millimetres for metres, an empty sensor, a mask without objects.
+  EXPECT_EQ(
+      remark_after([](Frame& f) { f.depth.setTo(700); }),
+      "the map is empty: of 13824 pixels in 2 frames 13824 have a depth, 0 of them within 100 "
+      "m and 0 of those a label");
+  EXPECT_EQ(remark_after([](Frame& f) { f.depth.setTo(0); }),
+            "the map is empty: of 13824 pixels in 2 frames 0 have a depth, 0 of them within 100 m "
+            "and 0 of those a label");
+  EXPECT_EQ(remark_after([](Frame& f) {
+              f.depth.at<float>(0, 0) = std::numeric_limits<float>::infinity();
+              f.depth.at<float>(0, 1) = std::numeric_limits<float>::quiet_NaN();
+              f.depth.at<float>(0, 2) = -1;
+              f.depth.at<float>(0, 3) = 101;
+              f.mask.setTo(kNoInstance);
+            }),
+            "the map is empty: of 13824 pixels in 2 frames 13818 have a depth, 13816 of them "
+            "within 100 m and 0 of those a label");
+  const std::vector<std::string> unused = NewPipeline(GetParam()).Remarks();
+  ASSERT_EQ(unused.size(), 1U);
+  EXPECT_EQ(unused[0], "the map is empty: no frame was mapped");
+}
+
+TEST(PipelineRemarks, RoundingIsSaidFarFromTheOrigin) {
+  const auto remarks_at = [](int blocks) {
+    Pipeline pipeline = NewPipeline(Method::kTsdfpp);
+    EXPECT_TRUE(pipeline.Process(Shifted(DyadicFrame(0), {0, blocks, 0})).has_value());
+    return pipeline.Remarks();
+  };
+  EXPECT_TRUE(remarks_at((1 << 17) - 8).empty());
+  const std::vector<std::string> far = remarks_at(1 << 18);
+  ASSERT_EQ(far.size(), 1U);
+  EXPECT_NE(far[0].find("16384 m from the origin along an axis"), std::string::npos) << far[0];
+  EXPECT_NE(far[0].find("0.12 voxels"), std::string::npos) << far[0];
+}
+
+// A map that was loaded is not empty.
+TEST(PipelineRemarks, ALoadedMapCounts) {
+  PipelineConfig config;
+  config.map = DyadicConfig();
+  config.method = Method::kTsdfppAnchored;
+  const Pipeline loaded(config, {}, DyadicMap(config.method, 1), {});
+  EXPECT_TRUE(loaded.Remarks().empty());
+}
+
+}  // namespace
+}  // namespace tsdfpp
