@@ -63,6 +63,7 @@ left_out+=':*RandomRenames*/1?:*RandomRenames*/2?'
 if [ "$preset" = tsan ]; then
   left_out+=':BlockGrid*:HalfTest*:*Invariants*:MapFileErrors*:*EveryFlippedByte*:*EveryTruncation*:*MadeUp*:MeshCache*'
   left_out+=':*EveryMethod.Instruction*:*RayCast.Sees*:*RandomRenames*:*OnlyBlocksThat*:*OfABall*:*DropsWhatAnother*'
+  left_out+=':*LatticeEdge*:*MapSymmetries*:*LatticeRange*:*PipelineRange*'
   left_out+=':*KeptScene*/tsdf:*KeptScene*/tsdf_min:*KeptScene*/tsdf_guarded:*KeptScene*/tsdf_static:*KeptScene*/tsdf__:*KeptScene*/tsdf___literal:*KeptScene*/volumes'
 fi
 export RC_PARAMS="max_success=5 seed=20211" GTEST_TOTAL_SHARDS=2 GTEST_BRIEF=1

@@ -113,19 +113,19 @@ std::vector<std::string> With(std::vector<std::string> words,
 }
 
 TEST_F(KilledCommands, Map) {
-  Strike(With(map_, {"--mesh-format", "glb", "--views", "1", "--until", "2"}), map_, "kill", 4, 12);
+  Strike(With(map_, {"--mesh-format", "glb", "--views", "1", "--until", "2"}), map_, "kill", 3, 9);
 }
 
 TEST_F(KilledCommands, MapOnAFullDisk) {
-  Strike(With(map_, {"--mesh-format", "glb"}), map_, "ENOSPC", 4, 4);
+  Strike(With(map_, {"--mesh-format", "glb"}), map_, "ENOSPC", 3, 2);
 }
 
 TEST_F(KilledCommands, Compare) {
-  Strike(With(compare_, {"--keep-meshes", "--record"}), compare_, "kill", 2, 6);
+  Strike(With(compare_, {"--keep-meshes", "--record"}), compare_, "kill", 1, 4);
 }
 
 TEST_F(KilledCommands, CompareOnAFullDisk) {
-  Strike(With(compare_, {"--keep-meshes"}), compare_, "ENOSPC", 2, 2);
+  Strike(With(compare_, {"--keep-meshes"}), compare_, "ENOSPC", 2, 1);
 }
 
 // One that was killed while its files moved is refused, and says what to do.
