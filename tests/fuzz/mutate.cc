@@ -317,8 +317,8 @@ std::string Mutator::ChangeKlg(const std::string& bytes) {
       break;
     case 3:
       frames.push_back(frames[which]);
-      frames.back().time_us = static_cast<std::int64_t>(
-          static_cast<std::uint64_t>(frames.back().time_us) + 33'333);
+      frames.back().time_us =
+          static_cast<std::int64_t>(static_cast<std::uint64_t>(frames.back().time_us) + 33'333);
       count = static_cast<std::int32_t>(frames.size());
       break;
     default:

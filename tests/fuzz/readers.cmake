@@ -120,16 +120,18 @@ function(tsdfpp_add_readers target)
   if(NOT ARG_STAND_IN)
     list(APPEND core decode_image.cc)
   endif()
-  # Files of a room are compiled together, some at once; the mapper's one by one, as it has them itself.
-  set(together 6)
+  # Files are compiled together as the rooms have it, four that follow one another; the mapper's one by one, as there.
   foreach(room core sequence sim eval metrics cli mapper)
-    set(index 0)
+    file(
+      GLOB all
+      RELATIVE ${PROJECT_SOURCE_DIR}/${room}
+      ${PROJECT_SOURCE_DIR}/${room}/*.cc)
     foreach(source ${${room}})
       set(file ${PROJECT_SOURCE_DIR}/${room}/${source})
       target_sources(${target} PRIVATE ${file})
-      math(EXPR group "${index} / ${together}")
-      math(EXPR index "${index} + 1")
-      if(room STREQUAL mapper)
+      list(FIND all ${source} index)
+      math(EXPR group "${index} / 4")
+      if("${room}" STREQUAL "mapper")
         set_source_files_properties(${file} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
       else()
         set_source_files_properties(${file} PROPERTIES UNITY_GROUP readers_${room}_${group})
