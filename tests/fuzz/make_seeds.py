@@ -414,10 +414,10 @@ class = "toy"
 model = "ball"
 x = -0.2
 y = 0.1
-[[object.key]]
+[[object.keyframe]]
 frame = 1
 position = [-0.2, 0.1, 0.8]
-[[object.key]]
+[[object.keyframe]]
 frame = 20
 position = [-0.2, 0.3, 0.9]
 [experiment]
@@ -466,15 +466,15 @@ metric = "table_preservation_behind_other"
 where = { method = "tsdf++", profile = "close" }
 against = { method = "tsdf" }
 min = 0.1
+confidence = 1
 why = "It is better."
 [[gate]]
 name = "as-before"
 experiment = "mini"
 metric = "visible_completion"
 where = { method = "tsdf++", profile = "close" }
-reference = true
-min = -0.01
-max = 0.01
+tolerance = 0.01
+confidence = 1
 why = "It was so."
 """
 

@@ -1,7 +1,7 @@
-# tsdfpp_add_readers(<target> [WITHOUT_MAPPER] [STAND_IN]): gives the target the fuzz targets (tests/fuzz/targets*.cc)
+# tsdfpp_add_readers(<target> [WITHOUT_MAPS] [STAND_IN]): gives the target the fuzz targets (tests/fuzz/targets*.cc)
 # and the sources of all readers that they call, without the rooms' other sources, which take long to build. What those
 # call beyond is not linked, because sections that nothing reaches are left out.
-# WITHOUT_MAPPER: the target has the mapper's and core's own sources already. STAND_IN: images are not decoded by OpenCV's
+# WITHOUT_MAPS: all fuzz targets but that of saved maps, which needs the whole mapper. STAND_IN: images are not decoded by OpenCV's
 # codecs (decode_image_stand_in.cc).
 set(fuzz_folder ${CMAKE_CURRENT_LIST_DIR})
 find_package(MuJoCo 3 REQUIRED) # its headers
@@ -12,7 +12,7 @@ find_package(ZLIB REQUIRED QUIET)
 find_library(TSDFPP_LIBDEFLATE deflate REQUIRED)
 
 function(tsdfpp_add_readers target)
-  cmake_parse_arguments(ARG "WITHOUT_MAPPER;STAND_IN" "" "" ${ARGN})
+  cmake_parse_arguments(ARG "WITHOUT_MAPS;STAND_IN" "" "" ${ARGN})
   set(core
       data_folder.cc
       exr_header.cc
@@ -109,11 +109,12 @@ function(tsdfpp_add_readers target)
       sweep_settings.cc)
   set(metrics segmentation.cc statistics.cc tracking_quality.cc)
   set(cli command.cc metric.cc metric_panoptic.cc)
-  set(mapper)
-  if(ARG_WITHOUT_MAPPER)
-    list(REMOVE_ITEM core files.cc limits.cc one_line.cc plain_name.cc toml_reader.cc)
-    set(mapper pipeline.cc)
+  set(targets configs meshes results sequences text)
+  if(ARG_WITHOUT_MAPS)
+    set(mapper map_config.cc pipeline.cc)
+    target_compile_definitions(${target} PRIVATE TSDFPP_FUZZ_MAPS=0)
   else()
+    list(APPEND targets map)
     file(GLOB mapper RELATIVE ${PROJECT_SOURCE_DIR}/mapper ${PROJECT_SOURCE_DIR}/mapper/*.cc)
     list(REMOVE_ITEM mapper icp_tracker.cc)
   endif()
@@ -138,8 +139,8 @@ function(tsdfpp_add_readers target)
       endif()
     endforeach()
   endforeach()
-  set(sources complaint.cc file_set.cc targets.cc targets_configs.cc targets_map.cc targets_meshes.cc targets_results.cc
-              targets_sequences.cc targets_text.cc)
+  list(TRANSFORM targets REPLACE "(.+)" "targets_\\1.cc" OUTPUT_VARIABLE sources)
+  list(APPEND sources complaint.cc file_set.cc targets.cc)
   if(ARG_STAND_IN)
     list(APPEND sources decode_image_stand_in.cc)
   endif()
