@@ -107,7 +107,7 @@ def cofusion(with_json):
         files["depth_original/Depth%04d.exr" % i] = depth_exr()
         files["mask_id/Mask%04d.png" % i] = MASK
         cam += "%d 0.0%d 0 0 0 0 0 1\n" % (i, i)
-        toy += "%d 0 0 0.8 0 0 0 1\n" % i
+        toy += "%d %.2f 0 0.8 0 0 %.1f %.3f\n" % (i, 0.05 * i, 0.1 * (i - 1), 1 - 0.005 * (i - 1))
     files["trajectories/gt-cam-0.txt"] = cam
     files["trajectories/gt-toy-1.txt"] = toy
     if with_json:
