@@ -519,15 +519,26 @@ def configs():
 
 
 def recording():
-    mesh = {"id": 1, "vertices": 3, "triangles": 1, "vertex_bytes": [0, 18], "index_bytes": [18, 6]}
-    chunk = dict(mesh, layer="visible")
-    keys = [{"frame": f, "colour": [0, 4], "depth": [4, 4], "mask": [8, 4]} for f in (1, 5, 9)]
-    run_keys = [{"frame": f, "picture": [0, 9], "picture_after": [9, 9], "chunks": [chunk]} for f in (1, 5, 9)]
-    return {"schema": 1, "sequence": "toys", "error_step_m": 0.001, "age_step_frames": 1, "depth_range_m": [0.5, 2.5],
-            "grid": {"origin_m": [0, 0, 0], "step_m": 0.001}, "intrinsics": {"width": 4, "height": 3},
-            "objects": [{"id": 1, "name": "toy", "removed": True, "colour": [1, 2, 3]}],
-            "frames": [{"frame": 1, "T_WC": [0, 0, 0, 0, 0, 0, 1], "T_WO": {"1": [0, 0, 0, 0, 0, 0, 1]}}],
-            "truth": [mesh], "key_frames": keys, "stills": [1, 5], "runs": [{"folder": "tsdf", "key_frames": run_keys}]}
+    end = 0
+
+    def place(length):
+        nonlocal end
+        end += length
+        return [end - length, length]
+
+    def mesh(**more):
+        return {"id": 1, "vertices": 3, "triangles": 1, "vertex_bytes": place(18), "index_bytes": place(6), **more}
+
+    keys = [{"frame": f, "colour": place(4), "depth": place(4), "mask": place(4)} for f in (1, 5, 9)]
+    run_keys = [{"frame": f, "picture": place(9), "picture_after": place(9), "chunks": [mesh(layer="visible")]}
+                for f in (1, 5, 9)]
+    record = {
+        "schema": 1, "sequence": "toys", "error_step_m": 0.001, "age_step_frames": 1, "depth_range_m": [0.5, 2.5],
+        "grid": {"origin_m": [0, 0, 0], "step_m": 0.001}, "intrinsics": {"width": 4, "height": 3},
+        "objects": [{"id": 1, "name": "toy", "removed": True, "colour": [1, 2, 3]}],
+        "frames": [{"frame": 1, "T_WC": [0, 0, 0, 0, 0, 0, 1], "T_WO": {"1": [0, 0, 0, 0, 0, 0, 1]}}],
+        "truth": [mesh()], "key_frames": keys, "stills": [1, 5], "runs": [{"folder": "tsdf", "key_frames": run_keys}]}
+    return {"record/record.json": json.dumps(record), "record/record.bin": bytes(i % 256 for i in range(end))}
 
 
 def gate_results():
@@ -578,7 +589,7 @@ def cell():
 
 def results():
     save("cell", "good", json.dumps(cell()))
-    save("recording", "good", packed({"record/record.json": json.dumps(recording()), "record/record.bin": bytes(range(24))}))
+    save("recording", "good", packed(recording()))
     note = {"schema": 1, "generator": "tsdfpp", "command": "tsdfpp map", "run": "0123456789abcdef",
             "files": [{"name": "summary.json", "bytes": 2}, {"name": "mesh/scene.ply", "bytes": None}]}
     save("run_note", "good", packed({"run.json": json.dumps(note), "summary.json": "{}", "mesh/scene.ply": "ply"}))
