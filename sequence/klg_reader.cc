@@ -143,9 +143,9 @@ class KlgSource : public DatasetSource {
     info_.intrinsics = camera;
     // Images have no headers here: their size is the camera's.
     TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::image_side, std::max(camera.width, camera.height),
-                                      size_source_, "pixels along a side of the image"));
+                                      file_.string(), "pixels along a side of the image"));
     TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::image_pixels,
-                                      std::int64_t{camera.width} * camera.height, size_source_,
+                                      std::int64_t{camera.width} * camera.height, file_.string(),
                                       "pixels in the image"));
     return CheckCamera(camera, file_.string());
   }
