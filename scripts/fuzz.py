@@ -22,7 +22,7 @@ SUMS = ("seconds", "executions", "finds")
 def targets_of(lines_program):
     """The files of each target, as the program knows them."""
     said = subprocess.run([lines_program, "--sources"], check=True, capture_output=True, text=True).stdout
-    return {words[0]: words[2:] for words in map(str.split, said.splitlines())}
+    return {words[0]: words[1:] for words in map(str.split, said.splitlines())}
 
 
 def add_runs(folder, entry):

@@ -16,7 +16,6 @@ using namespace tsdfpp;
 int List(bool with_sources) {
   for (const fuzz::Target& target : fuzz::AllTargets()) {
     std::string line(target.name);
-    line += " " + std::to_string(target.most_bytes);
     if (with_sources) {
       for (const std::string_view source : target.sources) line += " " + std::string(source);
     }

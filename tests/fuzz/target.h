@@ -17,7 +17,6 @@ struct Target {
   bool (*read)(std::string_view input);
   // Whose lines the coverage of the target is of, relative to the repository.
   std::vector<std::string_view> sources;
-  int most_bytes = 16384;  // of an input
 };
 
 // All, by name.

@@ -95,14 +95,12 @@ void AddConfigTargets(std::vector<Target>& targets) {
                      ReadScene,
                      {"sim/scene_config.cc", "sim/scene_object_config.cc", "sim/scene_readers.cc",
                       "sim/camera_config.cc", "sim/sensor_config.cc", "sim/light_rig.cc",
-                      "sim/random_scene_config.cc", "sim/scene_inputs.cc", "sim/scene_toml.cc"},
-                     32768});
+                      "sim/random_scene_config.cc", "sim/scene_inputs.cc", "sim/scene_toml.cc"}});
   targets.push_back({"experiment",
                      "experiment.toml",
                      ReadExperiment,
                      {"eval/experiment.cc", "eval/sweep_settings.cc"}});
-  targets.push_back(
-      {"gates", "", ReadGates, {"eval/gate_config.cc", "eval/gate_reference.cc"}, 32768});
+  targets.push_back({"gates", "", ReadGates, {"eval/gate_config.cc", "eval/gate_reference.cc"}});
   targets.push_back({"adapter", "adapter.toml", ReadAdapterInput, {"eval/adapter.cc"}});
   targets.push_back({"bench_set", "", ReadBenchSet, {"eval/bench_set.cc"}});
 }

@@ -40,8 +40,7 @@ void AddMapTargets(std::vector<Target>& targets) {
                      kWhere,
                      ReadMap,
                      {"mapper/map_file.cc", "mapper/section_file.cc", "mapper/volume_store.cc",
-                      "mapper/map_store.cc"},
-                     65536});
+                      "mapper/map_store.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

@@ -122,11 +122,8 @@ void AddMeshTargets(std::vector<Target>& targets) {
   targets.push_back(
       {"obj", "", ReadObjInput, {"sim/obj_reader.cc", "sim/mesh_import.cc", "sim/mesh_repair.cc"}});
   targets.push_back({"stl", "mesh.stl", ReadStlInput, {"sim/stl_reader.cc"}});
-  targets.push_back({"gltf",
-                     "scene.glb",
-                     ReadGltfInput,
-                     {"core/gltf_document.cc", "core/gltf_reader.cc"},
-                     32768});
+  targets.push_back(
+      {"gltf", "scene.glb", ReadGltfInput, {"core/gltf_document.cc", "core/gltf_reader.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

@@ -121,8 +121,7 @@ void AddSequenceTargets(std::vector<Target>& targets) {
                      "",
                      ReadSet<DatasetFormat::kCofusion>,
                      {"sequence/cofusion_reader.cc", "sequence/cofusion_layout.cc",
-                      "sequence/calibration.cc", "sequence/trajectory_file.cc"},
-                     32768});
+                      "sequence/calibration.cc", "sequence/trajectory_file.cc"}});
   targets.push_back({"tum",
                      "",
                      ReadSet<DatasetFormat::kTum>,
@@ -132,8 +131,7 @@ void AddSequenceTargets(std::vector<Target>& targets) {
       {"bop",
        "",
        ReadSet<DatasetFormat::kBop>,
-       {"sequence/bop_reader.cc", "sequence/bop_instances.cc", "sequence/pose_matrix.cc"},
-       32768});
+       {"sequence/bop_reader.cc", "sequence/bop_instances.cc", "sequence/pose_matrix.cc"}});
   targets.push_back({"klg",
                      "",
                      ReadSet<DatasetFormat::kKlg>,
