@@ -71,7 +71,7 @@ std::vector<std::string_view> Names() {
   return names;
 }
 INSTANTIATE_TEST_SUITE_P(Targets, FuzzReplay, testing::ValuesIn(Names()),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& target) { return std::string(target.param); });
 
 TEST(FuzzTargets, EveryCorpusAndEverySourceIsThere) {
   const fs::path root = TSDFPP_SOURCE_DIR;

@@ -6,17 +6,17 @@
 namespace tsdfpp::fuzz {
 namespace {
 
-constexpr const char* kWhere = "map.tsdf";
+constexpr const char* kMapFile = "map.tsdf";
 
 bool ReadMap(std::string_view input) {
-  const auto loaded = MapFromBytes(input, kWhere);
-  if (!Accepted(loaded, kWhere)) return false;
+  const auto loaded = MapFromBytes(input, kMapFile);
+  if (!Accepted(loaded, kMapFile)) return false;
   const MapRepresentation& map = *loaded->map;
   const auto fault = map.FindFault();
   Require(!fault, "a map with a fault: " + fault.value_or(""));
   const MappedRun* const run = loaded->run ? &*loaded->run : nullptr;
   const std::string bytes = MapToBytes(map, run);
-  const auto again = MapFromBytes(bytes, kWhere);
+  const auto again = MapFromBytes(bytes, kMapFile);
   Require(again.has_value(), again ? "" : "what was saved is refused: " + again.error().message);
   Require(MapToBytes(*again->map, run) == bytes, "what was saved is loaded as something else");
   // What `tsdfpp map --from` and `evaluate` do first.
@@ -37,7 +37,7 @@ bool ReadMap(std::string_view input) {
 
 void AddMapTargets(std::vector<Target>& targets) {
   targets.push_back({"map",
-                     kWhere,
+                     kMapFile,
                      ReadMap,
                      {"mapper/map_file.cc", "mapper/section_file.cc", "mapper/volume_store.cc",
                       "mapper/map_store.cc"}});
