@@ -380,8 +380,8 @@ rotation_deg = 0.2
 [room]
 table = true
 furniture = true
-half_x = 2.0
-half_y = 2.0
+half_x = 2.4
+half_y = 2.2
 height = 2.6
 [physics]
 timestep_s = 0.001

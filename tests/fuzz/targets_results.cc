@@ -1,5 +1,6 @@
 // What our own commands left and later ones read, and COCO's annotations.
 #include <CLI/CLI.hpp>
+#include <optional>
 
 #include "cli/metric.h"
 #include "core/json_text.h"
@@ -22,7 +23,7 @@ bool ReadRecord(std::string_view input) {
   if (!Accepted(recording) || !*recording) return false;
   // As the report's page thins it out.
   for (std::vector<int> frames = (*recording)->KeyFrames(); frames.size() >= 2;) {
-    (*recording)->DropKeyFrame((*recording)->LeastKeyFrame(frames.front()));
+    (*recording)->DropKeyFrame((*recording)->LeastKeyFrame(std::nullopt));
     const std::vector<int> left = (*recording)->KeyFrames();
     Require(left.size() < frames.size(), "a key frame that cannot be dropped");
     frames = left;
