@@ -90,8 +90,8 @@ function(tsdfpp_add_readers target)
       bench_set.cc
       cell.cc
       compare_names.cc
-      evaluation.cc
       evaluation_columns.cc
+      evaluation_json.cc
       experiment.cc
       folder_lock.cc
       gate_config.cc
@@ -150,7 +150,7 @@ function(tsdfpp_add_readers target)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_definitions(${target} PRIVATE TSDFPP_VERSION="${PROJECT_VERSION}")
   target_compile_options(${target} PRIVATE -ffunction-sections -fdata-sections)
-  target_link_options(${target} PRIVATE -Wl,--gc-sections)
+  target_link_options(${target} PRIVATE -Wl,--gc-sections,-z,start-stop-gc)
   target_link_libraries(
     ${target}
     PRIVATE CLI11::CLI11
