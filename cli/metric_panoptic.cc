@@ -60,12 +60,18 @@ int IdOf(const nlohmann::json& json) {
   return static_cast<int>(*id);
 }
 
+// 0 or 1, also as false or true. Throws where it is neither number nor one of these.
+bool IsFlagged(const nlohmann::json& object, const char* key, int otherwise) {
+  const nlohmann::json flag = object.value(key, nlohmann::json(otherwise));
+  return flag.is_boolean() ? flag.get<bool>() : IdOf(flag) == 1;
+}
+
 Expected<Annotations> ReadAnnotations(const fs::path& path) {
   TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   Annotations out;
   try {
     for (const auto& category : json.value("categories", nlohmann::json::array())) {
-      out.is_thing[IdOf(category.at("id"))] = category.value("isthing", 1) == 1;
+      out.is_thing[IdOf(category.at("id"))] = IsFlagged(category, "isthing", 1);
     }
     for (const auto& annotation : json.at("annotations")) {
       const std::string file = annotation.at("file_name");
@@ -75,7 +81,7 @@ Expected<Annotations> ReadAnnotations(const fs::path& path) {
       out.file_of_id[id] = file;
       for (const auto& info : annotation.at("segments_info")) {
         segments.push_back(
-            {IdOf(info.at("id")), IdOf(info.at("category_id")), info.value("iscrowd", 0) == 1});
+            {IdOf(info.at("id")), IdOf(info.at("category_id")), IsFlagged(info, "iscrowd", 0)});
       }
     }
   } catch (const std::exception& error) {

@@ -331,7 +331,9 @@ Expected<Parsed> Parse(const std::filesystem::path& path) {
         "{}: the file ends, or holds something unreadable, before its header's counts are "
         "reached",
         file);
+  // Of several elements called so, some may lack what others have.
   if (parsed.mesh.colours.size() != parsed.mesh.vertices.size()) parsed.mesh.colours.clear();
+  if (parsed.mesh.face_ids.size() != parsed.mesh.triangles.size()) parsed.mesh.face_ids.clear();
   for (const Eigen::Vector3f& vertex : parsed.mesh.vertices) {
     if (!vertex.allFinite()) return DataError("{}: a vertex has no finite x, y, z", file);
   }

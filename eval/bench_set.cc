@@ -225,7 +225,7 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
     const json& hardware = root.at("hardware");
     result.hardware =
         fmt::format("{}, {} cores, {} GB, GPU: {}", hardware.at("cpu").get<std::string>(),
-                    hardware.at("cores").get<int>(), hardware.at("memory_gb").get<double>(),
+                    hardware.at("cores").get<double>(), hardware.at("memory_gb").get<double>(),
                     hardware.at("gpu").get<std::string>());
     for (const json& entry : root.at("entries")) {
       auto& scores = result.scores[entry.at("sequence").get<std::string>()];

@@ -1,5 +1,8 @@
 #include "eval/cell.h"
 
+#include <limits>
+#include <stdexcept>
+
 #include "core/files.h"
 #include "core/json_text.h"
 #include "core/pose_text.h"
@@ -36,6 +39,19 @@ std::vector<Measured> FromNamed(const nlohmann::json& named, std::size_t count) 
                                        : Measured::Undefined(value.at("why")));
   }
   return values;
+}
+
+// Throws where it is none: nlohmann's own conversion wraps what does not fit.
+int FrameOf(const nlohmann::json& json) {
+  const auto frame = WholeIn(json, 0, std::numeric_limits<int>::max());
+  if (!frame) throw std::out_of_range(fmt::format("{} is no frame", JsonShown(json)));
+  return static_cast<int>(*frame);
+}
+
+InstanceId ObjectOf(const nlohmann::json& json) {
+  const auto id = WholeIn(json, 0, kNoInstance);
+  if (!id) throw std::out_of_range(fmt::format("{} is no object", JsonShown(json)));
+  return static_cast<InstanceId>(*id);
 }
 
 }  // namespace
@@ -101,13 +117,13 @@ Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
     }
     CellResult result;
     for (const nlohmann::json& entry : json.at("frames")) {
-      result.frames.push_back({entry.at("frame"), entry.at("examined"),
+      result.frames.push_back({FrameOf(entry.at("frame")), entry.at("examined"),
                                FromNamed(entry.at("scores"), EvaluationMetricCount()),
                                entry.at("map_digest")});
     }
     result.examined = FromNamed(json.at("examined"), SweepMetrics().size());
     result.evaluation = json.at("evaluation");
-    result.removed = json.at("removed").get<std::vector<InstanceId>>();
+    for (const nlohmann::json& id : json.at("removed")) result.removed.push_back(ObjectOf(id));
     const nlohmann::json& times = json.at("times");
     result.times = times.at("steps");
     result.frame_ms = times.at("frame_ms").get<std::vector<double>>();

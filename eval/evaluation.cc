@@ -275,11 +275,6 @@ Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
   return result;
 }
 
-nlohmann::json ToJson(const Measured& measured) {
-  if (measured.value) return *measured.value;
-  return {{"value", nullptr}, {"why", measured.why_not}};
-}
-
 namespace {
 
 nlohmann::json ToJson(const DistanceSummary& summary) {

@@ -9,6 +9,8 @@
 namespace tsdfpp {
 namespace {
 
+constexpr std::size_t kMostCells = 100'000;
+
 bool Has(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
@@ -176,6 +178,16 @@ std::vector<CellSettings> AllCombinations(const ExperimentGrid& grid) {
   return made;
 }
 
+// How many cells AllCombinations() makes, or any number above the most.
+std::size_t CountCombinations(const ExperimentGrid& grid) {
+  std::size_t count = 1;
+  for (const auto& [axis, values] : grid.values) {
+    count *= values.size();
+    if (count > kMostCells) break;
+  }
+  return count;
+}
+
 // Whether the cell has, of each axis named, one of the values.
 bool Fits(const CellSettings& settings, const ExperimentGrid::Values& values) {
   return std::all_of(values.begin(), values.end(), [&](const auto& named) {
@@ -210,7 +222,16 @@ void CheckTogether(TomlReader& reader, const ExperimentConfig& config) {
     reader.Fault("baseline", known.error().message);
     return;
   }
+  std::size_t cells = 0;
   for (const ExperimentGrid& grid : config.grids) {
+    // Axes multiply: a short file can ask for more cells than memory holds.
+    cells += CountCombinations(grid);
+    if (cells > kMostCells) {
+      reader.Fault("grid",
+                   fmt::format("'{}' brings the cells to more than {}, expected that at most",
+                               grid.name, kMostCells));
+      return;
+    }
     const auto methods = grid.values.find("method");
     const auto scenes = grid.values.find("scene");
     if (methods == grid.values.end() || scenes == grid.values.end()) {

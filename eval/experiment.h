@@ -58,7 +58,8 @@ struct ExperimentConfig {
   std::optional<PlotPlan> plot;
 
   // Errors: kUsage, one sentence with file, line and key: an unknown key, metric, axis or method, a
-  // value that is impossible, twice there or of the wrong type.
+  // value that is impossible, twice there or of the wrong type, more than 100,000 cells before
+  // exceptions.
   static Expected<ExperimentConfig> Load(const std::filesystem::path& file);
   static Expected<ExperimentConfig> Parse(std::string_view text, const std::filesystem::path& file);
 };

@@ -79,8 +79,9 @@ Expected<References> LoadReferences(const std::filesystem::path& file) {
   }
   const nlohmann::json& json = *read;
   try {
-    if (const int schema = json.at("schema"); schema != kReferencesSchema) {
-      return DataError("{}: has schema {}, expected {}", file.string(), schema, kReferencesSchema);
+    if (const nlohmann::json& schema = json.at("schema"); schema != kReferencesSchema) {
+      return DataError("{}: has schema {}, expected {}", file.string(), JsonShown(schema),
+                       kReferencesSchema);
     }
     References references;
     for (const auto& [gate, entry] : json.at("gates").items()) {

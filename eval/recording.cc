@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "core/files.h"
 #include "core/folders.h"
@@ -11,6 +12,11 @@ namespace tsdfpp {
 namespace {
 
 using nlohmann::json;
+
+// A number that stays itself as an int, and of which differences can be taken.
+bool IsFrame(const json& number) {
+  return WholeIn(number, 0, std::numeric_limits<int>::max()).has_value();
+}
 
 // Calls `visit` for each place [offset, length] in `bytes` that the recording names. False where a
 // part that should hold places has another form.
@@ -33,7 +39,7 @@ bool ForEachPlace(json& recording, const std::function<bool(json&)>& visit) {
     return mesh(part) && part.contains("layer") && part["layer"].is_string();
   };
   const auto numbered = [](const json& part) {
-    return part.is_object() && part.contains("frame") && part["frame"].is_number_integer();
+    return part.is_object() && part.contains("frame") && IsFrame(part["frame"]);
   };
   return all(recording["truth"], mesh) &&
          all(recording["key_frames"],
@@ -78,7 +84,7 @@ bool HasForm(const json& recording) {
            NumbersOfLength(object.value("colour", json()), 3);
   };
   const auto frame_has_form = [](const json& frame) {
-    return frame.is_object() && frame.value("frame", json()).is_number_integer() &&
+    return frame.is_object() && IsFrame(frame.value("frame", json())) &&
            NumbersOfLength(frame.value("T_WC", json()), 7) &&
            frame.value("T_WO", json()).is_object();
   };
@@ -145,18 +151,21 @@ Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& fo
     return DataError("{} lacks something that docs/report.md names", path.string());
   }
   std::string outside;
+  std::size_t named = 0;
   const bool complete = ForEachPlace(recording.json, [&](json& place) {
     const auto range = PlaceOf(place);
     if (range && range->first <= recording.bytes.size() &&
         range->second <= recording.bytes.size() - range->first) {
-      return true;
+      named += range->second;
+      // Each byte has one place; else a short file could name more than memory holds.
+      if (named <= recording.bytes.size()) return true;
     }
     outside = JsonShown(place);
     return false;
   });
   if (!outside.empty()) {
-    return DataError("{}: {} is no offset and length in the {} bytes of record.bin", path.string(),
-                     outside, recording.bytes.size());
+    return DataError("{}: {} is no offset and length of its own in the {} bytes of record.bin",
+                     path.string(), outside, recording.bytes.size());
   }
   if (!complete) {
     return DataError("{} lacks something that docs/report.md names", path.string());

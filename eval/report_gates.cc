@@ -73,7 +73,9 @@ Expected<json> ReadGateResults(const std::filesystem::path& file) {
   TSDFPP_RETURN_IF_ERROR(Check(results, file.string()));
   json pictures = json::object();
   for (const json& gate : results["gates"]) {
-    const std::string name = gate.value(json::json_pointer("/explanation/picture"), "");
+    const json explanation = gate.value("explanation", json());
+    const json picture = explanation.is_object() ? explanation.value("picture", json()) : json();
+    const std::string name = picture.is_string() ? picture.get<std::string>() : "";
     // A file of that folder and no other.
     if (name.empty() || std::filesystem::path(name).filename() != name) continue;
     if (const auto bytes = ReadFile(file.parent_path() / kGatePictures / name)) {

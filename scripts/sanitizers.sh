@@ -6,7 +6,8 @@
 # SHORT=1 is what .ci/run has the time for, in build/asan-short and build/tsan-short: the mapper's tests without what is
 # slow to build (tests/sanitizers/CMakeLists.txt) or to run (below), in two processes; five random sequences of events in
 # place of sixty; and without UBSan's checks of every access through a pointer (null, alignment, type, size), which take
-# half of its build and of which ASan notices the first by itself.
+# half of its build and of which ASan notices the first by itself. Under ASan also the inputs that are kept of fuzzing the
+# readers of files (docs/fuzzing.md).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 preset=asan
@@ -26,6 +27,7 @@ if [ -n "${SHORT:-}" ]; then
   folder=build/$preset-short
   ROOMS="core;mapper;tests"
   targets=(--target mapper_short_tests planted_fault)
+  if [ "$preset" = asan ]; then targets+=(fuzz_short_tests); fi
   # The map's checks of itself after every step, which ASan's run makes, find no races.
   if [ "$preset" = tsan ]; then settings=("-DCMAKE_CXX_FLAGS_DEBUG=-O1 -g1 -DNDEBUG"); fi
   if [ "$preset" = asan ]; then
@@ -55,6 +57,8 @@ if [ -z "${SHORT:-}" ]; then
   exit
 fi
 "${run[@]}" ctest --test-dir "$folder" --output-on-failure -R '^Sanitizers'
+# What fuzzing the readers of files has left (docs/fuzzing.md); the saved maps are among the mapper's tests.
+if [ "$preset" = asan ]; then GTEST_BRIEF=1 "$folder/tests/sanitizers/fuzz_short_tests"; fi
 # Thousands of moves and frames; comparisons with the dense references, which the random sequences make too, but for ten
 # of those with renames.
 left_out='*TenThousand*:*DoesNotGrow*:*AgreesWithTinySteps*:*LiesInTheReferences*:*/LayeredQuery*:*ARenamedObject*:Reveal*'

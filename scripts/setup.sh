@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what tsdfpp needs on a Debian 12: packages, and MuJoCo and the page's libraries into .deps/. Idempotent; quick the second time.
+# Usage: bash scripts/setup.sh [--fuzz]; --fuzz installs what scripts/fuzz.sh needs, too.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -20,7 +21,9 @@ if [ "$(. /etc/os-release && echo "$ID ${VERSION_ID:-}")" != "debian 12" ]; then
   say "this is not Debian 12; the package names and versions below may not fit"
 fi
 
-mapfile -t wanted < <(grep -vE '^(#|$)' scripts/debian-packages.txt)
+lists=(scripts/debian-packages.txt)
+if [ "${1:-}" = "--fuzz" ]; then lists+=(scripts/debian-packages-fuzz.txt); fi
+mapfile -t wanted < <(grep -hvE '^(#|$)' "${lists[@]}")
 missing=()
 for package in "${wanted[@]}"; do
   # Node.js from elsewhere brings its own npm and does not get along with Debian's.

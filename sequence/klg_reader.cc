@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -140,6 +141,12 @@ class KlgSource : public DatasetSource {
     camera.fy = std::abs(camera.fy);
     units_per_m_ = options.depth_units_per_m.value_or(kKlgUnitsPerMetre);
     info_.intrinsics = camera;
+    // Images have no headers here: their size is the camera's.
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::image_side, std::max(camera.width, camera.height),
+                                      file_.string(), "pixels along a side of the image"));
+    TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::image_pixels,
+                                      std::int64_t{camera.width} * camera.height, file_.string(),
+                                      "pixels in the image"));
     return CheckCamera(camera, file_.string());
   }
 

@@ -102,6 +102,7 @@ SequenceRecord FromJson(const Json& json, int version) {
   GeneratorInfo& generator = record.generator;
   generator.version = json.at("version").get<std::string>();
   if (const Json& seed = json.at("seed"); !seed.is_null()) {
+    if (!seed.is_number_unsigned()) throw std::out_of_range("seed is no whole number from 0");
     generator.seed = seed.get<std::uint64_t>();
   }
   generator.sensor = json.at("sensor").get<std::string>();

@@ -189,6 +189,22 @@ TEST(Ply, MalformedFilesAreNamed) {
   }
 }
 
+// An id a face or none: whoever reads them looks at the id of every face.
+TEST(Ply, IdsOfSomeFacesAreNone) {
+  const TempFolder folder;
+  const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\n" +
+      faces + "property int object_id\n" + faces +
+      "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 7\n3 0 2 1\n";
+  ASSERT_TRUE(WriteFile(folder / "some.ply", text).has_value());
+  const auto mesh = ReadPly(folder / "some.ply");
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_EQ(mesh->triangles.size(), 2U);
+  EXPECT_TRUE(mesh->face_ids.empty());
+}
+
 // Every cut of a binary file is an error, never a crash or a shorter mesh.
 TEST(Ply, CutBinaryFilesAreErrors) {
   const TempFolder folder;

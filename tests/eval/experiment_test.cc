@@ -29,6 +29,13 @@ std::string Replaced(std::string text, const std::string& what, const std::strin
   return text.replace(at, what.size(), by);
 }
 
+// "0, 1, 2, ..."
+std::string Numbers(int count) {
+  std::string numbers = "0";
+  for (int i = 1; i < count; ++i) numbers += ", " + std::to_string(i);
+  return numbers;
+}
+
 TEST(Experiment, ReadsWhatItSays) {
   const auto config = Parse(kGood);
   ASSERT_TRUE(config.has_value()) << config.error().message;
@@ -73,6 +80,8 @@ TEST(Experiment, FaultsGetOneSentenceWithFileLineAndKey) {
       {good + "except = [{ method = [\"tsdf\", \"anchored\"] }]\n",
        "'except' leaves no cell of grid"},
       {good + "except = [{ voxel = 0.01 }]\n", "'grid.except.voxel' is not a known key here"},
+      {good + "seed = [" + Numbers(300) + "]\nnoise = [" + Numbers(300) + "]\n",
+       "'grid' '1' brings the cells to more than 100000, expected that at most"},
       {Replaced(good, "\"tsdf\"", "\"anchored\""), "holds tsdf++/anchored twice"},
       {Replaced(good, "\"tsdf\"", "\"tsdf++\""), "'baseline' is tsdf, which is not among"},
       {Replaced(good, "scene = \"mini.toml\"\n", ""), "'grid' '1' has no scene"},

@@ -393,6 +393,27 @@ TEST_F(Report, DroppingAKeyFrameKeepsTheBytesOfTheOthers) {
   EXPECT_EQ(bytes_of(record.json["runs"][0]["key_frames"][0]["picture"]), picture);
 }
 
+// Numbers that wrap would never be dropped; bytes that are named over and over fill all memory.
+TEST_F(Report, ARecordingNamesItsFramesAndBytesOnce) {
+  const auto refused = [&](const std::string& name, const std::function<void(json&)>& spoil) {
+    const std::filesystem::path run = Copy(name);
+    json record = json::parse(Text(run / "record" / "record.json"));
+    spoil(record);
+    EXPECT_TRUE(WriteFile(run / "record" / "record.json", record.dump()));
+    const auto recording = ReadRecording(run);
+    return recording ? std::string() : recording.error().message;
+  };
+  const auto wrapped = [](json& record) { record["key_frames"][0]["frame"] = 4294967304; };
+  EXPECT_NE(refused("wrapped", wrapped).find("lacks something"), std::string::npos);
+  const auto negative = [](json& record) { record["frames"][0]["frame"] = -1; };
+  EXPECT_NE(refused("negative", negative).find("lacks something"), std::string::npos);
+  const auto twice = [&](json& record) {
+    record["key_frames"][0]["colour"] = {0, Text(Run() / "record" / "record.bin").size()};
+  };
+  EXPECT_NE(refused("twice", twice).find("is no offset and length of its own"), std::string::npos);
+  EXPECT_EQ(refused("sound", [](json&) {}), "");
+}
+
 // A name can say what it likes: between its <script> tags the data has no '<' at all.
 TEST_F(Report, NothingInARunCanEndTheDataOfThePage) {
   TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");

@@ -156,6 +156,9 @@ TEST(Malformed, Klg) {
            "40000"},
           {Bytes(klg, 20, "nothing that zlib wrote"),
            "@/sequence.klg, frame 0: the depth: cannot be unpacked by zlib"},
+          {Text("calibration.txt", "8000 8000 8191.5 8191.5 16384 16384\n"),
+           "@/sequence.klg: 268435456 pixels in the image, over the limit of 100000000 "
+           "(TSDFPP_LIMITS=image_pixels=... raises it)"},
           {Text("calibration.txt", "60 61 31.25 23.75 66 48\n"),
            "@/sequence.klg, frame 0: the depth: unpacks to 6144 bytes, expected 6336 (16 bits a "
            "pixel)"},

@@ -1,0 +1,112 @@
+#!/usr/bin/env bash
+# Fuzzes targets, some at a time, each for some seconds, and goes on from the corpus that it left the last time. Needs
+# nothing but bash: `scripts/fuzz.sh --bundle DIR` copies it with all that it runs. Beside it lie tsdfpp_fuzz, corpus/
+# and, where the libraries are not installed, lib/.
+# Usage: bash run.sh [--seconds S] [--jobs N] [--targets a,b]
+# In the environment: OUT, where $OUT/<target>/ gets corpus/, crashes/, logs and runs.tsv (by default ./out); FUZZ_HOME,
+# where the program and the corpora are, if not beside this script.
+set -euo pipefail
+home=${FUZZ_HOME:-$(cd "$(dirname "$0")" && pwd)}
+seconds=60
+jobs=$(nproc)
+targets=
+while [ $# -gt 0 ]; do
+  case "$1" in
+  --seconds) seconds=$2 ;;
+  --jobs) jobs=$2 ;;
+  --targets) targets=${2//,/ } ;;
+  *)
+    echo "run.sh: '$1' is no option, expected --seconds S, --jobs N or --targets a,b" >&2
+    exit 2
+    ;;
+  esac
+  shift 2
+done
+OUT=${OUT:-out}
+mkdir -p "$OUT"
+OUT=$(cd "$OUT" && pwd)
+binary=$home/tsdfpp_fuzz
+if [ -d "$home/lib" ]; then export LD_LIBRARY_PATH=$home/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}; fi
+if [ -z "$targets" ]; then
+  for folder in "$home"/corpus/*/; do targets="$targets $(basename "$folder")"; done
+fi
+# What a run that ends at a find leaves in memory goes at the end.
+scratch=/dev/shm
+if [ ! -w "$scratch" ]; then scratch=${TMPDIR:-/tmp}; fi
+TSDFPP_FUZZ_SCRATCH=$(mktemp -d "$scratch/tsdfpp-fuzz-XXXXXX")
+export TSDFPP_FUZZ_SCRATCH
+trap 'rm -rf "$TSDFPP_FUZZ_SCRATCH"' EXIT
+# Leaks are not looked for (it takes a debugger's rights); memory that is asked for without reason is a find.
+export ASAN_OPTIONS=detect_leaks=0:abort_on_error=1:allocator_may_return_null=0:handle_abort=1
+export UBSAN_OPTIONS=print_stacktrace=1
+symbolizer=$(command -v llvm-symbolizer-14 || command -v llvm-symbolizer || true)
+if [ -n "$symbolizer" ]; then export ASAN_SYMBOLIZER_PATH=$symbolizer; fi
+
+# Bytes of an input: sets of files are larger than single ones.
+most_bytes() {
+  local largest=0 size file
+  for file in "$home/corpus/$1"/* "$OUT/$1/crashes"/*; do
+    if [ ! -f "$file" ]; then continue; fi
+    size=$(wc -c <"$file")
+    if [ "$size" -gt "$largest" ]; then largest=$size; fi
+  done
+  echo $((largest * 2 > 8192 ? largest * 2 : 8192))
+}
+
+fuzz() {
+  local target=$1 begin now left log status executions line tries=0
+  local to=$OUT/$target
+  mkdir -p "$to/corpus" "$to/crashes"
+  begin=$(date +%s)
+  export TSDFPP_FUZZ_TARGET=$target
+  # After a find it goes on, until there are so many that they want a look first.
+  while [ $tries -lt 20 ]; do
+    now=$(date +%s)
+    left=$((begin + seconds - now))
+    if [ $left -lt 2 ]; then break; fi
+    log=$to/log-$now-$tries.txt
+    status=0
+    "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$left" -max_len="$(most_bytes "$target")" \
+      -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 -use_value_profile=1 -reload=0 -print_final_stats=1 \
+      -artifact_prefix="$to/crashes/" >"$log" 2>&1 || status=$?
+    executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -1)
+    line=$(grep -a ' cov: ' "$log" | tail -1 || true)
+    edges=$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' <<<"$line")
+    features=$(sed -n 's/.* ft: \([0-9]*\).*/\1/p' <<<"$line")
+    printf '%s\t%s\t%s\t%s\t%s\t%s\n' "$now" "$(($(date +%s) - now))" "${executions:-0}" "${edges:-0}" \
+      "${features:-0}" "$((status != 0))" >>"$to/runs.tsv"
+    # Only logs of finds are worth their place.
+    if [ $status = 0 ]; then rm "$log"; else
+      echo "$target: a find, $log: $(grep -aE '^(complaint|SUMMARY|==[0-9]*== *ERROR)|runtime error' "$log" | head -1)"
+    fi
+    tries=$((tries + 1))
+  done
+  echo "$target: $(awk '{s += $2; e += $3} END {print s " s, " e " executions"}' "$to/runs.tsv"), $(find "$to/corpus" -type f | wc -l) inputs, $(find "$to/crashes" -type f | wc -l) finds"
+}
+
+if [ ! -x "$binary" ]; then
+  echo "run.sh: there is no $binary" >&2
+  exit 2
+fi
+for target in $targets; do
+  if [ ! -d "$home/corpus/$target" ]; then
+    echo "run.sh: there is no target '$target' in $home/corpus" >&2
+    exit 2
+  fi
+done
+running=0
+for target in $targets; do
+  if [ "$running" -ge "$jobs" ]; then
+    wait -n || true
+    running=$((running - 1))
+  fi
+  fuzz "$target" &
+  running=$((running + 1))
+done
+wait
+# Any find of these targets fails the run.
+status=0
+for target in $targets; do
+  if [ -n "$(ls -A "$OUT/$target/crashes")" ]; then status=1; fi
+done
+exit $status
