@@ -227,18 +227,14 @@ class Inputs:
         for name, stride, seeds in (("experiment", 1, [1, 2]), ("experiment-before", 2, [1])):
             write(self.at(name + ".toml"), EXPERIMENT.format(stride=stride, seeds=seeds))
         self.run("sweep", "experiment.toml", "--out", "swept")
-        with open(self.at("swept", "results.json"), encoding="utf-8") as file:
-            results = json.load(file)
-        self.program = results["program"]
-        self.cells = sorted(results["cells"])
-        self.frame = max(results["sequences"][results["cells"][self.cells[0]]["sequence"]]["frames"])
         for name, method in (("gates", "tsdf++"), ("gates-before", "tsdf")):
             write(self.at(name + ".toml"), GATES.format(method=method))
         self.make_set("set", 1)
         self.make_set("set-before", 0.5)
         self.run("bench-set", "tiny", "--sets", "set", "--run", "tsdf,tsdf++", "--out", "benched")
         for name, seed in (("true", 1), ("found", 2)):
-            write(self.at(name + ".txt"), trajectory(seed, 40000))
+            write(self.at(name + ".txt"), trajectory(seed, 10000))
+            write(self.at(name + "-few.txt"), trajectory(seed, 200))
             for k in range(40):
                 write(self.at("masks-" + name, f"{k:03d}.png"), label_image(100 * seed + k, 640, 480))
         write(self.at("adapter", "slow.py"), ADAPTER)
@@ -246,6 +242,15 @@ class Inputs:
                                                '"{frames}"]\nmatch = "overlap"\n')
         self.make_pages()
         shutil.rmtree(self.at(".said"))
+        self.look()
+
+    def look(self):
+        """What commands have to be told of what was made."""
+        with open(self.at("swept", "results.json"), encoding="utf-8") as file:
+            results = json.load(file)
+        self.program = results["program"]
+        self.cells = sorted(results["cells"])
+        self.frame = max(results["sequences"][results["cells"][self.cells[0]]["sequence"]]["frames"])
 
     def make_set(self, name, scale):
         write(self.at(name, "tiny", "tiny.toml"), SCENE.format(frames=self.frames, azimuth=-112.0, reveal=self.frames))
@@ -341,10 +346,11 @@ def commands_of(inputs):
         Command("verify", [t, "verify", seq, "--all", "--json"], writes=False, kills=4),
         Command("metric trajectory", [t, "metric", "trajectory", at("true.txt"), at("found.txt"), "--align", "se3", "--delta",
                                       "10f,0.1m,1s", "--all-pairs", "--json"], writes=False, kills=2),
-        Command("metric surface", [t, "metric", "surface", *surface, "--density", "50", "--json"], writes=False, kills=2),
+        Command("metric surface", [t, "metric", "surface", *surface, "--density", "10", "--json"], writes=False, kills=2),
         Command("metric panoptic", [t, "metric", "panoptic", at("masks-true"), at("masks-found"), "--encoding", "objects",
                                     "--json"], writes=False, kills=2),
-        Command("metric pose", [t, "metric", "pose", at("seq", "models", "car-1.ply"), at("true.txt"), at("found.txt"), "--json"],
+        Command("metric pose", [t, "metric", "pose", at("seq", "models", "car-1.ply"), at("true-few.txt"), at("found-few.txt"),
+                                "--json"],
                 writes=False, kills=2),
         Command("pages.py fill", [sys.executable, "out/scripts/pages.py", "fill", "planted"], given=at("pages"),
                 before=[sys.executable, at("pages-before", "scripts", "pages.py"), "list"], kills=5, ours=False),

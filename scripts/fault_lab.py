@@ -37,7 +37,6 @@ class Learned:
     whole: dict
     stdout: str
     seconds: float
-    start_s: float  # of that, the program's own start
     changes: int  # of its folder, of the process that makes the most
     before_bytes: int
     whole_bytes: int
@@ -136,8 +135,7 @@ class Lab:
             self.restore(command, trial)
             peak = fault_process.peak_of(command.words, trial, self.at("said"))
         self.learned[command.name] = Learned(first.code, fault_trees.content_of(before), content,
-                                             fault_trees.stdout_content(first.out), first.seconds,
-                                             min(self.start_s, 0.5 * first.seconds), changes, bytes_on_disk(before), whole_bytes,
+                                             fault_trees.stdout_content(first.out), first.seconds, changes, bytes_on_disk(before), whole_bytes,
                                              peak, list(zip(before_read, whole_read)))
         return self.learned[command.name]
 
@@ -206,6 +204,11 @@ class Lab:
 
     # --- Trials -------------------------------------------------------------------------------------------------------
 
+    def moment_s(self, learned, share):
+        """Of a command's work, after its start-up."""
+        start_s = min(self.start_s, 0.5 * learned.seconds)
+        return start_s + share * (learned.seconds - start_s)
+
     def kill_once(self, command, trial, draw, at_change):
         """False where it ended before."""
         learned = self.learned[command.name]
@@ -218,14 +221,16 @@ class Lab:
             killed = ending.signal == signal.SIGKILL or (ending.code != learned.code and "signal 9" in ending.err)
         else:
             running = fault_process.Running(command.words, trial, self.at("said"))
-            killed = running.sleep_until(learned.start_s + share * (learned.seconds - learned.start_s))
+            killed = running.sleep_until(self.moment_s(learned, share))
             if killed:
                 to = running.send(signal.SIGKILL, to, draw)
             ending = running.end(self.limit_s(command))
+        if not killed and not ending.hung:
+            learned.seconds = min(learned.seconds, ending.seconds)  # the machine has less to do than it had
         stayed = fault_process.wait_for_orphans()
         return killed, ending, stayed
 
-    def kill(self, command, number, tries=6):
+    def kill(self, command, number, tries=12):
         """One kill at a random moment, judged; nothing where none of the tries met the command at work."""
         trial, learned = self.at("trial"), self.learned[command.name]
         for attempt in range(tries):
@@ -251,26 +256,28 @@ class Lab:
                 return outcome
         return None
 
-    def disturb(self, command, fault, draw):
+    def disturb(self, command, fault, draw, tries=12):
         """One fault, judged; nothing where it cannot be made here."""
-        trial = self.at("trial")
-        self.restore(command, trial)
-        with fault.place(self, command) as disk:
-            trial = disk.place if disk else trial
-            around = fault.around(self, command, draw, trial)
-            if around is None:
-                return None
-            words = command.words + fault.words
-            running = fault_process.Running(words, trial, self.at("said"), around)
-            number = fault.signal
-            learned = self.learned[command.name]
-            if number and running.sleep_until(learned.start_s + draw.random() * (learned.seconds - learned.start_s)):
-                running.send(number, "leader", draw)
-            ending = running.end(self.limit_s(command))
-            stayed = fault_process.wait_for_orphans()
-            if disk:
-                disk.repair()
-            return self.judge_fault(command, fault, trial, ending, stayed)
+        learned = self.learned[command.name]
+        for _ in range(tries):
+            self.restore(command, self.at("trial"))
+            with fault.place(self, command) as disk:
+                trial = disk.place if disk else self.at("trial")
+                around = fault.around(self, command, draw, trial)
+                if around is None:
+                    return None
+                running = fault_process.Running(command.words + fault.words, trial, self.at("said"), around)
+                met = not fault.signal or running.sleep_until(self.moment_s(learned, draw.random()))
+                if fault.signal and met:
+                    running.send(fault.signal, "leader", draw)
+                ending = running.end(self.limit_s(command))
+                stayed = fault_process.wait_for_orphans()
+                if disk:
+                    disk.repair()
+                if met:
+                    return self.judge_fault(command, fault, trial, ending, stayed)
+                learned.seconds = min(learned.seconds, ending.seconds)
+        raise RuntimeError(f"{command.name} was never met at work")
 
     def judge_fault(self, command, fault, trial, ending, stayed):
         learned, outcome = self.learned[command.name], Outcome()
@@ -296,8 +303,10 @@ class Lab:
                     fault_trees.stdout_content(ending.out) != learned.stdout:
                 outcome.lost.append("it prints another result")
             found = fault_trees.content_of(trial)
-            if found != learned.whole:
+            if fault_trees.visible(found) != fault_trees.visible(learned.whole):
                 outcome.lost.append("its result differs: " + fault_trees.differences(found, learned.whole))
+            elif found != learned.whole:  # a disk that refuses keeps hidden things from being removed
+                self.judge_rerun(command, trial, outcome, "whole")
             return outcome
         state = self.judge_left(command, trial, outcome)
         if fault.result_stands and command.writes and state != "whole":

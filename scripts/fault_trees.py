@@ -14,6 +14,7 @@ ASIDE = [
     ("JSON", "the members " + ", ".join(sorted(TIMES)), "times and memory of that run"),
     ("JSON", "the member `run`, a text of 16 hexadecimal digits", "a run's name is drawn anew for each"),
     ("`run.json`", "`files[].bytes`", "files with times have other sizes"),
+    ("`run.json`", "` --threads N` in `command`", "a fault that is tried"),
     ("`resumed_frames`, `run_now`, `jobs` on stdout", "", "how much a rerun found done is what it is for"),
     ("`frames.csv`, `results.csv`", "the columns `mesh_s`, `evaluate_s` and `*_ms`", "times"),
     ("`table-*.png`", "all but that it is a whole PNG", "a picture of a table that has times"),
@@ -73,6 +74,7 @@ def png(content):
 
 def run_note(content):
     note = without_times(json.loads(content))
+    note["command"] = re.sub(r" --threads \d+", "", note["command"])
     for file in note["files"]:
         file.pop("bytes")
     return note

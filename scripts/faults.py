@@ -202,8 +202,9 @@ def run_all(lab, options, record):
             command = next(one for one in chosen if one.name == name)
             for k in range(count):
                 outcome = lab.kill(command, k)
-                if outcome:
-                    record.add("kills", name, "SIGKILL", outcome)
+                if outcome is None:
+                    sys.exit(f"faults: {name} was never met at work")
+                record.add("kills", name, "SIGKILL", outcome)
             record.write(options.out)
     if "faults" in options.parts:
         for fault in kinds:
