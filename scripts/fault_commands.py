@@ -34,7 +34,7 @@ class Command:
     quick: bool = False
 
 
-SCENE = """name = "tiny"
+SCENE = """name = "{name}"
 purpose = "A car turns beside a mug, in a few small frames."
 frames = {frames}
 rate_hz = 10
@@ -215,9 +215,10 @@ class Inputs:
     def make(self):
         frames, reveal = self.frames, self.frames
         for name, azimuth in (("tiny", -112.0), ("other", -105.0)):
-            write(self.at(name + ".toml"), SCENE.format(frames=frames, azimuth=azimuth, reveal=reveal))
-            write(self.at("scenes", name + ".toml"), SCENE.format(frames=frames, azimuth=azimuth, reveal=reveal))
-        write(self.at("scenes-before", "tiny.toml"), SCENE.format(frames=frames, azimuth=-100.0, reveal=reveal))
+            scene = SCENE.format(name=name, frames=frames, azimuth=azimuth, reveal=reveal)
+            write(self.at(name + ".toml"), scene)
+            write(self.at("scenes", name + ".toml"), scene)
+        write(self.at("scenes-before", "tiny.toml"), SCENE.format(name="tiny", frames=frames, azimuth=-100.0, reveal=reveal))
         self.run("generate", "tiny.toml", "--out", "seq", "--share", "0")
         self.run("compare", "seq", "--methods", "tsdf,tsdf++/anchored", "--profiles", "close", "--every", str(frames),
                  "--record", "--keep-meshes", "--out", "compared")
@@ -253,7 +254,8 @@ class Inputs:
         self.frame = max(results["sequences"][results["cells"][self.cells[0]]["sequence"]]["frames"])
 
     def make_set(self, name, scale):
-        write(self.at(name, "tiny", "tiny.toml"), SCENE.format(frames=self.frames, azimuth=-112.0, reveal=self.frames))
+        write(self.at(name, "tiny", "tiny.toml"), SCENE.format(name="tiny", frames=self.frames, azimuth=-112.0,
+                                                                   reveal=self.frames))
         place = self.at(name, "tiny", "set.toml")
         write(place, SET.format(scale=scale, scene_hash="?", truth_hash="?"))
         found = json.loads(self.run("bench-set", "tiny", "--sets", name, "--json"))["sequences"][0]
