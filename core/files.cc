@@ -1,12 +1,14 @@
 #include "core/files.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <functional>
 
 namespace tsdfpp {
@@ -46,16 +48,78 @@ Error CannotRead(const fs::path& path, int number) {
           fmt::format("{}: cannot be read ({})", path.string(), std::strerror(number))};
 }
 
-// The name of the file while it is written: beside `path`, and no longer than a name can be.
-fs::path TemporaryOf(const fs::path& path) {
-  constexpr std::size_t kLongestName = 200;
-  std::string name = path.filename().string();
-  if (name.size() > kLongestName) {
-    const std::size_t hash = std::hash<std::string>()(name);
-    name = fmt::format("{}.{:016x}", name.substr(0, kLongestName), hash);
+// A file while it is written, hidden beside its place. It is named after that place alone, so that
+// the next one writes over what a killed process left. It is locked: a second process (or thread)
+// that writes the same file meanwhile takes a name of its own.
+class PartFile {
+ public:
+  explicit PartFile(const fs::path& place) {
+    constexpr std::size_t kLongestName = 200;
+    std::string name = place.filename().string();
+    if (name.size() > kLongestName) {
+      const std::size_t hash = std::hash<std::string>()(name);
+      name = fmt::format("{}.{:016x}", name.substr(0, kLongestName), hash);
+    }
+    path_ = place.parent_path() / fmt::format(".{}.writing.part", name);
+    if (OpenShared()) return;
+    static std::atomic<int> count{0};
+    path_ = place.parent_path() / fmt::format(".{}.{}-{}.part", name, getpid(), count++);
+    number_ = open(path_.c_str(), kFlags | O_EXCL, kMode);
+    fault_ = errno;
   }
-  return path.parent_path() / fmt::format("{}.{}.part", name, getpid());
-}
+  ~PartFile() {
+    if (number_ < 0) return;
+    // Before the lock goes with the descriptor.
+    if (!placed_) unlink(path_.c_str());
+    close(number_);
+  }
+  PartFile(const PartFile&) = delete;
+  PartFile& operator=(const PartFile&) = delete;
+
+  // Each is 0, or the number of what went wrong.
+  int Write(std::string_view bytes) const {
+    if (number_ < 0) return fault_;
+    while (!bytes.empty()) {
+      const ssize_t count = write(number_, bytes.data(), bytes.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) return errno;
+      bytes.remove_prefix(static_cast<std::size_t>(count));
+    }
+    // Some file systems say it when the file is closed alone; the lock has to stay until it has its
+    // place.
+    const int twin = fcntl(number_, F_DUPFD_CLOEXEC, 0);
+    return twin < 0 || close(twin) != 0 ? errno : 0;
+  }
+  int TakeThePlace(const fs::path& place) {
+    placed_ = rename(path_.c_str(), place.c_str()) == 0;
+    return placed_ ? 0 : errno;
+  }
+
+ private:
+  // Without O_NONBLOCK a pipe of this name would be waited for.
+  static constexpr int kFlags = O_WRONLY | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
+  static constexpr mode_t kMode = 0666;
+
+  bool OpenShared() {
+    number_ = open(path_.c_str(), kFlags, kMode);
+    if (number_ < 0) return false;
+    struct stat held {};
+    struct stat named {};
+    // Who held it before may have put it in its place after it was opened here.
+    const bool ours = flock(number_, LOCK_EX | LOCK_NB) == 0 && fstat(number_, &held) == 0 &&
+                      lstat(path_.c_str(), &named) == 0 && held.st_ino == named.st_ino &&
+                      held.st_dev == named.st_dev && S_ISREG(held.st_mode) && held.st_nlink == 1;
+    if (ours && (held.st_size == 0 || ftruncate(number_, 0) == 0)) return true;
+    close(number_);
+    number_ = -1;
+    return false;
+  }
+
+  fs::path path_;
+  int number_ = -1;
+  int fault_ = 0;
+  bool placed_ = false;
+};
 
 }  // namespace
 
@@ -103,23 +167,11 @@ Expected<void> WriteFile(const fs::path& path, std::string_view bytes) {
                               code.message());
     }
   }
-  const fs::path temporary = TemporaryOf(path);
-  {
-    std::ofstream out(temporary, std::ios::binary);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    if (!out) {
-      std::error_code ignored;
-      fs::remove(temporary, ignored);
-      return EnvironmentError("{}: cannot be written", path.string());
-    }
-  }
-  std::error_code code;
-  fs::rename(temporary, path, code);
-  if (code) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    return EnvironmentError("{}: cannot be written ({})", path.string(), code.message());
+  PartFile part(path);
+  int fault = part.Write(bytes);
+  if (fault == 0) fault = part.TakeThePlace(path);
+  if (fault != 0) {
+    return EnvironmentError("{}: cannot be written ({})", path.string(), std::strerror(fault));
   }
   return {};
 }
@@ -129,7 +181,7 @@ Expected<void> MakeWritableFolder(const fs::path& path) {
   fs::create_directories(path, code);
   if (code)
     return EnvironmentError("{}: the folder cannot be made ({})", path.string(), code.message());
-  const fs::path probe = path / fmt::format(".tsdfpp-probe-{}", getpid());
+  const fs::path probe = path / ".tsdfpp-probe";
   if (!WriteFile(probe, "").has_value()) {
     return EnvironmentError("{}: the folder cannot be written to", path.string());
   }

@@ -1,5 +1,8 @@
 #include "core/guard.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -36,6 +39,16 @@ std::string& NameOfProgram() {
   std::abort();
 }
 
+// A standard descriptor that is closed would go to the next file that is opened, which then gets
+// what is printed.
+void FillClosedDescriptors() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(descriptor, F_GETFD) >= 0) continue;
+    // It gets the lowest number that is free. A result cannot be written to stdout, as before.
+    if (open("/dev/null", descriptor == STDERR_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
+  }
+}
+
 }  // namespace
 
 Error ErrorOfException() {
@@ -61,6 +74,7 @@ void PrintError(std::string_view program, std::string_view message) {
 }
 
 int GuardedMain(std::string_view program, const std::function<int()>& body) {
+  FillClosedDescriptors();
   NameOfProgram() = program;
   std::set_terminate(SayAndAbort);
   // Its warnings would stand before our sentence.

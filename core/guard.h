@@ -1,4 +1,5 @@
-// The end of the line for exceptions: the project throws none, its libraries do.
+// The end of the line for exceptions: the project throws none, but for std::bad_alloc where a C
+// library has no memory; its libraries do.
 #pragma once
 
 #include <functional>
@@ -26,8 +27,9 @@ std::invoke_result_t<const Function&> Guarded(const Function& function) {
 // "<program>: <message>" on stderr: one line without control bytes, under 500 bytes.
 void PrintError(std::string_view program, std::string_view message);
 
-// The whole of a main(): takes the limits from the environment (core/limits.h), runs `body`, which
-// returns the exit code, and turns what is thrown into a sentence and its exit code.
+// The whole of a main(): opens what is closed of stdin, stdout and stderr, so that no file gets
+// their numbers, takes the limits from the environment (core/limits.h), runs `body`, which returns
+// the exit code, and turns what is thrown into a sentence and its exit code.
 int GuardedMain(std::string_view program, const std::function<int()>& body);
 
 }  // namespace tsdfpp

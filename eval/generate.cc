@@ -122,6 +122,12 @@ class Generator {
     TSDFPP_ASSIGN(SequenceRecord record, Finish());
     result_.render_s = SecondsSince(start);
     TSDFPP_RETURN_IF_ERROR(Verify(record));
+    // It took a while, in which somebody may have put something there. What was made is kept for
+    // when that is away.
+    if (const auto place = CheckPlace(); !place) {
+      staging_.Keep();
+      return tl::unexpected(place.error());
+    }
     TSDFPP_RETURN_IF_ERROR(staging_.TakeThePlace());
     return result_;
   }

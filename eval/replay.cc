@@ -12,6 +12,7 @@
 #include "eval/map_slice.h"
 #include "eval/map_views.h"
 #include "eval/program_identity.h"
+#include "eval/run_folder.h"
 #include "eval/sweep_report.h"
 #include "sequence/image_files.h"
 
@@ -181,15 +182,19 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
       recorded, "images and poses", options.frame, result.image_digest,
       recorded.cell.at("images").value(std::to_string(options.frame), ""), source.source()));
 
-  TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
-  TSDFPP_RETURN_IF_ERROR(WriteCamera(both.frame, options.out / "camera"));
-  TSDFPP_RETURN_IF_ERROR(WritePly(options.out / "scene.ply", scene));
+  const std::string command =
+      fmt::format("tsdfpp replay {} --cell {} --frame {} --out {}", options.result.string(),
+                  options.cell, options.frame, options.out.string());
+  TSDFPP_ASSIGN(RunFolder run, RunFolder::Begin(options.out, command));
+  const fs::path& out = run.path();
+  TSDFPP_RETURN_IF_ERROR(WriteCamera(both.frame, out / "camera"));
+  TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", scene));
   if (const MapRepresentation* map = mapper.map()) {
     std::set<InstanceId> movers;
     for (const json& id : recorded.cell.at("removed")) movers.insert(id.get<InstanceId>());
     TSDFPP_RETURN_IF_ERROR(
-        WriteViews(*map, source.info().intrinsics, both.frame.T_WC, 2, options.out / "views"));
-    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, movers)), options.out));
+        WriteViews(*map, source.info().intrinsics, both.frame.T_WC, 2, out / "views"));
+    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, movers)), out));
   }
   const json note{{"cell", recorded.id},
                   {"frame", options.frame},
@@ -197,12 +202,13 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
                   {"program", ProgramIdentity()},
                   {"image_digest", result.image_digest},
                   {"map_digest", result.map_digest}};
-  TSDFPP_RETURN_IF_ERROR(WriteFile(options.out / "replay.json", JsonText(note, 1) + "\n"));
-  TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(options.out));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "replay.json", JsonText(note, 1) + "\n"));
+  TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(out));
   for (const fs::path& file : written) {
-    result.files.push_back(file.lexically_relative(options.out).string());
+    result.files.push_back(file.lexically_relative(out).string());
   }
   std::sort(result.files.begin(), result.files.end());
+  TSDFPP_RETURN_IF_ERROR(run.Commit());
   return result;
 }
 

@@ -28,7 +28,7 @@ struct ReplayResult {
   std::optional<int> compared_map_frame;
   std::string image_digest;
   std::string map_digest;          // of the visible scene at the frame itself
-  std::vector<std::string> files;  // below `out`
+  std::vector<std::string> files;  // below `out`, without run.json
 };
 
 // Maps the sequence up to the frame and writes below `out`: camera/colour.png, depth.exr (metres)
@@ -36,10 +36,10 @@ struct ReplayResult {
 // each ray; slice.png, slice-distance.exr and slice-id.png (eval/map_slice.h), through the first
 // removed object or, without one, the point that the camera looks at; scene.ply; replay.json. Of
 // Open3D's map, which has no lists, no views and no slice. The same cell and frame give the same
-// bytes.
+// bytes. All of it is one run (eval/run_folder.h), which takes an earlier one's place.
 // Errors: kUsage where the results have no such cell or the cell no such frame; kData where results
 // are unusable, or where what was made again is not what the original run had: this program or this
-// machine's renderer differs, which the sentence says. Nothing is written then.
+// machine's renderer differs, which the sentence says: nothing is written then; those of RunFolder.
 Expected<ReplayResult> Replay(const ReplayOptions& options);
 
 }  // namespace tsdfpp

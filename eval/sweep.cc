@@ -91,7 +91,8 @@ void RemoveHalves(const fs::path& out) {
   const auto files = ListFilesBelow(out);
   if (!files) return;
   for (const fs::path& file : *files) {
-    if (file.extension() == ".part") fs::remove(file, ignored);
+    if (file.extension() != ".part" || file.filename().string().front() != '.') continue;
+    fs::remove(file, ignored);
   }
 }
 

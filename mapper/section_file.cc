@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <new>
 #include <vector>
 
 #include "core/limits.h"
@@ -36,6 +37,7 @@ std::string Compressed(std::string_view bytes) {
   const int status = compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
                                reinterpret_cast<const Bytef*>(bytes.data()),
                                static_cast<uLong>(bytes.size()), kCompressionLevel);
+  if (status == Z_MEM_ERROR) throw std::bad_alloc();
   if (status != Z_OK) std::abort();  // there is no input that cannot be compressed
   packed.resize(size);
   return packed;

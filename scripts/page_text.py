@@ -119,6 +119,55 @@ def tracks(path):
     return markdown(rows)
 
 
+def fault_rows(title, lines, columns):
+    """Of scripts/faults.py: a row a name, columns as pairs (title, key), and a row of their sums."""
+    rows = [[title] + [column for column, _ in columns]]
+    for name, line in lines:
+        rows.append([name] + [str(line.get(key, 0)) for _, key in columns])
+    return markdown(rows + [["all"] + [str(sum(line.get(key, 0) for _, line in lines)) for _, key in columns]])
+
+
+def kills(path):
+    """Of faults.json: a row a command."""
+    lines = [(f"`{name}`", of["SIGKILL"]) for name, of in json.loads(path.read_text())["kills"].items()]
+    return fault_rows("command", lines, (
+        ("killed", "tried"), ("survived", "survived"), ("lost", "lost"), ("it left the older result", "before"),
+        ("a part of both", "between"), ("the new result", "whole"), ("readers read one of them", "read"),
+        ("readers refused", "refused")))
+
+
+def added(lines):
+    total = {}
+    for line in lines:
+        for key, value in line.items():
+            total[key] = total.get(key, 0) + value
+    return total
+
+
+def faults(path):
+    """Of faults.json: a row a fault, over all commands that met it."""
+    found = json.loads(path.read_text())
+    lines = [(name, added(of[name] for of in found["faults"].values() if name in of)) for name in found["order"]]
+    return fault_rows("fault", [line for line in lines if line[1]], (
+        ("tried", "tried"), ("survived", "survived"), ("lost", "lost"), ("the same bytes as ever", "same"),
+        ("a sentence and its exit code", "said"), ("ended by the signal", "signal")))
+
+
+def pairs(path):
+    """Of faults.json: a row a command, with itself and with each of the others; each pair counts once, in its first row."""
+    lines = [(f"`{name}`", added(of.values())) for name, of in json.loads(path.read_text())["pairs"].items()]
+    return fault_rows("command, with itself and those below", lines, (
+        ("pairs", "tried"), ("survived", "survived"), ("lost", "lost"), ("both did their work", "both"),
+        ("one did, one was refused", "one"), ("both were refused", "neither")))
+
+
+def faults_made(path):
+    """Of faults.json: what was run and when."""
+    found = json.loads(path.read_text())
+    missing = "".join(f" Not tried: {name} ({why})." for name, why in sorted(found["not_tried"].items()))
+    return (f"Made by tsdfpp {found['version']}, on {found['date']}, with seed {found['seed']}.{missing}\n")
+
+
 def experiment(make):
     return lambda path: make(json.loads(path.read_text()))
 
@@ -134,6 +183,10 @@ KINDS = {
     "comparison": experiment(experiment_text.comparison_of),
     "scenes": experiment(experiment_text.scenes_of),
     "rules": experiment(experiment_text.rules_of),
+    "kills": kills,
+    "faults": faults,
+    "pairs": pairs,
+    "faults_made": faults_made,
 }
 
 

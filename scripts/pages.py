@@ -61,6 +61,14 @@ def write(path, text):
     part.replace(path)
 
 
+def copy(source, path):
+    """The file is there whole, as write() does it."""
+    path = pathlib.Path(path)
+    part = path.with_name(path.name + ".part")
+    shutil.copyfile(source, part)
+    part.replace(path)
+
+
 def without_what_is_missing(out, command):
     """After a run with options, which may have made a part: what is not there stays in the pages as it is."""
     def is_there(entry):
@@ -96,9 +104,9 @@ def fill(root, out, command):
         write(root / path, text)
     for source, path in copies:
         if source.is_dir():
-            shutil.copytree(source, path, dirs_exist_ok=True)
+            shutil.copytree(source, path, copy_function=copy, dirs_exist_ok=True)
         else:
-            shutil.copyfile(source, path)
+            copy(source, path)
     return list(texts)
 
 

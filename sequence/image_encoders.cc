@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <vector>
 
 namespace tsdfpp {
@@ -30,7 +31,7 @@ template <int level>
 libdeflate_compressor* Compressor() {
   thread_local const std::unique_ptr<libdeflate_compressor, CompressorDeleter> compressor(
       libdeflate_alloc_compressor(level));
-  if (compressor == nullptr) std::abort();  // no memory
+  if (compressor == nullptr) throw std::bad_alloc();
   return compressor.get();
 }
 

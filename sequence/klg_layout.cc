@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 #include <fstream>
+#include <new>
 
 namespace tsdfpp {
 namespace {
@@ -95,9 +96,10 @@ Expected<std::string> Inflate(const std::string& bytes, std::size_t expected_byt
 std::string Deflate(const std::string& bytes) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::string packed(size, '\0');
-  compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
-            reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uLong>(bytes.size()),
-            Z_BEST_SPEED);
+  const int status = compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
+                               reinterpret_cast<const Bytef*>(bytes.data()),
+                               static_cast<uLong>(bytes.size()), Z_BEST_SPEED);
+  if (status != Z_OK) throw std::bad_alloc();  // there is no input that cannot be compressed
   packed.resize(size);
   return packed;
 }

@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <atomic>
 #include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "tests/core/temp_folder.h"
 
@@ -49,6 +53,60 @@ TEST(Files, FailedWriteLeavesTheOldAndNothingBeside) {
       << result.error().message;
   EXPECT_EQ(ReadFile(folder / "taken/inside").value(), "kept");
   EXPECT_EQ(folder.Entries(), 1);
+}
+
+// What a process was writing when it was killed.
+TEST(Files, WhatAKilledWriterLeftIsWrittenOver) {
+  const TempFolder folder;
+  std::ofstream(folder / ".x.writing.part") << "a longer half of a file";
+  ASSERT_TRUE(WriteFile(folder / "x", "whole").has_value());
+  EXPECT_EQ(ReadFile(folder / "x").value(), "whole");
+  EXPECT_EQ(folder.Entries(), 1);
+}
+
+TEST(Files, SeveralWritersOfOneFileDoNotMeet) {
+  const TempFolder folder;
+  constexpr std::size_t kBytes = 200000;
+  constexpr int kWrites = 40;
+  std::vector<std::thread> writers;
+  std::atomic<int> failed{0};
+  for (const char letter : {'a', 'b', 'c'}) {
+    writers.emplace_back([&, letter] {
+      for (int i = 0; i < kWrites; ++i) {
+        failed += WriteFile(folder / "x", std::string(kBytes, letter)).has_value() ? 0 : 1;
+      }
+    });
+  }
+  std::atomic<bool> stop{false};
+  int mixed = 0;
+  std::thread reader([&] {
+    while (!stop) {
+      const auto bytes = ReadFile(folder / "x");
+      mixed +=
+          bytes && *bytes != std::string(kBytes, bytes->empty() ? ' ' : bytes->front()) ? 1 : 0;
+    }
+  });
+  for (std::thread& writer : writers) writer.join();
+  stop = true;
+  reader.join();
+  EXPECT_EQ(failed, 0);
+  EXPECT_EQ(mixed, 0);
+  EXPECT_EQ(folder.Entries(), 1);
+}
+
+// Of the name that is taken while a file is written somebody else's things may be.
+TEST(Files, NothingElseIsWrittenInto) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "other", "kept").has_value());
+  std::filesystem::create_symlink(folder / "other", folder / ".x.writing.part");
+  std::filesystem::create_hard_link(folder / "other", folder / ".y.writing.part");
+  ASSERT_EQ(mkfifo((folder / ".z.writing.part").c_str(), 0600), 0);
+  for (const char* name : {"x", "y", "z"}) {
+    ASSERT_TRUE(WriteFile(folder / name, "bytes").has_value());
+    EXPECT_EQ(ReadFile(folder / name).value(), "bytes");
+  }
+  EXPECT_EQ(ReadFile(folder / "other").value(), "kept");
+  EXPECT_EQ(folder.Entries(), 7);
 }
 
 TEST(Files, MissingFileAndFolderAreNamed) {

@@ -1,8 +1,12 @@
 #include "core/guard.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -55,6 +59,23 @@ TEST(Guard, ACodeThatIsReturnedIsKept) {
   const Ended ended = EndOf([] { return 4; });
   EXPECT_EQ(ended.code, 4);
   EXPECT_EQ(ended.said, "");
+}
+
+// A file with the number of stderr would get what is printed.
+TEST(Guard, NoFileGetsTheNumberOfAStandardDescriptor) {
+  const pid_t child = fork();
+  if (child == 0) {
+    for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) close(descriptor);
+    _exit(GuardedMain("program", [] {
+      const int opened = open("/dev/null", O_RDONLY);
+      // As before, a result cannot be written to a stdout that was closed.
+      return opened > STDERR_FILENO && write(STDOUT_FILENO, "x", 1) < 0 && errno == EBADF ? 0 : 1;
+    }));
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 TEST(Guard, LimitsOfTheEnvironmentHoldOrAreRefused) {

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "eval/generate.h"
 #include "eval/workers.h"
 #include "sequence/open_sequence.h"
 #include "sequence/sequence_json.h"
@@ -170,6 +171,29 @@ TEST_F(Generation, WhatDoesNotVerifyIsNotPublished) {
   EXPECT_NE(output.err.find("does not verify"), std::string::npos) << output.err;
   EXPECT_FALSE(fs::exists(out_));
   EXPECT_FALSE(fs::exists(hidden_));
+}
+
+// Rendering takes a while; what somebody has put there since is theirs.
+TEST_F(Generation, WhatCameMeanwhileIsNotReplaced) {
+  const SceneConfig scene = LoadSceneConfig(scene_).value();
+  GenerateOptions options;
+  options.out = out_;
+  options.ray_share = 0;
+  options.progress = [&](const std::string& phase, int, int, int) {
+    if (phase == "verify") EXPECT_TRUE(WriteFile(out_ / "theirs.txt", "kept").has_value());
+  };
+  const auto made = GenerateSequence(scene, "0", options);
+  ASSERT_FALSE(made.has_value());
+  EXPECT_EQ(made.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(made.error().message.find("holds something other than a sequence"), std::string::npos)
+      << made.error().message;
+  EXPECT_EQ(ReadFile(out_ / "theirs.txt").value(), "kept");
+  // Once it is away nothing has to be rendered again.
+  fs::remove_all(out_);
+  options.progress = nullptr;
+  const auto again = GenerateSequence(scene, "0", options);
+  ASSERT_TRUE(again.has_value()) << again.error().message;
+  EXPECT_EQ(again->resumed_frames, kFrames);
 }
 
 TEST_F(Generation, WritesWhatItMeasured) {

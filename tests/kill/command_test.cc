@@ -1,4 +1,4 @@
-// map, compare and report --video, killed or on a full disk while they write.
+// map, compare, replay and report --video, killed or on a full disk while they write.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -128,6 +128,35 @@ TEST_F(KilledCommands, CompareOnAFullDisk) {
   Strike(With(compare_, {"--keep-meshes"}), compare_, "ENOSPC", 2, 1);
 }
 
+// Two frames of two cells: which file is of which would not be seen.
+TEST_F(KilledCommands, Replay) {
+  ASSERT_TRUE(WriteFile(folder_ / "experiment.toml", R"(name = "tiny"
+question = "Which frame is it?"
+metrics = ["visible_completion"]
+baseline = "tsdf"
+replicates = ["seed"]
+[[grid]]
+scene = "tiny.toml"
+seed = 1
+method = ["tsdf", "tsdf++"]
+)")
+                  .has_value());
+  const fs::path swept = folder_ / "swept";
+  const auto sweep = test::RunTsdfpp(
+      {"sweep", folder_ / "experiment.toml", "--out", swept, "--scale", "1", "--stride", "1"},
+      folder_.path());
+  ASSERT_EQ(sweep.exit_code, 0) << sweep.err;
+  std::vector<std::string> cells;
+  for (const auto& entry : fs::directory_iterator(swept / "cells")) {
+    cells.push_back(entry.path().stem());
+  }
+  ASSERT_EQ(cells.size(), 2U);
+  const auto replay = [&](const std::string& cell, const char* frame) -> std::vector<std::string> {
+    return {"replay", swept, "--cell", cell, "--frame", frame, "--out", out_};
+  };
+  Strike(replay(cells[0], "2"), replay(cells[1], "1"), "kill", 2, 12);
+}
+
 // One that was killed while its files moved is refused, and says what to do.
 TEST_F(KilledCommands, AReportOfAnInterruptedComparison) {
   ASSERT_EQ(Command(compare_, {out_}).exit_code, 0);
@@ -195,7 +224,7 @@ TEST_F(KilledCommands, AFilmOnAFullDisk) {
   after.erase("report.mp4");
   // The shim lets nobody remove anything either, which a full disk would.
   std::erase_if(after, [](const auto& file) {
-    return file.first.ends_with(".part") || file.first.starts_with(".tsdfpp-probe-");
+    return file.first.ends_with(".part") || file.first.starts_with(".tsdfpp-probe");
   });
   EXPECT_EQ(after, before);
 }
