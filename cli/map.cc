@@ -2,6 +2,8 @@
 #include <spdlog/spdlog.h>
 
 #include <array>
+#include <set>
+#include <string>
 
 #include "cli/command.h"
 #include "cli/map_start.h"
@@ -120,6 +122,9 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
   TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, CommandText(app)));
   const std::filesystem::path& out = run_folder.path();
+  std::set<std::string> files{"stats.json", fmt::format("mesh/scene.{}", options.mesh_format)};
+  if (options.views > 0) files.insert("views/1");
+  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files)));
 
   RunTimes times;
   Pose T_WC = Pose::Identity();  // of the last frame

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <chrono>
 #include <fstream>
+#include <set>
 
 #include "core/files.h"
 #include "core/guard.h"
@@ -168,6 +169,16 @@ Error NothingLeft(const CompareResult& result) {
                       result.failed.size() > 1 ? "; and the others too" : "")};
 }
 
+// Says before the work what would stand in the way of a run's files.
+Expected<void> CheckPlaces(const CompareResult& result, const RunFolder& folder) {
+  std::set<std::string> files{kSummaryFile, kFramesFile, kPageFile};
+  for (const auto& run : result.runs) files.insert(run->FolderName() + "/mesh/scene.ply");
+  for (const AdapterConfig& adapter : result.config.adapters) {
+    files.insert(adapter.name + "/log.txt");
+  }
+  return folder.CheckPlaces(std::move(files));
+}
+
 // The last frame at which all that is left was evaluated; before the first where there is none.
 int LastEvaluated(const CompareResult& result) {
   int last = result.info.first_index - 1;
@@ -236,6 +247,7 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
     }
   }
   TSDFPP_ASSIGN(result.runs, MakeRuns(config, result.info, *result.truth));
+  TSDFPP_RETURN_IF_ERROR(CheckPlaces(result, folder_of_run));
 
   const int first = result.info.first_index;
   const int total = result.last_frame - first + 1;

@@ -180,9 +180,22 @@ Expected<void> RunFolder::ListFiles(const std::set<std::string>& rewritten) {
   return {};
 }
 
-Expected<void> RunFolder::CheckPlaces(const std::set<std::string>& old) const {
+std::set<std::string> RunFolder::OldFiles() const {
+  std::set<std::string> old;
+  for (const char* place : {kRunNote, kRunMoving}) {
+    // One that is none of ours says nothing, and goes.
+    const auto note = ReadNote(out_ / place);
+    if (!note || !*note) continue;
+    for (const auto& [name, bytes] : (*note)->files) old.insert(name);
+  }
+  return old;
+}
+
+Expected<void> RunFolder::CheckPlaces(std::set<std::string> files) const {
+  const std::set<std::string> old = OldFiles();
+  files.insert({kRunNote, kRunMoving});
   std::error_code failure;
-  for (const auto& [name, bytes] : note_.files) {
+  for (const std::string& name : files) {
     fs::path folder;
     for (const fs::path& part : fs::path(name).parent_path()) {
       folder /= part;
@@ -222,14 +235,10 @@ Expected<void> RunFolder::MoveFiles(const std::set<std::string>& old) const {
 
 Expected<void> RunFolder::Commit(const std::set<std::string>& rewritten) {
   TSDFPP_RETURN_IF_ERROR(ListFiles(rewritten));
-  std::set<std::string> old;
-  for (const char* place : {kRunNote, kRunMoving}) {
-    // One that is none of ours says nothing, and goes.
-    const auto note = ReadNote(out_ / place);
-    if (!note || !*note) continue;
-    for (const auto& [name, bytes] : (*note)->files) old.insert(name);
-  }
-  TSDFPP_RETURN_IF_ERROR(CheckPlaces(old));
+  std::set<std::string> names;
+  for (const auto& [name, bytes] : note_.files) names.insert(name);
+  TSDFPP_RETURN_IF_ERROR(CheckPlaces(std::move(names)));
+  const std::set<std::string> old = OldFiles();
   RunNote moving = note_;
   for (const std::string& name : old) moving.files.try_emplace(name, std::nullopt);
   TSDFPP_RETURN_IF_ERROR(WriteFile(staging_ / kRunMoving, JsonText(RunNoteJson(moving), 1) + "\n"));

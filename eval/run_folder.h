@@ -46,6 +46,10 @@ class RunFolder {
   // What the run is called in run.json; a summary names it, so that it is known to need one.
   const std::string& id() const { return note_.run; }
 
+  // Whether files of these names could take their places: who knows what will be written asks before
+  // the work. Errors: kUsage, as Commit.
+  Expected<void> CheckPlaces(std::set<std::string> files) const;
+
   // Moves everything to its place. Of the files named in `rewritten` the size is not kept. Errors:
   // kUsage where a folder of somebody else's stands in a file's place, or a file in a folder's,
   // kData where a name cannot be printed: then all is as before; kEnvironment where the disk
@@ -55,7 +59,8 @@ class RunFolder {
  private:
   RunFolder(FolderLock lock, std::filesystem::path out, const std::string& command);
   Expected<void> ListFiles(const std::set<std::string>& rewritten);
-  Expected<void> CheckPlaces(const std::set<std::string>& old) const;
+  // What earlier runs left, whole or not.
+  std::set<std::string> OldFiles() const;
   Expected<void> MoveFiles(const std::set<std::string>& old) const;
 
   FolderLock lock_;

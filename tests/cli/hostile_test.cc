@@ -13,6 +13,7 @@
 #include "core/files.h"
 #include "core/json_text.h"
 #include "core/one_line.h"
+#include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_writer.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
@@ -170,6 +171,27 @@ TEST_F(Hostile, NamesThatAreTooLong) {
   const CommandOutput output =
       RunTsdfpp({"map", folder_ / "set", "--out", folder_ / longer}, folder_.path());
   ExpectSentence(output, kEnvironment, "the folder cannot be made");
+}
+
+// Before the work: the set's last frame, which cannot be read, is not met.
+TEST_F(Hostile, WhatIsInTheWayIsSaidFirst) {
+  fs::resize_file(folder_ / "set" / cofusion::DepthFile(2), 10);
+  ExpectSentence(Map(folder_ / "set"), kData, cofusion::DepthFile(2));
+  ASSERT_TRUE(WriteFile(folder_ / "a/b/out/mesh", "mine").has_value());
+  ExpectSentence(Map(folder_ / "set"), kUsage, "mesh: is a file, expected a folder or nothing");
+  const auto compare = [&] {
+    return RunTsdfpp({"compare", folder_ / "set", "--out", folder_ / "c", "--voxel", "0.05",
+                      "--methods", "tsdf", "--profiles", "close"},
+                     folder_.path());
+  };
+  const auto free = compare();
+  EXPECT_EQ(free.exit_code, kData) << free.err;
+  ASSERT_TRUE(WriteFile(folder_ / "c/tsdf_close_gt", "mine").has_value());
+  ExpectSentence(compare(), kUsage, "tsdf_close_gt: is a file, expected a folder or nothing");
+  ASSERT_TRUE(WriteFile(folder_ / "d/run.json/mine", "mine").has_value());
+  ExpectSentence(RunTsdfpp({"map", folder_ / "set", "--out", folder_ / "d", "--voxel", "0.05"},
+                           folder_.path()),
+                 kUsage, "run.json: is a folder with files in it");
 }
 
 TEST_F(Hostile, PipesThatAreTypedAreRefused) {
