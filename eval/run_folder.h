@@ -46,8 +46,8 @@ class RunFolder {
   // What the run is called in run.json; a summary names it, so that it is known to need one.
   const std::string& id() const { return note_.run; }
 
-  // Whether files of these names could take their places: who knows what will be written asks before
-  // the work. Errors: kUsage, as Commit.
+  // Whether files of these names could take their places: who knows what will be written asks
+  // before the work. Errors: kUsage, as Commit.
   Expected<void> CheckPlaces(std::set<std::string> files) const;
 
   // Moves everything to its place. Of the files named in `rewritten` the size is not kept. Errors:

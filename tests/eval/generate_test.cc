@@ -1,4 +1,6 @@
 // Sequences made by several processes, stopped and killed on the way.
+#include "eval/generate.h"
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -13,7 +15,6 @@
 #include <thread>
 
 #include "core/files.h"
-#include "eval/generate.h"
 #include "eval/workers.h"
 #include "sequence/open_sequence.h"
 #include "sequence/sequence_json.h"
