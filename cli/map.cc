@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <array>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -23,7 +24,7 @@ namespace {
 struct MapArguments {
   SequenceArguments source;
   std::string method = "tsdf++/anchored";
-  std::string segmentation = "gt";
+  std::string segmentation;
   std::string poses = "gt";
   std::string profile = "close";
   std::string remove;
@@ -59,19 +60,26 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 }
 
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
+  std::optional<Segmentation> segmentation;
+  if (!options.segmentation.empty()) {
+    TSDFPP_ASSIGN(segmentation, SegmentationFromName(options.segmentation));
+    if (options.source.path.empty()) {
+      return UsageError("--segmentation {} needs a sequence to map", options.segmentation);
+    }
+  }
   if (options.load.empty()) {
     if (options.source.path.empty()) {
       return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
     }
     TSDFPP_ASSIGN(const PipelineConfig config, ConfigOf(options));
-    return StartNew(config, options.source, options.until);
+    return StartNew(config, options.source, segmentation, options.until);
   }
   for (const char* option : kSettingsOfTheMap) {
     if (app.count(option) > 0) {
       return UsageError("{} cannot be given with --load, whose map has its own", option);
     }
   }
-  return StartLoaded(options.load, options.source, options.until);
+  return StartLoaded(options.load, options.source, segmentation, options.until);
 }
 
 // The command with what was given.
@@ -131,11 +139,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   {
     ProgressBar bar("map");
     for (int index = start.first; index <= start.last; ++index) {
-      TSDFPP_ASSIGN(const Frame frame, start.source->Read(index));
-      if (frame.mask.empty()) {
-        return DataError("{}: frame {} has no mask and frame {} has one, expected masks for all",
-                         options.source.path, index, info.first_index);
-      }
+      TSDFPP_ASSIGN(const Frame frame, ReadToMap(start, index));
       TSDFPP_ASSIGN(const StepTimes step, pipeline.Process(frame));
       times.Add(step);
       T_WC = frame.T_WC;
@@ -160,7 +164,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
       {"run", run_folder.id()},
       {"method", MethodName(config.method)},
       {"poses", PoseSourceName(config.poses)},
-      {"segmentation", options.segmentation},
+      {"segmentation", SegmentationName(config.segmentation)},
       {"sequence", info.name},
       {"frames", frames},
       {"removed", removed},
@@ -171,10 +175,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
       {"times", times.ToJson()},
       {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
   };
-  if (!start.mask_remark.empty()) {
-    stats["segmentation"] = "none";
-    stats["remarks"] = {start.mask_remark};
-  }
+  if (!start.mask_remark.empty()) stats["remarks"] = {start.mask_remark};
   for (const std::string& remark : remarks) stats["remarks"].push_back(remark);
   if (!options.load.empty()) stats["loaded"] = options.load;
   if (!options.save.empty()) {
@@ -206,9 +207,10 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
          "tsdf, tsdf/min, tsdf/guarded, tsdf/static, tsdf++, tsdf++/literal, tsdf++/anchored, "
          "volumes")
       ->capture_default_str();
-  app.add_option("--segmentation", options->segmentation, "Where masks come from")
-      ->check(OneOf({"gt"}))
-      ->capture_default_str();
+  app.add_option("--segmentation", options->segmentation,
+                 "Where masks come from: gt (the sequence) or none (all is background); by default "
+                 "gt where the sequence has masks")
+      ->check(OneOf({"gt", "none"}));
   app.add_option("--poses", options->poses, "Object poses: gt (given) or icp (tracked)")
       ->capture_default_str();
   app.add_option("--profile", options->profile,

@@ -1,15 +1,46 @@
 #include "cli/map_start.h"
 
+#include <filesystem>
+#include <utility>
+
 namespace tsdfpp {
+namespace {
+
+// Opens the sequence and says where its masks come from.
+Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
+                        std::optional<Segmentation> segmentation) {
+  TSDFPP_ASSIGN(start.source, OpenArguments(arguments));
+  start.info = start.source->info();
+  if (segmentation == Segmentation::kNone) {
+    start.config.segmentation = Segmentation::kNone;
+    start.mask_remark = fmt::format(
+        "{}: its masks are not read (--segmentation none), so all of it is taken for background",
+        start.info.name);
+    return {};
+  }
+  start.has_masks = true;
+  // A scene has masks, and a frame of it takes long to render.
+  if (std::filesystem::path(arguments.path).extension() == ".toml") return {};
+  TSDFPP_ASSIGN(const Frame first, start.source->Read(start.info.first_index));
+  if (!first.mask.empty()) return {};
+  if (segmentation == Segmentation::kGiven) {
+    return DataError("{}: has no masks, expected one for each frame, for --segmentation gt",
+                     arguments.path);
+  }
+  start.has_masks = false;
+  start.config.segmentation = Segmentation::kNone;
+  start.mask_remark =
+      fmt::format("{}: has no masks, so all of it is taken for background", start.info.name);
+  return {};
+}
+
+}  // namespace
 
 Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArguments& source,
-                            int until) {
+                            std::optional<Segmentation> segmentation, int until) {
   MapStart start;
   start.config = config;
-  TSDFPP_ASSIGN(MaskedSource masked, OpenWithMasks(source));
-  start.source = std::move(masked.source);
-  start.mask_remark = std::move(masked.remark);
-  start.info = start.source->info();
+  TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, segmentation));
   start.first = start.info.first_index;
   const int end = start.info.first_index + start.info.frame_count - 1;
   start.last = until < 0 ? end : until;
@@ -17,12 +48,12 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
     return UsageError("--until {} is out of range: {} has frames {} to {}", start.last,
                       start.info.name, start.first, end);
   }
-  start.pipeline = std::make_unique<Pipeline>(config, start.info.objects);
+  start.pipeline = std::make_unique<Pipeline>(start.config, start.info.objects);
   return start;
 }
 
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,
-                               int until) {
+                               std::optional<Segmentation> segmentation, int until) {
   TSDFPP_ASSIGN(LoadedMap loaded, LoadMap(file));
   MappedRun run;
   if (loaded.run) {
@@ -44,10 +75,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.first = run.last_frame + 1;
   start.last = run.last_frame;
   if (!source.path.empty()) {
-    TSDFPP_ASSIGN(MaskedSource masked, OpenWithMasks(source));
-    start.source = std::move(masked.source);
-    start.mask_remark = std::move(masked.remark);
-    start.info = start.source->info();
+    TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, segmentation));
     if (!loaded.run || start.info.name != run.sequence || start.info.objects != run.objects) {
       return UsageError("--load {} is a map of '{}', expected one of {}, '{}'", file, run.sequence,
                         source.path, start.info.name);
@@ -65,6 +93,17 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.pipeline = std::make_unique<Pipeline>(start.config, run.objects, std::move(loaded.map),
                                               std::move(run.trajectories));
   return start;
+}
+
+Expected<Frame> ReadToMap(const MapStart& start, int index) {
+  TSDFPP_ASSIGN(Frame frame, start.source->Read(index));
+  if (!start.has_masks || *start.has_masks != frame.mask.empty()) return frame;
+  if (*start.has_masks) {
+    return DataError("{}: frame {} has no mask and frame {} has one, expected masks for all",
+                     start.info.name, index, start.info.first_index);
+  }
+  return DataError("{}: frame {} has a mask and frame {} has none, expected masks for all",
+                   start.info.name, index, start.info.first_index);
 }
 
 MappedRun RunOf(const MapStart& start, int last_frame) {

@@ -70,17 +70,13 @@ Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& ar
   return source;
 }
 
-Expected<MaskedSource> OpenWithMasks(const SequenceArguments& arguments) {
+Expected<MaskedSource> OpenForScores(const SequenceArguments& arguments) {
   TSDFPP_ASSIGN(auto source, OpenArguments(arguments));
   // A scene has masks, and a frame of it takes long to render.
   if (std::filesystem::path(arguments.path).extension() == ".toml") {
     return MaskedSource{std::move(source), ""};
   }
-  return WithBackgroundMasks(std::move(source));
-}
-
-Expected<MaskedSource> OpenForScores(const SequenceArguments& arguments) {
-  TSDFPP_ASSIGN(MaskedSource masked, OpenWithMasks(arguments));
+  TSDFPP_ASSIGN(MaskedSource masked, WithBackgroundMasks(std::move(source)));
   const std::size_t objects = masked.source->info().objects.size();
   if (!masked.remark.empty() && objects > 1) {
     return DataError(

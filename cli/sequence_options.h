@@ -31,12 +31,9 @@ std::string TextOf(const SequenceArguments& arguments);
 // the calibration's file; kUsage where options for sequences meet a scene.
 Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& arguments);
 
-// The same for those who need masks: a sequence without any is background throughout, and the
-// remark says so (sequence/background_masks.h).
-Expected<MaskedSource> OpenWithMasks(const SequenceArguments& arguments);
-
-// The same for those whose scores ask which object a pixel shows; the remark is logged. Errors:
-// also kData where a sequence without masks has objects beside the background.
+// The same for those whose scores ask which object a pixel shows: a sequence without masks is
+// background throughout, with a remark (sequence/background_masks.h), which is logged. Errors: also
+// kData where a sequence without masks has objects beside the background.
 Expected<MaskedSource> OpenForScores(const SequenceArguments& arguments);
 
 }  // namespace tsdfpp

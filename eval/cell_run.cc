@@ -30,7 +30,7 @@ Expected<void> CellMapper::Process(const Frame& frame) {
   if (pipeline_) {
     TSDFPP_ASSIGN(const StepTimes step, pipeline_->Process(frame));
     times_.Add(step);
-    frame_s_.push_back(step.track_s + step.update_poses_s + step.fuse_s);
+    frame_s_.push_back(step.Total_s());
   } else {
     frame_s_.push_back(open3d_->Integrate(frame));
   }

@@ -25,16 +25,17 @@ nlohmann::json Spread(std::vector<double> seconds) {
 }  // namespace
 
 void RunTimes::Add(const StepTimes& step) {
+  segment_s.push_back(step.segment_s);
+  associate_s.push_back(step.associate_s);
   track_s.push_back(step.track_s);
   update_poses_s.push_back(step.update_poses_s);
   fuse_s.push_back(step.fuse_s);
 }
 
 nlohmann::json RunTimes::ToJson() const {
-  return {{"track", Spread(track_s)},
-          {"update_poses", Spread(update_poses_s)},
-          {"fuse", Spread(fuse_s)},
-          {"mesh_scene", Spread(mesh_s)}};
+  return {{"segment", Spread(segment_s)}, {"associate", Spread(associate_s)},
+          {"track", Spread(track_s)},     {"update_poses", Spread(update_poses_s)},
+          {"fuse", Spread(fuse_s)},       {"mesh_scene", Spread(mesh_s)}};
 }
 
 Expected<MeshFormat> MeshFormatFromName(std::string_view name) {

@@ -12,6 +12,8 @@ namespace tsdfpp {
 
 // Times of the steps over the frames of a run, for its statistics.
 struct RunTimes {
+  std::vector<double> segment_s;
+  std::vector<double> associate_s;
   std::vector<double> track_s;
   std::vector<double> update_poses_s;
   std::vector<double> fuse_s;

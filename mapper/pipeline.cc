@@ -5,7 +5,10 @@
 #include <limits>
 #include <utility>
 
+#include "mapper/associate/given_ids.h"
 #include "mapper/lattice_range.h"
+#include "mapper/track/given_poses.h"
+#include "mapper/track/pcl_icp.h"
 
 namespace tsdfpp {
 namespace {
@@ -28,30 +31,13 @@ class StopWatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-std::set<InstanceId> LabelsIn(const cv::Mat& labels) {
-  std::set<InstanceId> ids;
-  InstanceId last = kNoInstance;
-  for (int v = 0; v < labels.rows; ++v) {
-    const auto* row = labels.ptr<InstanceId>(v);
-    for (int u = 0; u < labels.cols; ++u) {
-      if (row[u] != last) ids.insert(last = row[u]);
-    }
-  }
-  ids.erase(kNoInstance);
-  return ids;
+std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config,
+                                     const std::vector<ObjectInfo>& objects) {
+  if (config.poses == PoseSource::kIcp) return std::make_unique<PclIcp>(config.icp, objects);
+  return std::make_unique<GivenPoses>();
 }
 
 }  // namespace
-
-Expected<PoseSource> PoseSourceFromName(std::string_view name) {
-  if (name == "gt") return PoseSource::kGiven;
-  if (name == "icp") return PoseSource::kIcp;
-  return UsageError("pose source '{}' is unknown, expected gt or icp", name);
-}
-
-std::string_view PoseSourceName(PoseSource source) {
-  return source == PoseSource::kGiven ? "gt" : "icp";
-}
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
     : Pipeline(config, objects, MakeMap(config.method, config.map), {}) {}
@@ -59,70 +45,50 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
                    std::unique_ptr<MapRepresentation> map,
                    std::map<InstanceId, std::map<int, Pose>> trajectories)
-    : config_(config), map_(std::move(map)), trajectories_(std::move(trajectories)) {
+    : config_(config),
+      segmenter_(MakeSegmenter(config.segmentation)),
+      associator_(std::make_unique<GivenIds>()),
+      tracker_(MakeTracker(config, objects)),
+      map_(std::move(map)),
+      trajectories_(std::move(trajectories)) {
   is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
   }
-  for (const ObjectInfo& object : objects) {
-    if (object.id != kBackground && !object.semantic_class.empty()) tracked_.insert(object.id);
-  }
-}
-
-std::map<InstanceId, Pose> Pipeline::Track(const Frame& frame) const {
-  std::map<InstanceId, Pose> motions;
-  for (const InstanceId id : LabelsIn(frame.mask)) {
-    if (!tracked_.contains(id)) continue;
-    if (!T_WO_.contains(id)) {
-      // First seen: its frame is its lattice, where it is.
-      motions.emplace(id, Pose::Identity());
-      continue;
-    }
-    const TriangleMesh model_W = map_->ObjectMesh(id);
-    const TrackResult result = TrackObject(SegmentPoints(frame, frame.mask, id, config_.icp),
-                                           model_W, config_.map.voxel_m, config_.icp);
-    motions.emplace(id, result.T_O);
-  }
-  return motions;
-}
-
-std::map<InstanceId, Pose> Pipeline::PosesAfter(const Frame& frame) const {
-  std::map<InstanceId, Pose> poses = T_WO_;
-  if (config_.poses == PoseSource::kIcp) {
-    for (const auto& [id, T_O] : Track(frame)) {
-      const auto known = T_WO_.find(id);
-      poses[id] = known == T_WO_.end() ? T_O : Pose(T_O * known->second);
-    }
-  } else {
-    for (const auto& [id, T_WO] : frame.T_WO) poses[id] = T_WO;
-  }
-  return poses;
 }
 
 Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   StepTimes times;
   StopWatch watch;
-  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, frame.mask));
-  std::map<InstanceId, Pose> poses = PosesAfter(frame);
-  TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, frame.mask, poses));
-  T_WO_ = std::move(poses);
+  TSDFPP_ASSIGN(const cv::Mat segments, segmenter_->Segment(frame));
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments));
+  times.segment_s = watch.Lap();
+  const cv::Mat labels = associator_->Associate(frame, segments, *map_);
+  times.associate_s = watch.Lap();
+  ObjectPoses T_WO = tracker_->Track(frame, labels, *map_, T_WO_);
+  TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, T_WO));
   times.track_s = watch.Lap();
-  for (const auto& [id, T_WO] : T_WO_) {
-    map_->SetObjectPose(id, T_WO);
-    trajectories_[id][frame.index] = T_WO;
-  }
+  UpdatePoses(frame.index, std::move(T_WO));
   times.update_poses_s = watch.Lap();
-  map_->Fuse(frame, frame.mask);
+  map_->Fuse(frame, labels);
   times.fuse_s = watch.Lap();
-  CountWhileEmpty(frame);
+  CountWhileEmpty(frame, labels);
   farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
   return times;
 }
 
-void Pipeline::CountWhileEmpty(const Frame& frame) {
+void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
+  T_WO_ = std::move(T_WO);
+  for (const auto& [id, pose] : T_WO_) {
+    map_->SetObjectPose(id, pose);
+    trajectories_[id][frame] = pose;
+  }
+}
+
+void Pipeline::CountWhileEmpty(const Frame& frame, const cv::Mat& labels) {
   if (!is_empty_) return;
   is_empty_ = map_->Memory().blocks == 0;
-  if (is_empty_) in_vain_.Add(frame, frame.mask);
+  if (is_empty_) in_vain_.Add(frame, labels);
 }
 
 std::vector<std::string> Pipeline::Remarks() const {

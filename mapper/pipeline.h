@@ -1,42 +1,38 @@
 // The mapping pipeline, a frame at a time (paper section III): segment, associate, track, update
-// poses, fuse. With ground-truth masks the first two are the identity: the mask's ids are the map's
-// objects.
+// poses, fuse. Each verb but the last two, which are the map's own, is an object behind an
+// interface of one function; PipelineConfig says which.
 #pragma once
 
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "mapper/associate/associator.h"
 #include "mapper/frame_counts.h"
-#include "mapper/icp_tracker.h"
 #include "mapper/map_representation.h"
+#include "mapper/segment/segmenter.h"
+#include "mapper/track/icp_registration.h"
+#include "mapper/track/tracker.h"
 
 namespace tsdfpp {
-
-enum class PoseSource {
-  kGiven,  // Frame::T_WO
-  kIcp,    // tracked; Frame::T_WO is not read
-};
-
-// "gt" or "icp". Errors: kUsage.
-Expected<PoseSource> PoseSourceFromName(std::string_view name);
-std::string_view PoseSourceName(PoseSource source);
 
 struct PipelineConfig {
   Method method = Method::kTsdfpp;
   MapConfig map;
+  Segmentation segmentation = Segmentation::kGiven;
   PoseSource poses = PoseSource::kGiven;
   IcpConfig icp;
 };
 
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
-  double track_s = 0;         // segments, object meshes, ICP; 0 with given poses
+  double segment_s = 0;       // paper III-B; 0 with given masks
+  double associate_s = 0;     // paper III-C; 0 with given ids
+  double track_s = 0;         // paper III-D: objects' meshes, ICP; 0 with given poses
   double update_poses_s = 0;  // paper III-E
   double fuse_s = 0;          // paper III-F
+  double Total_s() const { return segment_s + associate_s + track_s + update_poses_s + fuse_s; }
 };
 
 class Pipeline {
@@ -68,17 +64,17 @@ class Pipeline {
   const std::map<InstanceId, std::map<int, Pose>>& trajectories() const { return trajectories_; }
 
  private:
-  // The relative motion of each tracked object that the frame shows, by id.
-  std::map<InstanceId, Pose> Track(const Frame& frame) const;
-  // T_WO of the objects after the frame.
-  std::map<InstanceId, Pose> PosesAfter(const Frame& frame) const;
+  // Moves the objects to where they are after the frame, and writes it down.
+  void UpdatePoses(int frame, ObjectPoses T_WO);
   // Looks at the pixels only while the map is empty.
-  void CountWhileEmpty(const Frame& frame);
+  void CountWhileEmpty(const Frame& frame, const cv::Mat& labels);
 
   PipelineConfig config_;
-  std::set<InstanceId> tracked_;  // ids with a semantic class
+  std::unique_ptr<Segmenter> segmenter_;
+  std::unique_ptr<Associator> associator_;
+  std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<MapRepresentation> map_;
-  std::map<InstanceId, Pose> T_WO_;
+  ObjectPoses T_WO_;
   std::map<InstanceId, std::map<int, Pose>> trajectories_;
   bool is_empty_ = true;   // no block has been in the map yet
   FrameCounts in_vain_;    // of the frames until then

@@ -83,6 +83,29 @@ TEST_F(Unmasked, AreMappedAsBackground) {
   }
 }
 
+// With masks on disk, --segmentation none makes the same bytes of it as of a recording without.
+TEST_F(Unmasked, IsWhatSegmentationNoneMakesOfMasks) {
+  const fs::path recording = Recording();
+  ASSERT_EQ(Map(recording, "out").exit_code, 0);
+  test::BoxSource source(4);
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kTum, folder_ / "set/boxes").has_value());
+  const CommandOutput output = Map(folder_ / "set/boxes", "none", {"--segmentation", "none"});
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  const std::string remark =
+      "boxes: its masks are not read (--segmentation none), so all of it is taken for background";
+  EXPECT_NE(output.err.find(remark), std::string::npos) << output.err;
+  EXPECT_EQ(Stats("none")["segmentation"], "none");
+  EXPECT_EQ(Stats("none")["remarks"], nlohmann::json::array({remark}));
+  EXPECT_EQ(ReadFile(folder_ / "out/mesh/scene.ply").value(),
+            ReadFile(folder_ / "none/mesh/scene.ply").value());
+
+  const CommandOutput refused = Map(recording, "gt", {"--segmentation", "gt"});
+  EXPECT_EQ(refused.exit_code, kData);
+  EXPECT_NE(refused.err.find("has no masks, expected one for each frame, for --segmentation gt"),
+            std::string::npos)
+      << refused.err;
+}
+
 TEST_F(Unmasked, HaveNothingToRemove) {
   const fs::path recording = Recording();
   const CommandOutput output = Map(recording, "out", {"--remove", "background"});

@@ -1,6 +1,7 @@
 // A map may depend on no truth that its settings do not use.
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
 #include <string>
 
 #include "mapper/pipeline.h"
@@ -18,8 +19,10 @@ struct MappedFrames {
 };
 
 MappedFrames MapFrames(Method method, PoseSource poses, const SequenceInfo& info,
-                       const std::vector<Frame>& frames) {
+                       const std::vector<Frame>& frames,
+                       Segmentation segmentation = Segmentation::kGiven) {
   PipelineConfig config;
+  config.segmentation = segmentation;
   config.method = method;
   config.poses = poses;
   Pipeline pipeline(config, info.objects);
@@ -54,6 +57,38 @@ TEST(StrippedTruth, IcpDoesNotReadTheTruePoses) {
     EXPECT_FALSE(MapFrames(method, PoseSource::kGiven, set->info, set->frames).map ==
                  MapFrames(method, PoseSource::kGiven, set->info, poisoned).map)
         << MethodName(method);
+  }
+}
+
+TEST(StrippedTruth, NoMasksDoesNotReadTheMasks) {
+  const auto set = ReadFrames("mini", 1, 6);
+  ASSERT_TRUE(set.has_value()) << set.error().message;
+  std::vector<Frame> stripped = set->frames;
+  std::vector<Frame> poisoned = set->frames;
+  for (std::size_t i = 0; i < stripped.size(); ++i) {
+    stripped[i].mask = cv::Mat();
+    cv::flip(set->frames[i].mask, poisoned[i].mask, 0);
+  }
+  for (const Method method : {Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored}) {
+    const auto map = [&](const std::vector<Frame>& frames, Segmentation segmentation) {
+      return MapFrames(method, PoseSource::kGiven, set->info, frames, segmentation).map;
+    };
+    const std::string whole = map(set->frames, Segmentation::kNone);
+    EXPECT_TRUE(whole == map(stripped, Segmentation::kNone))
+        << MethodName(method) << " differs without masks";
+    EXPECT_TRUE(whole == map(poisoned, Segmentation::kNone))
+        << MethodName(method) << " differs with wrong masks";
+    // The setting that does use them notices.
+    EXPECT_FALSE(whole == map(set->frames, Segmentation::kGiven)) << MethodName(method);
+    EXPECT_FALSE(map(set->frames, Segmentation::kGiven) == map(poisoned, Segmentation::kGiven))
+        << MethodName(method);
+    PipelineConfig config;
+    config.method = method;
+    Pipeline pipeline(config, set->info.objects);
+    const auto refused = pipeline.Process(stripped.front());
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_NE(refused.error().message.find("its mask image is 0x0"), std::string::npos)
+        << refused.error().message;
   }
 }
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <limits>
 
-#include "mapper/icp_tracker.h"
+#include "mapper/track/icp_registration.h"
 #include "tests/reference/analytic_scene.h"
 
 namespace tsdfpp {

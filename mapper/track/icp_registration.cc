@@ -1,4 +1,4 @@
-#include "mapper/icp_tracker.h"
+#include "mapper/track/icp_registration.h"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>

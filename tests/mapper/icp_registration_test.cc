@@ -1,4 +1,4 @@
-#include "mapper/icp_tracker.h"
+#include "mapper/track/icp_registration.h"
 
 #include <gtest/gtest.h>
 

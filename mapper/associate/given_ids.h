@@ -1,0 +1,15 @@
+// Segments whose ids are those of objects already, as the renderer's and an annotator's are.
+#pragma once
+
+#include "mapper/associate/associator.h"
+
+namespace tsdfpp {
+
+class GivenIds : public Associator {
+ public:
+  // The segments themselves.
+  cv::Mat Associate(const Frame& frame, const cv::Mat& segments,
+                    const MapRepresentation& map) override;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,23 @@
+#include "mapper/segment/segmenter.h"
+
+#include "mapper/segment/given_masks.h"
+#include "mapper/segment/no_masks.h"
+
+namespace tsdfpp {
+
+Expected<Segmentation> SegmentationFromName(std::string_view name) {
+  if (name == "gt") return Segmentation::kGiven;
+  if (name == "none") return Segmentation::kNone;
+  return UsageError("segmentation '{}' is unknown, expected gt or none", name);
+}
+
+std::string_view SegmentationName(Segmentation segmentation) {
+  return segmentation == Segmentation::kGiven ? "gt" : "none";
+}
+
+std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation) {
+  if (segmentation == Segmentation::kNone) return std::make_unique<NoMasks>();
+  return std::make_unique<GivenMasks>();
+}
+
+}  // namespace tsdfpp
