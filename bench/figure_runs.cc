@@ -5,6 +5,7 @@
 
 #include "core/files.h"
 #include "core/intrinsics.h"
+#include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {

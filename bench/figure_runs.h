@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "eval/evaluation.h"
+#include "eval/score/evaluation.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {

@@ -1,11 +1,11 @@
 // The mapper's inner steps on a wall with a box before it, 960x540, 1 cm, truncation 10 voxels.
 #include <benchmark/benchmark.h>
 
-#include "mapper/allocation.h"
 #include "mapper/map_representation.h"
-#include "mapper/marching_cubes.h"
-#include "mapper/pull_back.h"
-#include "mapper/volume_fusion.h"
+#include "mapper/mesh/marching_cubes.h"
+#include "mapper/volume/allocation.h"
+#include "mapper/volume/pull_back.h"
+#include "mapper/volume/volume_fusion.h"
 
 namespace tsdfpp {
 namespace {

@@ -16,7 +16,7 @@
 #include "bench/median.h"
 #include "eval/adapters/open3d_peer.h"
 #include "eval/adapters/voxel_block_grid.h"
-#include "eval/open_source.h"
+#include "eval/run/open_source.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {

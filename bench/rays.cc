@@ -11,7 +11,7 @@
 #include "bench/median.h"
 #include "bench/open3d_rays.h"
 #include "bench/ray_ids.h"
-#include "eval/open_source.h"
+#include "eval/run/open_source.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {

@@ -13,7 +13,7 @@
 
 #include "bench/figure_runs.h"
 #include "core/files.h"
-#include "eval/evaluation_columns.h"
+#include "eval/score/evaluation_columns.h"
 #include "tests/reference/float_map.h"
 
 namespace tsdfpp {

@@ -12,8 +12,9 @@
 #include "bench/clocks.h"
 #include "bench/median.h"
 #include "core/files.h"
-#include "eval/workers.h"
+#include "eval/run/workers.h"
 #include "sequence/image_files.h"
+#include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {

@@ -16,7 +16,7 @@
 #include "bench/ray_ids.h"
 #include "bench/scaling_runs.h"
 #include "core/files.h"
-#include "eval/gate_reference.h"
+#include "eval/gate/gate_reference.h"
 
 namespace tsdfpp {
 namespace {

@@ -15,7 +15,7 @@
 #include "bench/side_by_side_cases.h"
 #include "bench/side_by_side_tables.h"
 #include "core/files.h"
-#include "eval/open_source.h"
+#include "eval/run/open_source.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {

@@ -5,7 +5,7 @@
 #include "bench/side_by_side_cases.h"
 #include "eval/adapters/open3d_peer.h"
 #include "eval/adapters/voxel_block_grid.h"
-#include "eval/open_source.h"
+#include "eval/run/open_source.h"
 
 namespace tsdfpp {
 

@@ -1,4 +1,4 @@
-#include "eval/bench_set.h"
+#include "eval/sweep/bench_set.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "eval/compare.h"
+#include "eval/compare/compare.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,10 +9,10 @@
 
 #include "cli/command.h"
 #include "cli/sequence_options.h"
-#include "eval/compare_report.h"
-#include "eval/compare_tables.h"
-#include "eval/open_source.h"
-#include "eval/stand_in_truth.h"
+#include "eval/compare/compare_report.h"
+#include "eval/compare/compare_tables.h"
+#include "eval/run/open_source.h"
+#include "eval/truth/stand_in_truth.h"
 
 namespace tsdfpp {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "cli/command.h"
 #include "core/json_text.h"
-#include "eval/child_process.h"
-#include "sim/gl_context.h"
+#include "eval/adapters/child_process.h"
+#include "sim/render/gl_context.h"
 
 namespace tsdfpp {
 

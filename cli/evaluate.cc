@@ -6,8 +6,8 @@
 
 #include "cli/command.h"
 #include "cli/sequence_options.h"
-#include "eval/evaluate_meshes.h"
-#include "eval/open_source.h"
+#include "eval/run/open_source.h"
+#include "eval/score/evaluate_meshes.h"
 
 namespace tsdfpp {
 namespace {

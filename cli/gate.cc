@@ -7,10 +7,10 @@
 #include "cli/command.h"
 #include "cli/sweep_progress.h"
 #include "core/files.h"
-#include "eval/gate_audit.h"
-#include "eval/gate_explain.h"
-#include "eval/gate_report.h"
-#include "eval/gate_run.h"
+#include "eval/gate/gate_audit.h"
+#include "eval/gate/gate_explain.h"
+#include "eval/gate/gate_report.h"
+#include "eval/gate/gate_run.h"
 
 namespace tsdfpp {
 namespace {

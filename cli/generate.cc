@@ -1,4 +1,4 @@
-#include "eval/generate.h"
+#include "eval/make/generate.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,8 @@
 #include "cli/stop_on_signal.h"
 #include "core/folders.h"
 #include "core/intrinsics.h"
-#include "eval/scene_page.h"
+#include "eval/make/scene_page.h"
+#include "sim/load_scene.h"
 #include "sim/scene_list.h"
 
 namespace tsdfpp {

@@ -11,11 +11,11 @@
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "core/json_text.h"
-#include "eval/map_output.h"
-#include "eval/map_views.h"
-#include "eval/open_source.h"
-#include "eval/run_folder.h"
-#include "mapper/voxel_list.h"
+#include "eval/picture/map_output.h"
+#include "eval/picture/map_views.h"
+#include "eval/run/open_source.h"
+#include "eval/run/run_folder.h"
+#include "mapper/index/voxel_list.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {

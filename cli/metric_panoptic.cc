@@ -9,8 +9,8 @@
 #include "cli/metric.h"
 #include "core/data_folder.h"
 #include "core/json_text.h"
-#include "eval/evaluation.h"
-#include "eval/label_image.h"
+#include "eval/score/evaluation.h"
+#include "eval/score/label_image.h"
 #include "metrics/segmentation.h"
 #include "metrics/tracking_quality.h"
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "cli/metric.h"
-#include "eval/evaluation.h"
-#include "eval/surface_file.h"
+#include "eval/score/evaluation.h"
+#include "eval/score/surface_file.h"
 #include "metrics/association.h"
 #include "metrics/object_pose.h"
 #include "metrics/trajectory_report.h"

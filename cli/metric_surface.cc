@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "cli/metric.h"
-#include "eval/evaluation.h"
-#include "eval/surface_file.h"
+#include "eval/score/evaluation.h"
+#include "eval/score/surface_file.h"
 #include "metrics/surface_comparison.h"
 
 namespace tsdfpp {

@@ -1,4 +1,4 @@
-#include "eval/replay.h"
+#include "eval/sweep/replay.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

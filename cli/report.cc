@@ -4,8 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include "core/files.h"
-#include "eval/report_page.h"
-#include "eval/report_video.h"
+#include "eval/report/report_page.h"
+#include "eval/report/report_video.h"
 
 namespace tsdfpp {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "cli/command.h"
 #include "core/data_folder.h"
-#include "eval/open_source.h"
+#include "eval/run/open_source.h"
 #include "sequence/calibration.h"
 
 namespace tsdfpp {

@@ -1,10 +1,10 @@
-#include "eval/sweep.h"
+#include "eval/sweep/sweep.h"
 
 #include <fmt/format.h>
 
 #include "cli/command.h"
 #include "cli/sweep_progress.h"
-#include "eval/sweep_report.h"
+#include "eval/sweep/sweep_report.h"
 
 namespace tsdfpp {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/stop_on_signal.h"
-#include "eval/sweep.h"
+#include "eval/sweep/sweep.h"
 
 namespace tsdfpp {
 

@@ -2,7 +2,7 @@
 
 #include "cli/command.h"
 #include "core/json_text.h"
-#include "eval/certify.h"
+#include "eval/make/certify.h"
 
 namespace tsdfpp {
 namespace {

@@ -3,8 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "mapper/voxel_list.h"
-
 namespace tsdfpp {
 namespace {
 

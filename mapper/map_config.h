@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/half.h"
 #include "core/toml_reader.h"
-#include "mapper/half.h"
 
 namespace tsdfpp {
 
@@ -73,6 +73,9 @@ std::string_view ResamplingName(Resampling resampling);
 Expected<Resampling> ResamplingFromName(std::string_view name);
 
 inline constexpr double kSmallestVoxel_m = 0.0005;
+// Objects that a voxel can list.
+inline constexpr int kMaxLayers = 8;
+
 inline constexpr double kLargestVoxel_m = 1;
 
 struct MapConfig {

@@ -2,8 +2,8 @@
 
 #include "core/files.h"
 #include "core/plain_name.h"
-#include "mapper/section_file.h"
-#include "mapper/volume_store.h"
+#include "mapper/methods/volume_store.h"
+#include "mapper/store/section_file.h"
 
 namespace tsdfpp {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mapper/map_representation.h"
-#include "mapper/object_volume.h"
+#include "mapper/volume/object_volume.h"
 
 namespace tsdfpp {
 

@@ -9,11 +9,11 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
-#include "mapper/mesh_cache.h"
-#include "mapper/ray_cast.h"
-#include "mapper/scene_parts.h"
-#include "mapper/section_file.h"
-#include "mapper/tsdf_block.h"
+#include "mapper/mesh/mesh_cache.h"
+#include "mapper/mesh/scene_parts.h"
+#include "mapper/rays/ray_cast.h"
+#include "mapper/store/section_file.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
 
@@ -46,12 +46,12 @@ class MapRepresentation {
 
   // Paper III-E. The first pose given to an object is its pose at birth and moves nothing; nor does
   // one whose numbers equal the last. Objects must be given in increasing id within a frame. Poses
-  // and what they move must be such as CheckReach() lets pass (mapper/lattice_range.h).
+  // and what they move must be such as CheckReach() lets pass (mapper/map_reach.h).
   virtual void SetObjectPose(InstanceId id, const Pose& T_WO) = 0;
 
   // Paper III-F. Fuses depth, colour and labels (CV_16UC1, object ids as associated with the map;
   // pixels kNoInstance are left out) of a frame, whose own mask is not read. Aborts where
-  // CheckFrameForm() or CheckReach() refuse it (mapper/lattice_range.h).
+  // CheckFrameForm() or CheckReach() refuse it (mapper/map_reach.h).
   virtual void Fuse(const Frame& frame, const cv::Mat& labels) = 0;
 
   // Takes the object out of the map; unknown ids change nothing.
@@ -133,7 +133,7 @@ class MapRepresentation {
   virtual MapMemory Memory() const = 0;
 
   // The first thing found in what is stored that docs/map.md rules out, in a sentence; nothing
-  // where all is well. Slow (mapper/map_invariants.h).
+  // where all is well. Slow (mapper/methods/map_invariants.h).
   virtual std::optional<std::string> FindFault() const = 0;
 
   // The map's content as named sections of a file (mapper/map_file.h), always of the same names.

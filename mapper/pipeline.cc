@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "mapper/associate/given_ids.h"
-#include "mapper/lattice_range.h"
+#include "mapper/map_reach.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/pcl_icp.h"
 

@@ -49,7 +49,7 @@ class Pipeline {
 
   // Maps one frame. Errors: kData, a sentence that begins with the frame's number, where it is no
   // frame (its mask is missing, say) or something lies beyond the map's range
-  // (mapper/lattice_range.h); the map is then as it was.
+  // (mapper/map_reach.h); the map is then as it was.
   Expected<StepTimes> Process(const Frame& frame);
 
   const MapRepresentation& map() const { return *map_; }

@@ -36,7 +36,7 @@ struct Residual {
   bool operator==(const Residual&) const = default;
 };
 
-// What the verification of a whole sequence measured (eval/certify.h).
+// What the verification of a whole sequence measured (eval/make/certify.h).
 struct Certificate {
   int frames = 0;              // compared with the models, the poses and each other
   int ray_frames = 0;          // compared with rays

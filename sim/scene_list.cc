@@ -5,8 +5,9 @@
 
 #include "core/folders.h"
 #include "core/toml_reader.h"
-#include "sim/random_scene.h"
-#include "sim/scene_config.h"
+#include "sim/config/scene_config.h"
+#include "sim/load_scene.h"
+#include "sim/motion/random_scene.h"
 
 namespace tsdfpp {
 namespace {

@@ -4,13 +4,14 @@
 #include <utility>
 
 #include "core/pose_text.h"
-#include "sim/shutter.h"
+#include "sim/load_scene.h"
+#include "sim/render/shutter.h"
 
 namespace tsdfpp {
 
 namespace {
 
-// Colour is as sensed: there is no other on disk (eval/generate.h).
+// Colour is as sensed: there is no other on disk (eval/make/generate.h).
 Frame TrueFrame(const SensedFrame& sensed) {
   Frame frame = sensed.frame;
   frame.depth = sensed.truth.depth;

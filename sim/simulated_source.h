@@ -5,12 +5,12 @@
 #include <memory>
 
 #include "core/frame_source.h"
-#include "sim/gl_context.h"
-#include "sim/renderer.h"
-#include "sim/scene_builder.h"
-#include "sim/scene_config.h"
-#include "sim/scene_motion.h"
-#include "sim/sensor.h"
+#include "sim/config/scene_config.h"
+#include "sim/motion/scene_motion.h"
+#include "sim/render/gl_context.h"
+#include "sim/render/renderer.h"
+#include "sim/scene/scene_builder.h"
+#include "sim/sensor/sensor.h"
 
 namespace tsdfpp {
 

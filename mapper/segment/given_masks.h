@@ -9,7 +9,7 @@ namespace tsdfpp {
 class GivenMasks : public Segmenter {
  public:
   // The mask itself. Errors: none; whoever goes on with an image that is missing, or of another
-  // size or type, is refused by CheckFrameForm (mapper/lattice_range.h).
+  // size or type, is refused by CheckFrameForm (mapper/map_reach.h).
   Expected<cv::Mat> Segment(const Frame& frame) override;
 };
 

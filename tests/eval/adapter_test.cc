@@ -1,6 +1,6 @@
 // Other people's programs in a comparison: limits, failures that stop nobody else, what they are
 // given, and the adapters that come with the project.
-#include "eval/adapter.h"
+#include "eval/adapters/adapter.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 
 #include "core/files.h"
 #include "core/ply.h"
-#include "eval/compare.h"
-#include "eval/compare_report.h"
-#include "eval/compare_tables.h"
-#include "eval/surface_file.h"
+#include "eval/compare/compare.h"
+#include "eval/compare/compare_report.h"
+#include "eval/compare/compare_tables.h"
+#include "eval/score/surface_file.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 #include "tests/needs.h"

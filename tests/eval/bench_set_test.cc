@@ -1,5 +1,5 @@
 // The frozen benchmark is what it was, and a leaderboard takes sound results alone.
-#include "eval/bench_set.h"
+#include "eval/sweep/bench_set.h"
 
 #include <gtest/gtest.h>
 

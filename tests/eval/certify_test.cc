@@ -1,6 +1,6 @@
 // A sequence of ours is sound, and what is wrong with one that was tampered with is found and
 // named, also where the hashes were made to fit.
-#include "eval/certify.h"
+#include "eval/make/certify.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Programs that do not want to end, nor to be counted, nor to be brief.
-#include "eval/child_process.h"
+#include "eval/adapters/child_process.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -13,8 +13,8 @@
 
 #include "core/files.h"
 #include "core/one_line.h"
-#include "eval/capped_log.h"
-#include "eval/control_group.h"
+#include "eval/adapters/capped_log.h"
+#include "eval/adapters/control_group.h"
 #include "tests/core/temp_folder.h"
 #include "tests/needs.h"
 

@@ -5,9 +5,9 @@
 
 #include "core/files.h"
 #include "core/json_text.h"
-#include "eval/compare.h"
-#include "eval/compare_report.h"
-#include "eval/compare_tables.h"
+#include "eval/compare/compare.h"
+#include "eval/compare/compare_report.h"
+#include "eval/compare/compare_tables.h"
 #include "tests/core/temp_folder.h"
 #include "tests/sequence/box_source.h"
 

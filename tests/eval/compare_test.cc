@@ -1,5 +1,5 @@
 // A comparison's files, and that disk, repetition and threads change no byte of what it makes.
-#include "eval/compare.h"
+#include "eval/compare/compare.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -11,8 +11,8 @@
 
 #include "core/files.h"
 #include "core/ply.h"
-#include "eval/compare_report.h"
-#include "eval/open_source.h"
+#include "eval/compare/compare_report.h"
+#include "eval/run/open_source.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 

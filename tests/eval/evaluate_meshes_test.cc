@@ -1,6 +1,6 @@
 // Files of any mapper against the truth: closed forms on a wall with two boxes, every file format
 // and layout, everything that can be wrong with a mesh, and the same numbers as `compare`.
-#include "eval/evaluate_meshes.h"
+#include "eval/score/evaluate_meshes.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include "core/gltf.h"
 #include "core/ply.h"
 #include "core/pose_text.h"
-#include "eval/compare.h"
-#include "eval/open_source.h"
-#include "eval/surface_file.h"
+#include "eval/compare/compare.h"
+#include "eval/run/open_source.h"
+#include "eval/score/surface_file.h"
 #include "metrics/mesh_tools.h"
 #include "tests/core/temp_folder.h"
 #include "tests/sequence/box_source.h"

@@ -1,10 +1,10 @@
 // Scores of scene meshes that are made by hand, so that each value is known: what is sampled, what
 // is removed, who is counted.
-#include "eval/evaluation.h"
+#include "eval/score/evaluation.h"
 
 #include <gtest/gtest.h>
 
-#include "eval/evaluation_columns.h"
+#include "eval/score/evaluation_columns.h"
 #include "metrics/mesh_tools.h"
 #include "tests/eval/table_world.h"
 

@@ -1,12 +1,12 @@
 // Experiment files are read strictly, and say the cells that they stand for.
-#include "eval/experiment.h"
+#include "eval/sweep/experiment.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
-#include "eval/cell.h"
-#include "eval/sweep_statistics.h"
+#include "eval/sweep/cell.h"
+#include "eval/sweep/sweep_statistics.h"
 
 namespace tsdfpp {
 namespace {

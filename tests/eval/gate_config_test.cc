@@ -1,11 +1,11 @@
-#include "eval/gate_config.h"
+#include "eval/gate/gate_config.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "core/files.h"
-#include "eval/sabotage.h"
+#include "eval/sweep/sabotage.h"
 #include "tests/core/temp_folder.h"
 
 namespace tsdfpp {

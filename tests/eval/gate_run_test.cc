@@ -1,13 +1,13 @@
 // What gates make of cells, without running any: verdicts, references, reports.
-#include "eval/gate_run.h"
+#include "eval/gate/gate_run.h"
 
 #include <gtest/gtest.h>
 
 #include "core/files.h"
-#include "eval/gate_report.h"
-#include "eval/gate_times.h"
-#include "eval/report_gates.h"
-#include "eval/sweep_metrics.h"
+#include "eval/gate/gate_report.h"
+#include "eval/gate/gate_times.h"
+#include "eval/report/report_gates.h"
+#include "eval/sweep/sweep_metrics.h"
 #include "tests/core/temp_folder.h"
 
 namespace tsdfpp {

@@ -1,4 +1,4 @@
-#include "eval/gate_verdict.h"
+#include "eval/gate/gate_verdict.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Sequences made by several processes, stopped and killed on the way.
-#include "eval/generate.h"
+#include "eval/make/generate.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -15,9 +15,10 @@
 #include <thread>
 
 #include "core/files.h"
-#include "eval/workers.h"
+#include "eval/run/workers.h"
 #include "sequence/open_sequence.h"
 #include "sequence/sequence_json.h"
+#include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/tiny_scene.h"

@@ -1,5 +1,5 @@
 // The rasteriser against rays cast through every pixel, one triangle after the other, in double.
-#include "eval/rasteriser.h"
+#include "eval/tools/rasteriser.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -7,10 +7,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "eval/map_views.h"
-#include "eval/rasteriser.h"
-#include "eval/scene_sanity.h"
-#include "eval/scene_seams.h"
+#include "eval/picture/map_views.h"
+#include "eval/score/scene_sanity.h"
+#include "eval/score/scene_seams.h"
+#include "eval/tools/rasteriser.h"
 #include "mapper/map_representation.h"
 #include "sim/simulated_source.h"
 #include "tests/core/temp_folder.h"

@@ -1,9 +1,9 @@
 // Each sabotage breaks what it says, and nothing else.
-#include "eval/sabotage.h"
+#include "eval/sweep/sabotage.h"
 
 #include <gtest/gtest.h>
 
-#include "eval/sequence_variant.h"
+#include "eval/sweep/sequence_variant.h"
 
 namespace tsdfpp {
 namespace {

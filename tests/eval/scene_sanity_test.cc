@@ -1,5 +1,5 @@
 // The sanity of the visible scene on scenes whose true answer is known in closed form.
-#include "eval/scene_sanity.h"
+#include "eval/score/scene_sanity.h"
 
 #include <gtest/gtest.h>
 

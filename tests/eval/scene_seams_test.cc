@@ -1,11 +1,11 @@
 // The seams of the visible scene, where share and area are known in closed form.
-#include "eval/scene_seams.h"
+#include "eval/score/scene_seams.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "eval/mapped_pixels.h"
+#include "eval/score/mapped_pixels.h"
 #include "tests/reference/analytic_scene.h"
 
 namespace tsdfpp {

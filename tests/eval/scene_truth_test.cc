@@ -1,5 +1,5 @@
 // What is known of the truth after each frame of a small world.
-#include "eval/scene_truth.h"
+#include "eval/truth/scene_truth.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The paper's experiment on a set of somebody else's: ToyCar3's layout, names and quirks, written
 // from our renderer's frames with OpenCV alone, so that the stand-in can be held against the truth.
-#include "eval/stand_in_truth.h"
+#include "eval/truth/stand_in_truth.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/pose_text.h"
-#include "eval/compare.h"
-#include "eval/open_source.h"
+#include "eval/compare/compare.h"
+#include "eval/run/open_source.h"
 #include "metrics/mesh_tools.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "core/files.h"
-#include "eval/sequence_variant.h"
+#include "eval/sweep/sequence_variant.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/tiny_scene.h"

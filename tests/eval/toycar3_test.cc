@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "eval/compare.h"
+#include "eval/compare/compare.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {

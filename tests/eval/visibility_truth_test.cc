@@ -1,5 +1,5 @@
 // Visible fractions, boxes and hidden samples of flat plates whose images are known.
-#include "eval/visibility_truth.h"
+#include "eval/truth/visibility_truth.h"
 
 #include <gtest/gtest.h>
 

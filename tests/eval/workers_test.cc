@@ -1,4 +1,4 @@
-#include "eval/workers.h"
+#include "eval/run/workers.h"
 
 #include <gtest/gtest.h>
 

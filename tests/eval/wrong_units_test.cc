@@ -4,6 +4,7 @@
 #include "core/intrinsics.h"
 #include "sequence/export.h"
 #include "sequence/open_sequence.h"
+#include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 #include "tests/core/temp_folder.h"
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/gltf_format.h"
-#include "mapper/byte_stream.h"
-#include "mapper/section_file.h"
+#include "mapper/store/byte_stream.h"
+#include "mapper/store/section_file.h"
 #include "sequence/klg_layout.h"
 #include "tests/fuzz/file_set.h"
 

@@ -55,58 +55,58 @@ function(tsdfpp_add_readers target)
       trajectory_file.cc
       tum_reader.cc)
   set(sim
-      blob_shapes.cc
-      camera_config.cc
-      camera_path.cc
-      light_rig.cc
-      mesh_import.cc
-      mesh_repair.cc
-      mesh_shapes.cc
-      model_catalogue.cc
-      obj_reader.cc
-      object_motion.cc
-      profile_shapes.cc
-      random_scene_config.cc
-      room_model.cc
-      scene_config.cc
-      scene_inputs.cc
-      scene_object_config.cc
-      scene_readers.cc
-      scene_toml.cc
-      sensor_config.cc
-      sensor_presets.cc
-      spline.cc
-      stl_reader.cc
-      textures.cc
-      toy_models.cc
-      toys_buildings.cc
-      toys_figures.cc
-      toys_solids.cc
-      toys_vessels.cc
-      trajectory_folder.cc)
+      models/blob_shapes.cc
+      config/camera_config.cc
+      config/camera_path.cc
+      config/light_rig.cc
+      models/mesh_import.cc
+      models/mesh_repair.cc
+      models/mesh_shapes.cc
+      models/model_catalogue.cc
+      models/obj_reader.cc
+      config/object_motion.cc
+      models/profile_shapes.cc
+      config/random_scene_config.cc
+      models/room_model.cc
+      config/scene_config.cc
+      scene/scene_inputs.cc
+      config/scene_object_config.cc
+      config/scene_readers.cc
+      config/scene_toml.cc
+      config/sensor_config.cc
+      config/sensor_presets.cc
+      config/spline.cc
+      models/stl_reader.cc
+      models/textures.cc
+      models/toy_models.cc
+      models/toys_buildings.cc
+      models/toys_figures.cc
+      models/toys_solids.cc
+      models/toys_vessels.cc
+      config/trajectory_folder.cc)
   set(eval
-      adapter.cc
-      base64.cc
-      bench_set.cc
-      cell.cc
-      compare_names.cc
-      evaluation_columns.cc
-      evaluation_json.cc
-      experiment.cc
-      folder_lock.cc
-      gate_config.cc
-      gate_reference.cc
-      gate_verdict.cc
-      label_image.cc
-      map_output.cc
-      mesh_matching.cc
-      recording.cc
-      report_gates.cc
-      run_folder.cc
-      sabotage.cc
-      surface_file.cc
-      sweep_metrics.cc
-      sweep_settings.cc)
+      adapters/adapter.cc
+      tools/base64.cc
+      sweep/bench_set.cc
+      sweep/cell.cc
+      run/compare_names.cc
+      score/evaluation_columns.cc
+      score/evaluation_json.cc
+      sweep/experiment.cc
+      run/folder_lock.cc
+      gate/gate_config.cc
+      gate/gate_reference.cc
+      gate/gate_verdict.cc
+      score/label_image.cc
+      picture/map_output.cc
+      score/mesh_matching.cc
+      report/recording.cc
+      report/report_gates.cc
+      run/run_folder.cc
+      sweep/sabotage.cc
+      score/surface_file.cc
+      sweep/sweep_metrics.cc
+      sweep/sweep_settings.cc)
   set(metrics segmentation.cc statistics.cc tracking_quality.cc)
   set(cli command.cc metric.cc metric_panoptic.cc)
   set(targets configs meshes results sequences text)
@@ -115,9 +115,8 @@ function(tsdfpp_add_readers target)
     target_compile_definitions(${target} PRIVATE TSDFPP_FUZZ_MAPS=0)
   else()
     list(APPEND targets map)
-    file(GLOB mapper RELATIVE ${PROJECT_SOURCE_DIR}/mapper ${PROJECT_SOURCE_DIR}/mapper/*.cc)
-    list(REMOVE_ITEM mapper pipeline.cc)
-    list(APPEND mapper track/tracker.cc)
+    file(GLOB_RECURSE mapper RELATIVE ${PROJECT_SOURCE_DIR}/mapper ${PROJECT_SOURCE_DIR}/mapper/*.cc)
+    list(REMOVE_ITEM mapper pipeline.cc track/icp_registration.cc track/pcl_icp.cc)
   endif()
   if(NOT ARG_STAND_IN)
     list(APPEND core decode_image.cc)
@@ -125,7 +124,7 @@ function(tsdfpp_add_readers target)
   # Files are compiled together as the rooms have it, four that follow one another; the mapper's one by one, as there.
   foreach(room core sequence sim eval metrics cli mapper)
     file(
-      GLOB all
+      GLOB_RECURSE all
       RELATIVE ${PROJECT_SOURCE_DIR}/${room}
       ${PROJECT_SOURCE_DIR}/${room}/*.cc)
     foreach(source ${${room}})

@@ -3,13 +3,13 @@
 
 #include "core/files.h"
 #include "core/toml_reader.h"
-#include "eval/adapter.h"
-#include "eval/bench_set.h"
-#include "eval/gate_config.h"
-#include "eval/gate_reference.h"
-#include "sim/random_scene.h"
-#include "sim/scene_config.h"
-#include "sim/scene_inputs.h"
+#include "eval/adapters/adapter.h"
+#include "eval/gate/gate_config.h"
+#include "eval/gate/gate_reference.h"
+#include "eval/sweep/bench_set.h"
+#include "sim/config/scene_config.h"
+#include "sim/motion/random_scene.h"
+#include "sim/scene/scene_inputs.h"
 #include "tests/fuzz/complaint.h"
 #include "tests/fuzz/file_set.h"
 #include "tests/fuzz/target.h"
@@ -90,19 +90,22 @@ bool ReadBenchSet(std::string_view input) {
 }  // namespace
 
 void AddConfigTargets(std::vector<Target>& targets) {
-  targets.push_back({"scene",
-                     "",
-                     ReadScene,
-                     {"sim/scene_config.cc", "sim/scene_object_config.cc", "sim/scene_readers.cc",
-                      "sim/camera_config.cc", "sim/sensor_config.cc", "sim/light_rig.cc",
-                      "sim/random_scene_config.cc", "sim/scene_inputs.cc", "sim/scene_toml.cc"}});
+  targets.push_back(
+      {"scene",
+       "",
+       ReadScene,
+       {"sim/config/scene_config.cc", "sim/config/scene_object_config.cc",
+        "sim/config/scene_readers.cc", "sim/config/camera_config.cc", "sim/config/sensor_config.cc",
+        "sim/config/light_rig.cc", "sim/config/random_scene_config.cc", "sim/scene/scene_inputs.cc",
+        "sim/config/scene_toml.cc"}});
   targets.push_back({"experiment",
                      "experiment.toml",
                      ReadExperiment,
-                     {"eval/experiment.cc", "eval/sweep_settings.cc"}});
-  targets.push_back({"gates", "", ReadGates, {"eval/gate_config.cc", "eval/gate_reference.cc"}});
-  targets.push_back({"adapter", "adapter.toml", ReadAdapterInput, {"eval/adapter.cc"}});
-  targets.push_back({"bench_set", "", ReadBenchSet, {"eval/bench_set.cc"}});
+                     {"eval/sweep/experiment.cc", "eval/sweep/sweep_settings.cc"}});
+  targets.push_back(
+      {"gates", "", ReadGates, {"eval/gate/gate_config.cc", "eval/gate/gate_reference.cc"}});
+  targets.push_back({"adapter", "adapter.toml", ReadAdapterInput, {"eval/adapters/adapter.cc"}});
+  targets.push_back({"bench_set", "", ReadBenchSet, {"eval/sweep/bench_set.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

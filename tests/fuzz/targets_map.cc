@@ -39,8 +39,8 @@ void AddMapTargets(std::vector<Target>& targets) {
   targets.push_back({"map",
                      kMapFile,
                      ReadMap,
-                     {"mapper/map_file.cc", "mapper/section_file.cc", "mapper/volume_store.cc",
-                      "mapper/map_store.cc"}});
+                     {"mapper/map_file.cc", "mapper/store/section_file.cc",
+                      "mapper/methods/volume_store.cc", "mapper/methods/map_store.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

@@ -4,8 +4,8 @@
 
 #include "core/gltf.h"
 #include "core/ply.h"
-#include "eval/surface_file.h"
-#include "sim/mesh_import.h"
+#include "eval/score/surface_file.h"
+#include "sim/models/mesh_import.h"
 #include "tests/fuzz/complaint.h"
 #include "tests/fuzz/file_set.h"
 #include "tests/fuzz/target.h"
@@ -120,8 +120,11 @@ bool ReadGltfInput(std::string_view input) {
 void AddMeshTargets(std::vector<Target>& targets) {
   targets.push_back({"ply", "mesh.ply", ReadPlyInput, {"core/ply.cc"}});
   targets.push_back(
-      {"obj", "", ReadObjInput, {"sim/obj_reader.cc", "sim/mesh_import.cc", "sim/mesh_repair.cc"}});
-  targets.push_back({"stl", "mesh.stl", ReadStlInput, {"sim/stl_reader.cc"}});
+      {"obj",
+       "",
+       ReadObjInput,
+       {"sim/models/obj_reader.cc", "sim/models/mesh_import.cc", "sim/models/mesh_repair.cc"}});
+  targets.push_back({"stl", "mesh.stl", ReadStlInput, {"sim/models/stl_reader.cc"}});
   targets.push_back(
       {"gltf", "scene.glb", ReadGltfInput, {"core/gltf_document.cc", "core/gltf_reader.cc"}});
 }

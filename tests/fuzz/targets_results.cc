@@ -4,10 +4,10 @@
 
 #include "cli/metric.h"
 #include "core/json_text.h"
-#include "eval/cell.h"
-#include "eval/recording.h"
-#include "eval/report_gates.h"
-#include "eval/run_folder.h"
+#include "eval/report/recording.h"
+#include "eval/report/report_gates.h"
+#include "eval/run/run_folder.h"
+#include "eval/sweep/cell.h"
 #include "tests/fuzz/complaint.h"
 #include "tests/fuzz/file_set.h"
 #include "tests/fuzz/target.h"
@@ -85,14 +85,15 @@ bool ReadCoco(std::string_view input) {
 }  // namespace
 
 void AddResultTargets(std::vector<Target>& targets) {
-  targets.push_back({"recording", "", ReadRecord, {"eval/recording.cc"}});
-  targets.push_back({"run_note", "", ReadRunJson, {"eval/run_folder.cc"}});
-  targets.push_back({"gate_results", "", ReadGatesJson, {"eval/report_gates.cc"}});
-  targets.push_back({"cell", "cell.json", ReadCell, {"eval/cell.cc"}});
-  targets.push_back({"coco",
-                     "",
-                     ReadCoco,
-                     {"cli/metric_panoptic.cc", "eval/label_image.cc", "metrics/segmentation.cc"}});
+  targets.push_back({"recording", "", ReadRecord, {"eval/report/recording.cc"}});
+  targets.push_back({"run_note", "", ReadRunJson, {"eval/run/run_folder.cc"}});
+  targets.push_back({"gate_results", "", ReadGatesJson, {"eval/report/report_gates.cc"}});
+  targets.push_back({"cell", "cell.json", ReadCell, {"eval/sweep/cell.cc"}});
+  targets.push_back(
+      {"coco",
+       "",
+       ReadCoco,
+       {"cli/metric_panoptic.cc", "eval/score/label_image.cc", "metrics/segmentation.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

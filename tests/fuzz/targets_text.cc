@@ -7,7 +7,7 @@
 #include "core/toml_reader.h"
 #include "sequence/timed_poses.h"
 #include "sequence/trajectory_file.h"
-#include "sim/trajectory_folder.h"
+#include "sim/config/trajectory_folder.h"
 #include "tests/fuzz/complaint.h"
 #include "tests/fuzz/file_set.h"
 #include "tests/fuzz/target.h"
@@ -109,7 +109,7 @@ void AddTextTargets(std::vector<Target>& targets) {
                      "poses.txt",
                      ReadPoses,
                      {"core/pose_text.cc", "sequence/trajectory_file.cc", "sequence/timed_poses.cc",
-                      "sequence/text_lines.cc", "sim/trajectory_folder.cc"}});
+                      "sequence/text_lines.cc", "sim/config/trajectory_folder.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

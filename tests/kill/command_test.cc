@@ -6,8 +6,8 @@
 #include <set>
 
 #include "core/files.h"
-#include "eval/folder_lock.h"
-#include "eval/run_folder.h"
+#include "eval/run/folder_lock.h"
+#include "eval/run/run_folder.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/tiny_scene.h"
 #include "tests/kill/shimmed.h"

@@ -1,5 +1,5 @@
 // A run is one thing, at whatever change of its folder it is killed or the disk is full.
-#include "eval/run_folder.h"
+#include "eval/run/run_folder.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

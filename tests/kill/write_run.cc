@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "core/files.h"
-#include "eval/run_folder.h"
+#include "eval/run/run_folder.h"
 
 namespace tsdfpp {
 namespace {

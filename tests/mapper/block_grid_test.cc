@@ -1,5 +1,5 @@
 // The hash of blocks against a map of the standard library.
-#include "mapper/block_grid.h"
+#include "mapper/volume/block_grid.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "mapper/block_pool.h"
+#include "mapper/volume/block_pool.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {

@@ -1,5 +1,5 @@
 // Covers after frames that change a few voxels: those found anew from all masks around.
-#include "mapper/cover.h"
+#include "mapper/index/cover.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The cubes of a block and their corners, found voxel by voxel, with every instruction set.
-#include "mapper/cube_masks.h"
+#include "mapper/volume/cube_masks.h"
 
 #include <gtest/gtest.h>
 #include <hwy/highway.h>

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "mapper/lattice_range.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/toy_scene.h"
 

@@ -1,5 +1,5 @@
 // Half precision against OpenCV's, and the lanes of every instruction set against the numbers.
-#include "mapper/half.h"
+#include "core/half.h"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
-#include "mapper/half_lanes-inl.h"
+#include "mapper/volume/half_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tsdfpp::HWY_NAMESPACE {

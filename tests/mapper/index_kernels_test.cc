@@ -1,5 +1,5 @@
 // Lists in the order of distances, against a stable sort.
-#include "mapper/index_kernels.h"
+#include "mapper/index/index_kernels.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // the one made from scratch.
 #include <gtest/gtest.h>
 
-#include "mapper/scene_parts.h"
+#include "mapper/mesh/scene_parts.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/from_scratch.h"
 #include "tests/mapper/visible_triangles.h"

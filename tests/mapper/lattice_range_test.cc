@@ -1,6 +1,6 @@
 // Maps at the end of what their voxels reach: just inside it they are as anywhere, and beyond it is
 // refused.
-#include "mapper/lattice_range.h"
+#include "mapper/volume/lattice_range.h"
 
 #include <gtest/gtest.h>
 
@@ -8,12 +8,13 @@
 #include <functional>
 #include <limits>
 
-#include "mapper/byte_stream.h"
 #include "mapper/map_file.h"
-#include "mapper/map_objects.h"
 #include "mapper/map_query.h"
-#include "mapper/pull_back.h"
-#include "mapper/volume_store.h"
+#include "mapper/map_reach.h"
+#include "mapper/methods/map_objects.h"
+#include "mapper/methods/volume_store.h"
+#include "mapper/store/byte_stream.h"
+#include "mapper/volume/pull_back.h"
 #include "tests/mapper/dyadic_scene.h"
 #include "tests/mapper/every_method.h"
 

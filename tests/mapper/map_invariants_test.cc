@@ -1,12 +1,12 @@
 // What the check of the invariants notices: a map is tampered with, one number at a time.
-#include "mapper/map_invariants.h"
+#include "mapper/methods/map_invariants.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <limits>
 
-#include "mapper/cover.h"
+#include "mapper/index/cover.h"
 #include "tests/mapper/every_method.h"
 
 namespace tsdfpp {

@@ -1,11 +1,11 @@
 // Objects that are renamed, taken out of one map and put into another.
-#include "mapper/map_objects.h"
+#include "mapper/methods/map_objects.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "mapper/object_volume.h"
+#include "mapper/volume/object_volume.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/map_snapshot.h"

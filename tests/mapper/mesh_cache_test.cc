@@ -1,6 +1,6 @@
 // Meshes that are kept and brought up to date are those made from scratch, byte for byte; those are
 // the surface that the plain code traces.
-#include "mapper/mesh_cache.h"
+#include "mapper/mesh/mesh_cache.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -9,8 +9,8 @@
 #include <set>
 #include <span>
 
-#include "mapper/marching_cubes.h"
-#include "mapper/scene_parts.h"
+#include "mapper/mesh/marching_cubes.h"
+#include "mapper/mesh/scene_parts.h"
 #include "tests/mapper/from_scratch.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/toy_scene.h"

@@ -5,9 +5,9 @@
 #include <functional>
 #include <limits>
 
-#include "mapper/lattice_range.h"
 #include "mapper/map_file.h"
 #include "mapper/pipeline.h"
+#include "mapper/volume/lattice_range.h"
 #include "tests/mapper/dyadic_scene.h"
 #include "tests/mapper/every_method.h"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <set>
 
-#include "mapper/observation.h"
+#include "mapper/volume/observation.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/reference/dense_voxel.h"
 

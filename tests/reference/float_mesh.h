@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "core/types.h"
-#include "mapper/marching_cubes.h"
+#include "mapper/mesh/marching_cubes.h"
 #include "tests/reference/sparse_voxels.h"
 
 namespace tsdfpp::reference {

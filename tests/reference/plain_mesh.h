@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "mapper/tsdf_block.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp::reference {
 

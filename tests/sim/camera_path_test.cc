@@ -1,5 +1,5 @@
 // The camera's paths against what they are defined by, and against a real recording.
-#include "sim/camera_path.h"
+#include "sim/config/camera_path.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // Colour against the formulae of sRGB, of the cosine law and of shot noise.
-#include "sim/colour_noise.h"
+#include "sim/sensor/colour_noise.h"
 
 #include <gtest/gtest.h>
 
-#include "sim/linear_light.h"
+#include "sim/render/linear_light.h"
 #include "tests/sim/sensor_images.h"
 
 namespace tsdfpp {

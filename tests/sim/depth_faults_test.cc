@@ -1,11 +1,11 @@
 // Shadow, flying pixels, drop-out, range and quantisation against closed forms and ray casting.
-#include "sim/depth_faults.h"
+#include "sim/sensor/depth_faults.h"
 
 #include <gtest/gtest.h>
 
 #include "core/units.h"
-#include "sim/depth_noise.h"
-#include "sim/incidence.h"
+#include "sim/render/incidence.h"
+#include "sim/sensor/depth_noise.h"
 #include "tests/sim/sensor_images.h"
 
 namespace tsdfpp {

@@ -1,5 +1,5 @@
 // Depth models against their closed forms, and without noise against their formulae.
-#include "sim/depth_noise.h"
+#include "sim/sensor/depth_noise.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/units.h"
-#include "sim/incidence.h"
+#include "sim/render/incidence.h"
 #include "tests/sim/sensor_images.h"
 
 namespace tsdfpp {

@@ -1,6 +1,6 @@
 // The dot pattern and its matching against the published algorithm, written as it is published:
 // dots in reading order scatter their value into the pixels around.
-#include "sim/dot_pattern.h"
+#include "sim/sensor/dot_pattern.h"
 
 #include <gtest/gtest.h>
 

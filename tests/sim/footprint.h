@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/types.h"
-#include "sim/model_catalogue.h"
+#include "sim/models/model_catalogue.h"
 
 namespace tsdfpp {
 

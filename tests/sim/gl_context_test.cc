@@ -1,5 +1,5 @@
 // What happens where the machine, or the user, has no OpenGL.
-#include "sim/gl_context.h"
+#include "sim/render/gl_context.h"
 
 #include <gtest/gtest.h>
 

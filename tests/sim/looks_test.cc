@@ -8,9 +8,9 @@
 #include <set>
 
 #include "core/toml_reader.h"
-#include "sim/light_rig.h"
-#include "sim/room_model.h"
-#include "sim/textures.h"
+#include "sim/config/light_rig.h"
+#include "sim/models/room_model.h"
+#include "sim/models/textures.h"
 #include "tests/sim/mesh_checks.h"
 #include "tests/sim/model_stage.h"
 

@@ -1,5 +1,5 @@
 // Mask faults: rates and durations, and each step against brute force over all pairs of pixels.
-#include "sim/mask_faults.h"
+#include "sim/sensor/mask_faults.h"
 
 #include <gtest/gtest.h>
 

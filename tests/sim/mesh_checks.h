@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "sim/mesh_shapes.h"
+#include "sim/models/mesh_shapes.h"
 
 namespace tsdfpp {
 

@@ -1,5 +1,5 @@
 // Meshes that others made: against trimesh's figures of the same files, and hand-made small ones.
-#include "sim/mesh_import.h"
+#include "sim/models/mesh_import.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "sim/model_catalogue.h"
+#include "sim/models/model_catalogue.h"
 #include "tests/needs.h"
 #include "tests/sim/mesh_checks.h"
 #include "tests/sim/mesh_texts.h"

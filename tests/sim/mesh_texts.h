@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/files.h"
-#include "sim/mesh_import.h"
-#include "sim/mesh_shapes.h"
+#include "sim/models/mesh_import.h"
+#include "sim/models/mesh_shapes.h"
 
 namespace tsdfpp {
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "sim/renderer.h"
-#include "sim/scene_builder.h"
+#include "sim/render/renderer.h"
+#include "sim/scene/scene_builder.h"
 
 namespace tsdfpp {
 

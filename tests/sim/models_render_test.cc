@@ -7,7 +7,7 @@
 #include <set>
 
 #include "core/files.h"
-#include "sim/room_model.h"
+#include "sim/models/room_model.h"
 #include "tests/core/temp_folder.h"
 #include "tests/needs.h"
 #include "tests/sim/mesh_checks.h"

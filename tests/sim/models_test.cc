@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core/random.h"
-#include "sim/model_catalogue.h"
+#include "sim/models/model_catalogue.h"
 #include "tests/sim/mesh_checks.h"
 
 namespace tsdfpp {

@@ -3,7 +3,7 @@
 #include <sys/stat.h>
 
 #include "core/files.h"
-#include "sim/mesh_files.h"
+#include "sim/models/mesh_files.h"
 #include "tests/core/temp_folder.h"
 
 namespace tsdfpp {

@@ -1,5 +1,5 @@
 // Baked physics against the textbook's formulae.
-#include "sim/physics_bake.h"
+#include "sim/motion/physics_bake.h"
 
 #include <gtest/gtest.h>
 

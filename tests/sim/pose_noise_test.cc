@@ -1,5 +1,5 @@
 // Drift and jitter of the camera pose against the closed forms of a random walk.
-#include "sim/pose_noise.h"
+#include "sim/sensor/pose_noise.h"
 
 #include <gtest/gtest.h>
 

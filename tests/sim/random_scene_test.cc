@@ -1,5 +1,5 @@
 // Scenes drawn from ranges: apart at the start, in view, the same for the same seed, writable.
-#include "sim/random_scene.h"
+#include "sim/motion/random_scene.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,7 @@
 
 #include "core/pose_text.h"
 #include "core/toml_reader.h"
+#include "sim/load_scene.h"
 #include "tests/sim/footprint.h"
 #include "tests/sim/scene_files.h"
 #include "tests/sim/scene_geometry.h"

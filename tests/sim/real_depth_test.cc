@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "sim/depth_noise.h"
+#include "sim/sensor/depth_noise.h"
 #include "tests/needs.h"
 
 namespace tsdfpp {

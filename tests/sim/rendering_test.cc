@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/pose_text.h"
-#include "sim/mujoco_guard.h"
-#include "sim/room_model.h"
+#include "sim/models/room_model.h"
+#include "sim/scene/mujoco_guard.h"
 #include "tests/sim/scene_files.h"
 
 namespace tsdfpp {

@@ -1,11 +1,12 @@
 // What a scene file may say, and the sentence for each way to get it wrong.
-#include "sim/scene_config.h"
+#include "sim/config/scene_config.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
 #include "core/files.h"
+#include "sim/load_scene.h"
 #include "tests/core/temp_folder.h"
 #include "tests/sim/scene_files.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "sim/room_model.h"
+#include "sim/models/room_model.h"
 #include "tests/sim/footprint.h"
 #include "tests/sim/scene_files.h"
 

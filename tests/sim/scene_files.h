@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "sim/scene_config.h"
+#include "sim/config/scene_config.h"
 
 namespace tsdfpp {
 

@@ -1,9 +1,10 @@
 // The files that a scene is made of, collected so that it can be made elsewhere.
-#include "sim/scene_inputs.h"
+#include "sim/scene/scene_inputs.h"
 
 #include <gtest/gtest.h>
 
 #include "core/files.h"
+#include "sim/load_scene.h"
 #include "tests/core/temp_folder.h"
 #include "tests/sim/mesh_texts.h"
 

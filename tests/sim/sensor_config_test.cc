@@ -1,5 +1,5 @@
 // The sensor's TOML: round trips, and the sentence for each way to get it wrong.
-#include "sim/sensor_config.h"
+#include "sim/config/sensor_config.h"
 
 #include <gtest/gtest.h>
 

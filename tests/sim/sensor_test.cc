@@ -1,5 +1,5 @@
 // The whole sensor on a frame: exactness, reproducibility, and what it refuses.
-#include "sim/sensor.h"
+#include "sim/sensor/sensor.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

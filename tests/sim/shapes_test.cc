@@ -6,10 +6,10 @@
 #include <map>
 #include <set>
 
-#include "sim/mesh_shapes.h"
-#include "sim/room_model.h"
-#include "sim/spline.h"
-#include "sim/toy_models.h"
+#include "sim/config/spline.h"
+#include "sim/models/mesh_shapes.h"
+#include "sim/models/room_model.h"
+#include "sim/models/toy_models.h"
 
 namespace tsdfpp {
 namespace {

@@ -1,11 +1,11 @@
 // Motion blur and rolling shutter against integrals over time and moving bars.
-#include "sim/shutter.h"
+#include "sim/render/shutter.h"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "sim/linear_light.h"
+#include "sim/render/linear_light.h"
 #include "tests/sim/sensor_images.h"
 
 namespace tsdfpp {

@@ -1,11 +1,12 @@
 // Depth at pixels that a triangle covers edge-on, against MuJoCo's rays at the true models.
-#include "sim/sliver_pixels.h"
+#include "sim/render/sliver_pixels.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "sim/ray_scene.h"
+#include "sim/load_scene.h"
+#include "sim/render/ray_scene.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {

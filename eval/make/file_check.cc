@@ -1,0 +1,100 @@
+#include "eval/make/file_check.h"
+
+#include <tbb/parallel_for.h>
+
+#include <set>
+
+#include "core/data_folder.h"
+#include "core/folders.h"
+#include "sequence/cofusion_layout.h"
+#include "sequence/trajectory_file.h"
+
+namespace tsdfpp {
+namespace fs = std::filesystem;
+namespace {
+
+Finding FileFinding(const std::string& file, std::string sentence, int frame = -1) {
+  return {"files", file, frame, std::move(sentence)};
+}
+
+}  // namespace
+
+std::vector<Finding> CheckFiles(const fs::path& folder, const SequenceRecord& record) {
+  std::vector<Finding> findings;
+  const std::vector<std::pair<std::string, std::string>> listed(record.hashes.begin(),
+                                                                record.hashes.end());
+  std::vector<std::string> wrong(listed.size());
+  const DataFolder data(folder);
+  tbb::parallel_for(std::size_t{0}, listed.size(), [&](std::size_t i) {
+    const auto& [file, hash] = listed[i];
+    const auto bytes = data.Read(file);
+    if (!bytes) {
+      wrong[i] =
+          fmt::format("is listed in sequence.json and cannot be read ({})", bytes.error().message);
+    } else if (const std::string found = HashText(*bytes); found != hash) {
+      wrong[i] =
+          fmt::format("its hash is {}, sequence.json says {}: the file was changed", found, hash);
+    }
+  });
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    if (!wrong[i].empty()) findings.push_back(FileFinding(listed[i].first, wrong[i]));
+  }
+  std::set<std::string> strangers;
+  const auto there = ListFilesBelow(folder);
+  if (!there) findings.push_back(FileFinding("", there.error().message));
+  for (const fs::path& path : there ? *there : std::vector<fs::path>()) {
+    const std::string file = path.lexically_relative(folder).string();
+    if (file != cofusion::kSequence && !record.hashes.contains(file)) strangers.insert(file);
+  }
+  for (const std::string& file : strangers) {
+    findings.push_back(FileFinding(file, "is not listed in sequence.json"));
+  }
+  const SequenceInfo& info = record.info;
+  for (int index = info.first_index; index < info.first_index + info.frame_count; ++index) {
+    for (const std::string& file :
+         {cofusion::ColourFile(index), cofusion::DepthFile(index), cofusion::MaskFile(index)}) {
+      if (!record.hashes.contains(file)) {
+        findings.push_back(
+            FileFinding(file, "a frame's image is not listed in sequence.json", index));
+      }
+    }
+  }
+  return findings;
+}
+
+std::vector<Finding> CheckTrajectories(const fs::path& folder, const SequenceRecord& record) {
+  std::vector<Finding> findings;
+  const SequenceInfo& info = record.info;
+  const int last = info.first_index + info.frame_count - 1;
+  const auto check = [&](const std::string& file, bool every_frame) {
+    const auto trajectory = ReadTrajectory(folder / file);
+    if (!trajectory) {
+      findings.push_back(FileFinding(file, trajectory.error().message));
+      return;
+    }
+    for (const auto& [index, pose] : *trajectory) {
+      if (index < info.first_index || index > last) {
+        findings.push_back(FileFinding(file,
+                                       fmt::format("a pose for frame {}, the frames are {} to {}",
+                                                   index, info.first_index, last),
+                                       index));
+      }
+    }
+    for (int index = info.first_index; every_frame && index <= last; ++index) {
+      if (!trajectory->contains(index)) {
+        findings.push_back(FileFinding(file, "no pose for this frame", index));
+      }
+    }
+  };
+  check(cofusion::kCameraTrajectory, true);
+  for (const ObjectInfo& object : info.objects) {
+    if (object.id != kBackground) check(cofusion::TrajectoryFile(object), false);
+    if (!record.hashes.contains(cofusion::ModelFile(object))) {
+      findings.push_back(FileFinding(cofusion::ModelFile(object),
+                                     "an object's model is not listed in sequence.json"));
+    }
+  }
+  return findings;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,30 @@
+// The figures of an evaluation that tables and frames.csv show, in one place (docs/metrics.md).
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "eval/score/evaluation.h"
+
+namespace tsdfpp {
+
+struct EvaluationColumn {
+  std::string title;  // in tables
+  std::string csv;    // in frames.csv
+  // Of the evaluation, where these objects are the ones that the experiment removes.
+  std::function<Measured(const std::set<InstanceId>& movers, const Evaluation&)> value;
+  int decimals;
+  // Its standard error, of sampling alone, in the same unit; empty where none is known. In
+  // frames.csv the column after it, with "_se" after its name.
+  std::function<Measured(const Evaluation&)> error = {};
+};
+
+const std::vector<EvaluationColumn>& EvaluationColumns();
+
+// What a table shows of a column: "58", or "58 ±0.6" where there is an error; "-" where undefined.
+std::string ColumnText(const EvaluationColumn& column, const std::set<InstanceId>& movers,
+                       const Evaluation& evaluation);
+
+}  // namespace tsdfpp

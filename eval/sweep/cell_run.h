@@ -1,0 +1,44 @@
+// Runs cells: several mappers on the same frames, which are rendered once.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "eval/adapters/open3d_peer.h"
+#include "eval/sweep/cell.h"
+#include "eval/sweep/sequence_variant.h"
+#include "mapper/pipeline.h"
+
+namespace tsdfpp {
+
+// The mapper of a cell: ours behind the pipeline, or Open3D's volume of a static world.
+class CellMapper {
+ public:
+  // The settings must be valid.
+  CellMapper(const CellSettings& settings, const std::vector<ObjectInfo>& objects);
+
+  // Errors: those of Pipeline::Process.
+  Expected<void> Process(const Frame& frame);
+  // What an evaluation looks at, after the removals that it needs. Open3D's mesh has no labels.
+  SceneMeshes Meshes(const std::set<InstanceId>& movers);
+  RunCosts costs() const;
+  double voxel_m() const { return config_.map.voxel_m; }
+  // nullptr of Open3D.
+  const MapRepresentation* map() const { return pipeline_ ? &pipeline_->map() : nullptr; }
+
+ private:
+  PipelineConfig config_;
+  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<Open3dVolume> open3d_;
+  RunTimes times_;               // not of Open3D
+  std::vector<double> frame_s_;  // of each frame
+};
+
+// The results of `cells`, which all have the frames of `variant`, in their order. `progress` is
+// called after each frame. Errors: those of the source; kData where a frame does not fit the truth.
+Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
+                                           const std::vector<const Cell*>& cells,
+                                           const std::function<void()>& progress);
+
+}  // namespace tsdfpp

@@ -1,0 +1,215 @@
+#include "eval/sweep/replay.h"
+
+#include <algorithm>
+
+#include "core/data_folder.h"
+#include "core/files.h"
+#include "core/folders.h"
+#include "core/json_text.h"
+#include "core/plain_name.h"
+#include "core/ply.h"
+#include "eval/picture/map_slice.h"
+#include "eval/picture/map_views.h"
+#include "eval/run/program_identity.h"
+#include "eval/run/run_folder.h"
+#include "eval/sweep/cell_run.h"
+#include "eval/sweep/sweep_report.h"
+#include "sequence/image_files.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct Recorded {
+  std::string id;
+  CellSettings settings;
+  SequenceVariant variant;
+  std::string program;
+  json cell;  // its file
+};
+
+Expected<std::string> FindCell(const json& cells, const std::string& wanted,
+                               const std::string& where) {
+  std::vector<std::string> found;
+  for (const auto& [id, cell] : cells.items()) {
+    if (!wanted.empty() && id.starts_with(wanted)) found.push_back(id);
+  }
+  if (found.size() == 1) return found.front();
+  if (!found.empty()) {
+    return UsageError("{}: {} cells begin with '{}', expected one: {}", where, found.size(), wanted,
+                      fmt::join(found, ", "));
+  }
+  return UsageError("{}: has no cell '{}'; its {} cells are in results.csv", where, wanted,
+                    cells.size());
+}
+
+Expected<Recorded> Load(const ReplayOptions& options) {
+  std::error_code ignored;
+  const fs::path file =
+      fs::is_directory(options.result, ignored) ? options.result / "results.json" : options.result;
+  const std::string where = file.string();
+  const fs::path folder = file.parent_path();
+  auto results = ReadJsonObject(file);
+  if (!results) return UsageError("{}, expected an experiment's folder", results.error().message);
+  try {
+    if (results->value("kind", "") != "tsdfpp experiment" ||
+        results->value("schema", 0) != kResultsSchema) {
+      return DataError("{}: is no experiment's result of schema {}", where, kResultsSchema);
+    }
+    Recorded recorded;
+    TSDFPP_ASSIGN(recorded.id, FindCell(results->at("cells"), options.cell, where));
+    TSDFPP_RETURN_IF_ERROR(CheckPlainName(recorded.id, where + ": a cell"));
+    const json& cell = results->at("cells").at(recorded.id);
+    TSDFPP_ASSIGN(recorded.settings, SettingsFromJson(cell.at("settings")));
+    const json& sequence = results->at("sequences").at(cell.at("sequence").get<std::string>());
+    TSDFPP_ASSIGN(const fs::path scene,
+                  DataFolder(folder).Find(sequence.at("scene").get<std::string>()));
+    SequenceVariant& variant = recorded.variant;
+    TSDFPP_ASSIGN(variant.scene_text, ReadFile(scene));
+    TSDFPP_ASSIGN(variant.scene,
+                  ParseSceneConfig(variant.scene_text, scene.string(), scene.parent_path()));
+    variant.frames = sequence.at("frames").get<std::vector<int>>();
+    variant.evaluated = sequence.at("evaluated").get<std::vector<int>>();
+    variant.examined = sequence.at("examined");
+    variant.fuse_until = sequence.at("fuse_until");
+    variant.object_error = sequence.at("object_error");
+    recorded.program = fmt::format("{}, {}", results->at("program").get<std::string>(),
+                                   results->at("renderer").get<std::string>());
+    TSDFPP_ASSIGN(recorded.cell, ReadJsonObject(folder / "cells" / (recorded.id + ".json")));
+    return recorded;
+  } catch (const std::exception& error) {
+    return DataError("{}: a field is missing or wrong ({})", where, error.what());
+  }
+}
+
+// The digest that the original run noted of a frame's map; empty where it was not evaluated.
+std::string NotedMap(const json& cell, int frame) {
+  for (const json& entry : cell.at("frames")) {
+    if (entry.at("frame") == frame) return entry.at("map_digest");
+  }
+  return {};
+}
+
+Expected<void> CheckSame(const Recorded& recorded, const char* what, int frame,
+                         const std::string& now, const std::string& noted,
+                         const SimulatedSource& source) {
+  if (now == noted) return {};
+  const GlInfo& gl = source.gl_info();
+  return DataError(
+      "cell {}: {} of frame {} are not what they were: made by {}; this is {}, {}, {}, {}",
+      recorded.id, what, frame, recorded.program, ProgramIdentity(), gl.backend, gl.renderer,
+      gl.version);
+}
+
+Expected<void> WriteImage(const cv::Mat& image, const fs::path& path) {
+  TSDFPP_ASSIGN(const std::string bytes, EncodePng(image, path.string()));
+  return WriteFile(path, bytes);
+}
+
+Expected<void> WriteCamera(const Frame& frame, const fs::path& folder) {
+  TSDFPP_ASSIGN(const std::string colour, EncodeColour(frame.colour, "colour.png"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(folder / "colour.png", colour));
+  TSDFPP_ASSIGN(const std::string depth, EncodeDepth(frame.depth, "depth.exr"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(folder / "depth.exr", depth));
+  return WriteImage(frame.mask, folder / "mask.png");
+}
+
+// Through the first object that the experiment removes, else through what the image's middle shows.
+SliceFrame SliceOf(const VariantFrame& both, const std::set<InstanceId>& movers) {
+  SliceFrame slice;
+  const Pose& T_WC = both.truth.T_WC;
+  const auto first = movers.empty() ? both.truth.T_WO.end() : both.truth.T_WO.find(*movers.begin());
+  if (first != both.truth.T_WO.end()) {
+    slice.middle_W = first->second.translation();
+  } else {
+    const cv::Mat& depth = both.truth.depth;
+    const float middle_m = depth.at<float>(depth.rows / 2, depth.cols / 2);
+    slice.middle_W = T_WC * Eigen::Vector3d(0, 0, IsValidDepth(middle_m) ? middle_m : 1);
+  }
+  // Across the view, so that near is not hidden by far.
+  const Eigen::Vector3d right_W = T_WC.linear().col(0);
+  slice.along_W = Eigen::Vector3d(right_W.x(), right_W.y(), 0).normalized();
+  return slice;
+}
+
+Expected<void> WriteSlice(const MapSlice& slice, const fs::path& out) {
+  TSDFPP_ASSIGN(const std::string png, EncodeColour(slice.picture, "slice.png"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "slice.png", png));
+  TSDFPP_ASSIGN(const std::string exr, EncodeDepth(slice.distance, "slice-distance.exr"));
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "slice-distance.exr", exr));
+  return WriteImage(slice.id, out / "slice-id.png");
+}
+
+}  // namespace
+
+Expected<ReplayResult> Replay(const ReplayOptions& options) {
+  TSDFPP_ASSIGN(const Recorded recorded, Load(options));
+  const SequenceVariant& variant = recorded.variant;
+  const auto last = std::find(variant.frames.begin(), variant.frames.end(), options.frame);
+  if (last == variant.frames.end()) {
+    return UsageError("cell {}: frame {} is not among the {} that it used, {} to {} of every {}-th",
+                      recorded.id, options.frame, variant.frames.size(), variant.frames.front(),
+                      variant.frames.back(), variant.frames[1] - variant.frames[0]);
+  }
+  TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
+  CellMapper mapper(recorded.settings, source.info().objects);
+  ReplayResult result{recorded.settings, recorded.id, 0, std::nullopt, {}, {}, {}};
+  const int total = static_cast<int>(last - variant.frames.begin()) + 1;
+  const auto later =
+      std::upper_bound(variant.evaluated.begin(), variant.evaluated.end(), options.frame);
+  if (later != variant.evaluated.begin()) result.compared_map_frame = *std::prev(later);
+  VariantFrame both;
+  TriangleMesh scene;
+  for (int i = 0; i < total; ++i) {
+    const int index = variant.frames[static_cast<std::size_t>(i)];
+    TSDFPP_ASSIGN(both, source.Read(index));
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
+    ++result.frames;
+    if (index == result.compared_map_frame || index == options.frame) {
+      scene = mapper.Meshes({}).scene;
+      result.map_digest = MeshDigest(scene);
+    }
+    if (index == result.compared_map_frame) {
+      TSDFPP_RETURN_IF_ERROR(CheckSame(recorded, "the map's surfaces", index, result.map_digest,
+                                       NotedMap(recorded.cell, index), source.source()));
+    }
+    if (options.progress) options.progress(i + 1, total);
+  }
+  result.image_digest = ImageDigest(both.frame);
+  TSDFPP_RETURN_IF_ERROR(CheckSame(
+      recorded, "images and poses", options.frame, result.image_digest,
+      recorded.cell.at("images").value(std::to_string(options.frame), ""), source.source()));
+
+  const std::string command =
+      fmt::format("tsdfpp replay {} --cell {} --frame {} --out {}", options.result.string(),
+                  options.cell, options.frame, options.out.string());
+  TSDFPP_ASSIGN(RunFolder run, RunFolder::Begin(options.out, command));
+  const fs::path& out = run.path();
+  TSDFPP_RETURN_IF_ERROR(WriteCamera(both.frame, out / "camera"));
+  TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", scene));
+  if (const MapRepresentation* map = mapper.map()) {
+    std::set<InstanceId> movers;
+    for (const json& id : recorded.cell.at("removed")) movers.insert(id.get<InstanceId>());
+    TSDFPP_RETURN_IF_ERROR(
+        WriteViews(*map, source.info().intrinsics, both.frame.T_WC, 2, out / "views"));
+    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, movers)), out));
+  }
+  const json note{{"cell", recorded.id},
+                  {"frame", options.frame},
+                  {"settings", SettingsJson(recorded.settings)},
+                  {"program", ProgramIdentity()},
+                  {"image_digest", result.image_digest},
+                  {"map_digest", result.map_digest}};
+  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "replay.json", JsonText(note, 1) + "\n"));
+  TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(out));
+  for (const fs::path& file : written) {
+    result.files.push_back(file.lexically_relative(out).string());
+  }
+  std::sort(result.files.begin(), result.files.end());
+  TSDFPP_RETURN_IF_ERROR(run.Commit());
+  return result;
+}
+
+}  // namespace tsdfpp

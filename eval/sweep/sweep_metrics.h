@@ -1,0 +1,50 @@
+// The figures that an experiment may ask for: those of evaluations
+// (eval/score/evaluation_columns.h) and those of a whole run.
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "eval/picture/map_output.h"
+#include "eval/score/evaluation.h"
+#include "mapper/map_representation.h"
+
+namespace tsdfpp {
+
+enum class Better { kHigher, kLower };
+
+// The time to map a frame, of all mappers alike.
+inline constexpr const char* kFrameTimeMetric = "frame_ms";
+
+struct SweepMetric {
+  std::string name;   // in CSV, JSON and experiments
+  std::string words;  // in sentences and on axes, e.g. "hidden table kept"
+  std::string unit;   // empty: a share or a count
+  Better better = Better::kHigher;
+  int decimals = 3;
+};
+
+// Those of an evaluation first, in the order of EvaluationColumns().
+const std::vector<SweepMetric>& SweepMetrics();
+// nullptr where there is none of this name.
+const SweepMetric* FindMetric(std::string_view name);
+// The place of the metric of this name, which must be there.
+std::size_t MetricIndex(std::string_view name);
+// How many of them are an evaluation's, defined at every evaluated frame.
+std::size_t EvaluationMetricCount();
+
+// What a mapper took for its work.
+struct RunCosts {
+  std::optional<RunTimes> times;     // none: not measured step by step
+  std::vector<double> frame_s;       // of each frame, all steps together
+  std::optional<std::size_t> bytes;  // of the map; none: not known
+};
+
+// The values of SweepMetrics(), in their order. `movers` are the objects that were removed.
+std::vector<Measured> MeasureAll(const Evaluation& evaluation, const std::set<InstanceId>& movers,
+                                 const RunCosts& costs);
+
+}  // namespace tsdfpp

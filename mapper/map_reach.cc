@@ -1,0 +1,161 @@
+#include "mapper/map_reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "mapper/volume/lattice_range.h"
+
+namespace tsdfpp {
+namespace {
+
+// Lattices of objects in which a frame is fused, and the map's, which is the world's.
+using Lattices = std::map<InstanceId, Pose>;
+
+// The ends of the part of a pixel's ray that is looked at, in the camera's frame.
+struct RayEnds {
+  Eigen::Vector3d near_C;
+  Eigen::Vector3d far_C;
+};
+
+RayEnds EndsOfRay(const Intrinsics& k, double u, double v, double depth_m,
+                  const MapConfig& config) {
+  const Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1);
+  const double range_m = depth_m * ray.norm();
+  const Eigen::Vector3d unit = ray.normalized();
+  const double front_m = config.trunc_front_voxels * config.voxel_m;
+  const double back_m = config.trunc_back_voxels * config.voxel_m;
+  return {unit * std::max(0.0, range_m - front_m), unit * (range_m + back_m)};
+}
+
+// Whether all that the camera could see, as far as depth is valid, is in the range of a lattice.
+bool HoldsView(const LatticeRange& range, const Frame& frame, const Pose& T_LC,
+               const MapConfig& config) {
+  if (!range.Holds(T_LC.translation())) return false;
+  const Intrinsics& k = frame.intrinsics;
+  // Along a ray the last point is at most this far along the optical axis.
+  const double depth_m = double{kMaxValidDepth_m} + config.trunc_back_voxels * config.voxel_m;
+  for (int i = 0; i < 4; ++i) {
+    const double u = (i & 1) != 0 ? k.width - 1 : 0;
+    const double v = (i & 2) != 0 ? k.height - 1 : 0;
+    const Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1);
+    if (!range.Holds(T_LC * (depth_m * ray))) return false;
+  }
+  return true;
+}
+
+Expected<void> CheckPixels(const LatticeRange& range, const Frame& frame, const cv::Mat& labels,
+                           const Lattices& T_WL, const MapConfig& config) {
+  InstanceId last = kNoInstance;
+  Pose T_LC = Pose::Identity();
+  for (int v = 0; v < labels.rows; ++v) {
+    const auto* depth = frame.depth.ptr<float>(v);
+    const auto* label = labels.ptr<InstanceId>(v);
+    for (int u = 0; u < labels.cols; ++u) {
+      const InstanceId id = label[u];
+      if (id == kNoInstance || !IsValidDepth(depth[u])) continue;
+      if (id != last) {
+        const auto lattice = T_WL.find(id);
+        T_LC = lattice == T_WL.end() ? frame.T_WC : Pose(lattice->second.inverse() * frame.T_WC);
+        last = id;
+      }
+      const RayEnds ends = EndsOfRay(frame.intrinsics, u, v, depth[u], config);
+      for (const Eigen::Vector3d& p_C : {ends.near_C, ends.far_C}) {
+        const Eigen::Vector3d p_L = T_LC * p_C;
+        if (range.Holds(p_L)) continue;
+        return DataError("frame {}: pixel ({}, {}) shows object {} at {}{}", frame.index, u, v, id,
+                         T_WL.contains(id) ? "a place that in the object's own lattice is " : "",
+                         range.Beyond(p_L));
+      }
+    }
+  }
+  return {};
+}
+
+Expected<void> CheckTranslation(const LatticeRange& range, const Pose& T, const std::string& what) {
+  if (range.Holds(T.translation())) return {};
+  return DataError("{} {}", what, range.Beyond(T.translation()));
+}
+
+}  // namespace
+
+Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
+  const Intrinsics& k = frame.intrinsics;
+  const auto number = [](double x) { return std::isfinite(x); };
+  if (k.width < 1 || k.height < 1 || !(k.fx > 0) || !(k.fy > 0) || !number(k.fx) || !number(k.fy) ||
+      !number(k.cx) || !number(k.cy)) {
+    return DataError(
+        "frame {}: its camera has {}x{} pixels, focal lengths ({:g}, {:g}) and the middle "
+        "({:g}, {:g}), expected a pixel at least and focal lengths above 0",
+        frame.index, k.width, k.height, k.fx, k.fy, k.cx, k.cy);
+  }
+  struct Image {
+    const char* name;
+    const cv::Mat& image;
+    int type;
+    const char* type_name;
+  };
+  for (const Image& of : {Image{"colour", frame.colour, CV_8UC3, "8-bit colours"},
+                          Image{"depth", frame.depth, CV_32FC1, "32-bit depths"},
+                          Image{"mask", labels, CV_16UC1, "16-bit ids"}}) {
+    if (of.image.type() == of.type && of.image.size() == cv::Size(k.width, k.height)) continue;
+    return DataError("frame {}: its {} image is {}x{} (type {}), expected {}x{} of {} (type {})",
+                     frame.index, of.name, of.image.cols, of.image.rows, of.image.type(), k.width,
+                     k.height, of.type_name, of.type);
+  }
+  return CheckRigid(frame.T_WC, fmt::format("frame {}: the camera's", frame.index));
+}
+
+Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,
+                          const std::map<InstanceId, Pose>& T_WO) {
+  const MapConfig& config = map.config();
+  const LatticeRange range(config.voxel_m);
+  Lattices T_WL = map.MovedLattices();
+  for (const auto& [id, pose] : T_WO) {
+    const std::string what = fmt::format("frame {}: object {}", frame.index, id);
+    TSDFPP_RETURN_IF_ERROR(CheckRigid(pose, what + "'s"));
+    TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, pose, what + " is posed at"));
+    const ObjectMove move = map.MoveTo(id, pose);
+    TSDFPP_RETURN_IF_ERROR(CheckMoved(range, move, 0, what + "'s pose takes a part of it to"));
+    T_WL.insert_or_assign(id, move.T_WL);
+  }
+  std::erase_if(T_WL, [](const auto& lattice) {
+    return lattice.second.matrix() == Pose::Identity().matrix();
+  });
+  TSDFPP_RETURN_IF_ERROR(
+      CheckTranslation(range, frame.T_WC, fmt::format("frame {}: the camera is at", frame.index)));
+  const bool holds_all =
+      HoldsView(range, frame, frame.T_WC, config) &&
+      std::all_of(T_WL.begin(), T_WL.end(), [&](const auto& lattice) {
+        return HoldsView(range, frame, lattice.second.inverse() * frame.T_WC, config);
+      });
+  return holds_all ? Expected<void>{} : CheckPixels(range, frame, labels, T_WL, config);
+}
+
+Expected<void> CheckAddition(const MapConfig& config, InstanceId id, const TsdfGrid& volume,
+                             const Pose& T_WL, const Pose& T_WO) {
+  const LatticeRange range(config.voxel_m);
+  const std::string what = fmt::format("object {}", id);
+  TSDFPP_RETURN_IF_ERROR(CheckRigid(T_WO, what + "'s"));
+  TSDFPP_RETURN_IF_ERROR(CheckRigid(T_WL, what + "'s lattice's"));
+  TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, T_WO, what + " is posed at"));
+  // The pose at birth is kept too, where the lattice stays the object's own.
+  TSDFPP_RETURN_IF_ERROR(
+      CheckTranslation(range, T_WL.inverse() * T_WO, what + "'s pose in its own lattice is at"));
+  ObjectMove move;
+  move.blocks = &volume;
+  TSDFPP_RETURN_IF_ERROR(CheckMoved(range, move, 0, what + "'s volume has a part at"));
+  move.T = T_WL;
+  return CheckMoved(range, move, 0, what + "'s lattice takes a part of it to");
+}
+
+void RequireReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels) {
+  Expected<void> status = CheckFrameForm(frame, labels);
+  if (status) status = CheckReach(map, frame, labels, {});
+  if (status) return;
+  std::fprintf(stderr, "tsdfpp: %s\n", status.error().message.c_str());
+  std::abort();
+}
+
+}  // namespace tsdfpp

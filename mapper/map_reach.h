@@ -1,0 +1,31 @@
+// The checks that keep out of a map what lies beyond its range (mapper/volume/lattice_range.h).
+#pragma once
+
+#include <map>
+
+#include "core/error.h"
+#include "mapper/map_representation.h"
+
+namespace tsdfpp {
+
+// Whether the frame is one at all: images of the camera's size and of the types that core/types.h
+// states, a camera with focal lengths, a rigid camera pose. The mask is that which is given.
+// Errors: kData, a sentence beginning with the frame's number. No pixel is looked at.
+Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels);
+
+// Whether the map can take these poses of objects and then this frame, whose form is right: the
+// poses, what they move, the camera, and all that the frame's depth may show lie in the range.
+// Errors: kData, a sentence. Costs a few rays and boxes, and a look at the pixels only where the
+// image's corners, as far away as depth is valid, do not all lie in the range.
+Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,
+                          const std::map<InstanceId, Pose>& T_WO);
+
+// For Add(): the volume, where it is to be and the pose. Errors: kData, a sentence.
+Expected<void> CheckAddition(const MapConfig& config, InstanceId id, const TsdfGrid& volume,
+                             const Pose& T_WL, const Pose& T_WO);
+
+// Aborts with the sentence where a frame that is about to be fused is refused by CheckFrameForm or
+// CheckReach: who fuses into a map by himself asks first.
+void RequireReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels);
+
+}  // namespace tsdfpp

@@ -1,0 +1,95 @@
+// From the cached parts of one or more grids to one mesh: placed in the world, labelled, without
+// what is hidden (docs/map.md, "Scene mesh of both").
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "mapper/index/voxel_labels.h"
+#include "mapper/mesh/mesh_cache.h"
+#include "mapper/volume/object_volume.h"
+
+namespace tsdfpp {
+
+// What one block of one volume adds to the visible scene.
+struct ScenePiece {
+  InstanceId id = kNoInstance;  // of the volume; kNoInstance where the map has one field for all
+  Index3 block;                 // of the volume's lattice
+  // In the world, with face_ids, the triangles of the cubes that the block's voxels name and the
+  // vertices that they use. Vertices at a border are in the parts on both sides.
+  TriangleMesh mesh;
+};
+
+// What changed of the visible scene (MapRepresentation::TakeSceneChanges).
+struct SceneChanges {
+  std::vector<ScenePiece> parts;
+  MeshWork work;  // of bringing the kept meshes up to date
+};
+
+// The mesh of an object's volume and where it stands. A copy starts empty.
+struct PlacedMesh {
+  GridMesh mesh;
+  Pose T_WL = Pose::Identity();
+  bool lattice_is_world = true;
+  BlockBox negative;  // of the lattice: at least the blocks that hold a negative voxel
+
+  // What happened since somebody last reset these: in blocks of the lattice.
+  std::vector<Index3> changed;
+  bool has_moved = true;
+
+  // Makes `negative` as small as it can be.
+  void FindNegative();
+
+  // Brings the mesh in line with the volume's grid and pose; `voxel` in metres.
+  MeshWork Update(const ObjectVolume& volume, float voxel);
+};
+
+// Where triangles of other objects may have a look-up voxel that this object covers, and where its
+// own have theirs: the blocks around those that hold a negative voxel.
+BlockBox ReachOf(const PlacedMesh& object, double voxel_m);
+
+// The parts of the set's blocks.
+std::vector<MeshPart*> PartsIn(const BlockSet& blocks, const GridMesh& mesh);
+
+// Where it is looked up whether a triangle is hidden, in voxels of the world: half a voxel in front
+// of its centroid, and the voxel nearest to that.
+struct LookUpPlace {
+  Index3 voxel;
+  Eigen::Vector3f point;
+};
+
+// Which triangles are hidden, from where they are looked up: 1 for those, 0 for the others. Returns
+// IdBit of all objects whose values say it. For several threads at once.
+using HiddenAt =
+    std::function<std::uint64_t(std::span<const LookUpPlace>, std::span<std::uint8_t>)>;
+
+// Finds out which triangles of some parts of the mesh are hidden: of those whose global blocks, by
+// `place_of`, are `in_doubt`; no others are. `voxel` in metres.
+// Returns the parts of which other triangles are visible than before, or whose triangles were made
+// again.
+std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float voxel,
+                                     const std::function<BlockBox(const MeshPart&)>& place_of,
+                                     const std::function<bool(const BlockBox&)>& in_doubt,
+                                     const HiddenAt& hidden_at);
+
+// Labels the triangles of the parts whose values changed by what labels of each part's own say of
+// the voxels nearest to their centroids in the lattice; `voxel` in metres.
+void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels);
+
+// One of the meshes that are put together.
+struct JoinedMesh {
+  const GridMesh* mesh = nullptr;
+  InstanceId id = kNoInstance;  // of all its faces; kNoInstance: those of its parts, where labelled
+  bool visible_only = false;    // as HideTriangles found
+};
+
+// What changed of a mesh since this was last asked of it, everything the first time: by block, the
+// parts that are no longer there among them, without triangles. They have the id of `of`.
+std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of);
+
+// The meshes one after the other, block after block; vertices that no triangle names are left out.
+TriangleMesh Join(const std::vector<JoinedMesh>& meshes);
+
+}  // namespace tsdfpp

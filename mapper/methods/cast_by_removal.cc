@@ -1,0 +1,44 @@
+#include "mapper/methods/cast_by_removal.h"
+
+#include <map>
+#include <set>
+
+namespace tsdfpp {
+
+std::vector<RaySurface> CastByRemoval(const MapRepresentation& map, std::vector<RaySurface> front,
+                                      const Intrinsics& camera, const Pose& T_WC,
+                                      const RayCastOptions& options) {
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  while (static_cast<int>(front.size()) < options.surfaces) {
+    RaySurface behind;
+    behind.depth = cv::Mat::zeros(camera.height, camera.width, CV_32FC1);
+    behind.normal = cv::Mat::zeros(camera.height, camera.width, CV_32FC3);
+    behind.id = cv::Mat(camera.height, camera.width, CV_16UC1, cv::Scalar(kNoInstance));
+    if (options.colour) behind.colour = cv::Mat::zeros(camera.height, camera.width, CV_8UC3);
+    std::map<std::set<InstanceId>, cv::Mat> pixels_by_ids;
+    for (int v = 0; v < camera.height; ++v) {
+      for (int u = 0; u < camera.width; ++u) {
+        if (front.back().id.at<std::uint16_t>(v, u) == kNoInstance) continue;
+        std::set<InstanceId> ids;
+        for (const RaySurface& surface : front) ids.insert(surface.id.at<std::uint16_t>(v, u));
+        cv::Mat& pixels = pixels_by_ids[ids];
+        if (pixels.empty()) pixels = cv::Mat::zeros(camera.height, camera.width, CV_8UC1);
+        pixels.at<std::uint8_t>(v, u) = 255;
+      }
+    }
+    for (const auto& [ids, pixels] : pixels_by_ids) {
+      const auto without = map.Clone();
+      for (const InstanceId id : ids) without->Remove(id);
+      const RaySurface seen = without->CastRays(camera, T_WC, first).front();
+      seen.depth.copyTo(behind.depth, pixels);
+      seen.normal.copyTo(behind.normal, pixels);
+      seen.id.copyTo(behind.id, pixels);
+      if (options.colour) seen.colour.copyTo(behind.colour, pixels);
+    }
+    front.push_back(std::move(behind));
+  }
+  return front;
+}
+
+}  // namespace tsdfpp

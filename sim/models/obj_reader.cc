@@ -1,0 +1,371 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+
+#include "core/data_folder.h"
+#include "core/files.h"
+#include "core/one_line.h"
+#include "sim/models/mesh_files.h"
+#include "sim/models/profile_shapes.h"
+#include "sim/models/text_scanner.h"
+
+namespace tsdfpp {
+namespace {
+
+// Cutting a face that is not convex takes time with its cube.
+constexpr std::size_t kMostConcaveCorners = 400;
+// Pictures repeat, but not that often.
+constexpr double kMostTexcoord = 1e4;
+
+Colour ToColour(const Eigen::Vector3d& rgb, double full) {
+  Colour colour{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double share = std::clamp(rgb[static_cast<Eigen::Index>(k)] / full, 0.0, 1.0);
+    colour[k] = static_cast<std::uint8_t>(255 * share + 0.5);
+  }
+  return colour;
+}
+
+// The rest of a line after its first word: a name, which may hold blanks.
+std::string RestOf(std::string_view line, std::string_view first_word) {
+  const char* rest = first_word.data() + first_word.size();
+  std::string name(rest, static_cast<std::size_t>(line.data() + line.size() - rest));
+  const auto blank = [](unsigned char c) { return std::isspace(c) != 0; };
+  name.erase(name.begin(), std::find_if_not(name.begin(), name.end(), blank));
+  name.erase(std::find_if_not(name.rbegin(), name.rend(), blank).base(), name.end());
+  return name;
+}
+
+class ObjReader {
+ public:
+  ObjReader(const std::filesystem::path& path, Materials materials)
+      : path_(path), file_(path.string()), wanted_(materials), above_(path.parent_path() / "..") {}
+
+  Expected<RawMesh> Read(std::string_view text);
+
+ private:
+  struct Corner {
+    std::uint32_t vertex = 0;
+    std::uint32_t texcoord = kNoTexcoord;
+  };
+
+  Expected<void> ReadLine(std::string_view line);
+  Expected<void> ReadVertex(const std::vector<std::string_view>& words);
+  Expected<void> ReadTexcoord(const std::vector<std::string_view>& words);
+  Expected<void> ReadFace(const std::vector<std::string_view>& words);
+  Expected<Corner> ReadCorner(std::string_view word);
+  Expected<std::uint32_t> ReadIndex(std::string_view word, std::size_t count, const char* what);
+  Expected<double> ReadNumber(std::string_view word);
+  Expected<void> CutFace(const std::vector<Corner>& corners);
+  Expected<void> AddTriangle(const Corner& a, const Corner& b, const Corner& c);
+  Companion Find(const std::filesystem::path& from, const std::string& name) const;
+  void ReadLibrary(const std::string& name);
+  void AddRemarks();
+  int MaterialNamed(const std::string& name);
+
+  std::filesystem::path path_;
+  std::string file_;
+  Materials wanted_;
+  DataFolder above_;                 // of the mesh's folder
+  std::set<std::string> libraries_;  // read
+  int line_ = 0;
+  RawMesh mesh_;
+  std::vector<std::optional<Eigen::Vector3d>> colours_;  // as written, per vertex
+  int material_ = kNoMaterial;
+  std::map<std::string, int> materials_;
+  std::size_t not_faces_ = 0;
+};
+
+Expected<double> ObjReader::ReadNumber(std::string_view word) {
+  const auto value = NumberIn<double>(word);
+  if (!value)
+    return DataError("{}: line {}: '{}' is not a number", file_, line_, word.substr(0, 40));
+  if (!std::isfinite(*value)) {
+    return DataError("{}: line {}: '{}' is not a finite number", file_, line_, word);
+  }
+  return *value;
+}
+
+Expected<void> ObjReader::ReadVertex(const std::vector<std::string_view>& words) {
+  if (words.size() < 4) {
+    return DataError("{}: line {}: a vertex has {} numbers, expected 3", file_, line_,
+                     words.size() - 1);
+  }
+  std::array<double, 6> numbers{};
+  // x y z, or x y z and red green blue; a fourth number alone is a weight, which a mesh has no use
+  // for.
+  const std::size_t count = words.size() >= 7 ? 6 : 3;
+  for (std::size_t i = 0; i < count; ++i) {
+    TSDFPP_ASSIGN(numbers[i], ReadNumber(words[i + 1]));
+  }
+  mesh_.vertices.emplace_back(numbers[0], numbers[1], numbers[2]);
+  colours_.emplace_back();
+  if (count == 6) colours_.back() = Eigen::Vector3d(numbers[3], numbers[4], numbers[5]);
+  return {};
+}
+
+Expected<void> ObjReader::ReadTexcoord(const std::vector<std::string_view>& words) {
+  if (words.size() < 2) {
+    return DataError("{}: line {}: a texture coordinate has no number", file_, line_);
+  }
+  TSDFPP_ASSIGN(const double u, ReadNumber(words[1]));
+  double v = 0;
+  if (words.size() > 2) {
+    TSDFPP_ASSIGN(v, ReadNumber(words[2]));
+  }
+  if (std::max(std::abs(u), std::abs(v)) > kMostTexcoord) {
+    return DataError("{}: line {}: texture coordinate {} {} is beyond {}", file_, line_, u, v,
+                     kMostTexcoord);
+  }
+  mesh_.texcoords.emplace_back(u, v);
+  return {};
+}
+
+// Numbered from 1, or from the end: -1 is the last so far.
+Expected<std::uint32_t> ObjReader::ReadIndex(std::string_view word, std::size_t count,
+                                             const char* what) {
+  const auto value = NumberIn<std::int64_t>(word);
+  if (!value) {
+    return DataError("{}: line {}: '{}' is no index of a {}", file_, line_, word.substr(0, 40),
+                     what);
+  }
+  const auto have = static_cast<std::int64_t>(count);
+  if (*value == 0 || *value > have || *value < -have) {
+    return DataError("{}: line {}: names {} {}, but there are {} so far", file_, line_, what,
+                     *value, count);
+  }
+  return static_cast<std::uint32_t>(*value > 0 ? *value - 1 : have + *value);
+}
+
+// v, v/vt, v//vn or v/vt/vn; normals are made anew.
+Expected<ObjReader::Corner> ObjReader::ReadCorner(std::string_view word) {
+  Corner corner;
+  const std::size_t slash = word.find('/');
+  TSDFPP_ASSIGN(corner.vertex, ReadIndex(word.substr(0, slash), mesh_.vertices.size(), "vertex"));
+  if (slash == std::string_view::npos) return corner;
+  const std::string_view rest = word.substr(slash + 1);
+  const std::string_view texcoord = rest.substr(0, rest.find('/'));
+  if (!texcoord.empty()) {
+    TSDFPP_ASSIGN(corner.texcoord,
+                  ReadIndex(texcoord, mesh_.texcoords.size(), "texture coordinate"));
+  }
+  return corner;
+}
+
+Expected<void> ObjReader::AddTriangle(const Corner& a, const Corner& b, const Corner& c) {
+  if (mesh_.triangles.size() == kMaxImportedTriangles) {
+    return DataError("{}: has more than {} triangles, expected at most that: simplify it", file_,
+                     kMaxImportedTriangles);
+  }
+  RawTriangle triangle;
+  triangle.vertex = {a.vertex, b.vertex, c.vertex};
+  triangle.texcoord = {a.texcoord, b.texcoord, c.texcoord};
+  triangle.material = material_;
+  mesh_.triangles.push_back(triangle);
+  return {};
+}
+
+Expected<void> ObjReader::CutFace(const std::vector<Corner>& corners) {
+  const std::size_t n = corners.size();
+  const auto at = [&](std::size_t i) -> const Eigen::Vector3d& {
+    return mesh_.vertices[corners[i % n].vertex];
+  };
+  // Newell's normal, of twice the area's length.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < n; ++i) normal += (at(i) - at(0)).cross(at(i + 1) - at(0));
+  bool convex = true;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Eigen::Vector3d turn = (at(i + 1) - at(i)).cross(at(i + 2) - at(i + 1));
+    convex = convex && turn.dot(normal) >= 0;
+  }
+  if (convex || n == 3) {
+    for (std::size_t i = 2; i < n; ++i) {
+      TSDFPP_RETURN_IF_ERROR(AddTriangle(corners[0], corners[i - 1], corners[i]));
+    }
+    return {};
+  }
+  if (n > kMostConcaveCorners) {
+    return DataError("{}: line {}: a face that is not convex has {} corners, expected {} at most",
+                     file_, line_, n, kMostConcaveCorners);
+  }
+  const Eigen::Vector3d u = normal.unitOrthogonal();
+  const Eigen::Vector3d v = normal.normalized().cross(u);
+  std::vector<Eigen::Vector2d> flat;
+  for (std::size_t i = 0; i < n; ++i) flat.emplace_back(u.dot(at(i)), v.dot(at(i)));
+  for (const auto& [a, b, c] : CutPolygon(flat)) {
+    TSDFPP_RETURN_IF_ERROR(AddTriangle(corners[a], corners[b], corners[c]));
+  }
+  return {};
+}
+
+Expected<void> ObjReader::ReadFace(const std::vector<std::string_view>& words) {
+  if (words.size() < 4) {
+    return DataError("{}: line {}: a face has {} corners, expected 3 at least", file_, line_,
+                     words.size() - 1);
+  }
+  std::vector<Corner> corners;
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    TSDFPP_ASSIGN(const Corner corner, ReadCorner(words[i]));
+    corners.push_back(corner);
+  }
+  return CutFace(corners);
+}
+
+int ObjReader::MaterialNamed(const std::string& name) {
+  const auto [entry, is_new] =
+      materials_.try_emplace(name, static_cast<int>(mesh_.materials.size()));
+  if (is_new) mesh_.materials.push_back({name, std::nullopt, {}});
+  return entry->second;
+}
+
+// Stands for the name of the mesh's folder in a path from the folder above it.
+constexpr const char* kMeshFolder = "\x01";
+
+// Where a path is that a file in the folder `from` (as seen from the folder above the mesh's) says.
+Companion ObjReader::Find(const std::filesystem::path& from, const std::string& name) const {
+  const std::filesystem::path seen = (from / name).lexically_normal();
+  const std::filesystem::path folder = path_.parent_path();
+  if (seen.is_absolute() || seen.begin() == seen.end() || *seen.begin() == "..") {
+    return {name, folder / name, false};
+  }
+  const bool beside = *seen.begin() == kMeshFolder;
+  const std::filesystem::path path =
+      beside ? folder / seen.lexically_relative(kMeshFolder) : folder / ".." / seen;
+  return {name, path, above_.CheckLinks(path).has_value()};
+}
+
+void ObjReader::ReadLibrary(const std::string& name) {
+  if (wanted_ == Materials::kSkip || !libraries_.insert(name).second) return;
+  std::string plain = name;
+  std::replace(plain.begin(), plain.end(), '\\', '/');
+  const Companion library = Find(kMeshFolder, plain);
+  const std::filesystem::path path = library.path;
+  const std::filesystem::path from =
+      (std::filesystem::path(kMeshFolder) / plain).lexically_normal().parent_path();
+  mesh_.companions.push_back(library);
+  const auto bytes =
+      library.inside
+          ? ReadFile(path, &Limits::text_bytes)
+          : DataError("{}: expected a relative path inside the folder above the mesh's", plain);
+  if (!bytes) {
+    mesh_.remarks.push_back(
+        fmt::format("{}: its material library cannot be read ({}), so its "
+                    "colours are not known",
+                    file_, bytes.error().message));
+    return;
+  }
+  RawMaterial* material = nullptr;
+  std::string_view text = *bytes;
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    const auto words = WordsOf(line);
+    if (words.size() < 2) continue;
+    if (words[0] == "newmtl") {
+      const int index = MaterialNamed(RestOf(line, words[0]));
+      material = &mesh_.materials[static_cast<std::size_t>(index)];
+    } else if (words[0] == "Kd" && material != nullptr && words.size() >= 4) {
+      Eigen::Vector3d rgb = Eigen::Vector3d::Constant(-1);
+      for (int k = 0; k < 3; ++k) {
+        rgb[k] = NumberIn<double>(words[static_cast<std::size_t>(k) + 1]).value_or(-1);
+      }
+      if (rgb.allFinite() && rgb.minCoeff() >= 0) {
+        material->colour = ToColour(rgb, 1);
+      } else {
+        mesh_.remarks.push_back(
+            fmt::format("{}: Kd of material '{}' is not three numbers from 0 to 1: left out",
+                        path.string(), material->name));
+      }
+    } else if (words[0] == "map_Kd" && material != nullptr) {
+      // Options such as `-s 1 1 1` come before the name, which then cannot hold blanks.
+      std::string picture =
+          words[1].starts_with('-') ? std::string(words.back()) : RestOf(line, words[0]);
+      std::replace(picture.begin(), picture.end(), '\\', '/');
+      const Companion found = Find(from, picture);
+      mesh_.companions.push_back(found);
+      if (found.inside) {
+        material->picture = found.path;
+      } else {
+        mesh_.remarks.push_back(
+            fmt::format("{}: the picture {} of material {} is not looked at, expected a relative "
+                        "path inside the folder above the mesh's",
+                        path.string(), Quoted(picture), Quoted(material->name)));
+      }
+    }
+  }
+}
+
+Expected<void> ObjReader::ReadLine(std::string_view line) {
+  const auto words = WordsOf(line.substr(0, line.find('#')));
+  if (words.empty()) return {};
+  static const std::set<std::string_view> kKnown{"vn", "vp", "o", "g", "s"};
+  if (words[0] == "v") return ReadVertex(words);
+  if (words[0] == "vt") return ReadTexcoord(words);
+  if (words[0] == "f") return ReadFace(words);
+  if (words[0] == "usemtl") {
+    material_ = MaterialNamed(RestOf(line, words[0]));
+  } else if (words[0] == "mtllib") {
+    ReadLibrary(RestOf(line, words[0]));
+  } else if (!kKnown.contains(words[0])) {
+    ++not_faces_;
+  }
+  return {};
+}
+
+void ObjReader::AddRemarks() {
+  if (not_faces_ > 0) {
+    mesh_.remarks.push_back(fmt::format(
+        "{}: {} lines are no vertices, faces or materials: left out", file_, not_faces_));
+  }
+}
+
+Expected<RawMesh> ObjReader::Read(std::string_view text) {
+  if (text.substr(0, 4096).find('\0') != std::string_view::npos) {
+    return DataError("{}: not an OBJ file: it is not text", file_);
+  }
+  std::string joined;  // of lines that end in a backslash
+  while (!text.empty()) {
+    ++line_;
+    const std::size_t end = text.find('\n');
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    if (line.ends_with('\\')) {
+      joined.append(line.substr(0, line.size() - 1)).append(" ");
+      continue;
+    }
+    if (joined.empty()) {
+      TSDFPP_RETURN_IF_ERROR(ReadLine(line));
+    } else {
+      joined.append(line);
+      TSDFPP_RETURN_IF_ERROR(ReadLine(joined));
+      joined.clear();
+    }
+  }
+  if (!joined.empty()) return DataError("{}: the file is cut off within line {}", file_, line_);
+  const bool coloured =
+      !colours_.empty() &&
+      std::all_of(colours_.begin(), colours_.end(), [](const auto& c) { return c.has_value(); });
+  if (coloured) {
+    // From 0 to 1 by custom, but some write bytes.
+    double largest = 0;
+    for (const auto& colour : colours_) largest = std::max(largest, colour->maxCoeff());
+    for (const auto& colour : colours_) {
+      mesh_.colours.push_back(ToColour(*colour, largest > 1 ? 255 : 1));
+    }
+  }
+  AddRemarks();
+  return std::move(mesh_);
+}
+
+}  // namespace
+
+Expected<RawMesh> ReadObj(const std::filesystem::path& path, std::string_view bytes,
+                          Materials materials) {
+  return ObjReader(path, materials).Read(bytes);
+}
+
+}  // namespace tsdfpp
