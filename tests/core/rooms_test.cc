@@ -1,0 +1,90 @@
+// The rooms within the large rooms (docs/architecture.md): what includes what never leads back.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+
+#include "core/files.h"
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The room of a file, by its path in the large room: its folder, or the file itself (header and
+// source together) where it lies at the top.
+std::string RoomOf(const fs::path& path) {
+  return path.has_parent_path() ? path.begin()->string() : path.stem().string();
+}
+
+using Arrows = std::map<std::string, std::map<std::string, std::string>>;  // with one include each
+
+Arrows ArrowsIn(const fs::path& source, const std::string& large) {
+  Arrows arrows;
+  const std::regex include("#include \"" + large + "/([^\"]+)\"");
+  for (const auto& entry : fs::recursive_directory_iterator(source / large)) {
+    const fs::path extension = entry.path().extension();
+    if (!entry.is_regular_file() || (extension != ".h" && extension != ".cc")) continue;
+    const fs::path file = entry.path().lexically_relative(source / large);
+    const std::string text = ReadFile(entry.path()).value();
+    for (std::sregex_iterator at(text.begin(), text.end(), include), end; at != end; ++at) {
+      const std::string included = (*at)[1];
+      const std::string from = RoomOf(file);
+      const std::string to = RoomOf(included);
+      if (from != to) arrows[from].try_emplace(to, file.string() + " includes " + included);
+    }
+  }
+  return arrows;
+}
+
+// The includes on a way from `room` back to it; empty where there is none.
+std::string WayBack(const Arrows& arrows, const std::string& room, const std::string& at,
+                    std::set<std::string>& visited) {
+  const auto from = arrows.find(at);
+  if (from == arrows.end()) return "";
+  for (const auto& [to, include] : from->second) {
+    if (to == room) return include;
+    if (!visited.insert(to).second) continue;
+    const std::string rest = WayBack(arrows, room, to, visited);
+    if (!rest.empty()) return include + ", " + rest;
+  }
+  return "";
+}
+
+std::string Circle(const Arrows& arrows) {
+  for (const auto& [room, to] : arrows) {
+    std::set<std::string> visited;
+    const std::string way = WayBack(arrows, room, room, visited);
+    if (!way.empty()) return way;
+  }
+  return "";
+}
+
+TEST(Rooms, NoneLeadsBack) {
+  for (const std::string large : {"mapper", "eval", "sim"}) {
+    const Arrows arrows = ArrowsIn(TSDFPP_SOURCE_DIR, large);
+    EXPECT_GE(arrows.size(), 7U) << large;
+    EXPECT_EQ(Circle(arrows), "") << large;
+  }
+}
+
+TEST(Rooms, AWayBackIsFound) {
+  const test::TempFolder folder;
+  const auto write = [&](const std::string& file, const std::string& included) {
+    ASSERT_TRUE(WriteFile(folder / ("house/" + file), "#include \"house/" + included + "\"\n"));
+  };
+  write("door.h", "kitchen/stove.h");
+  write("kitchen/stove.cc", "cellar/oven.h");
+  write("cellar/oven.h", "cellar/coal.h");
+  EXPECT_EQ(Circle(ArrowsIn(folder.path(), "house")), "");
+  write("cellar/coal.cc", "door.h");
+  EXPECT_NE(Circle(ArrowsIn(folder.path(), "house")).find("cellar/coal.cc includes door.h"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace tsdfpp
