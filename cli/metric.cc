@@ -51,6 +51,8 @@ Run AddMetric(CLI::App& app, const CommonOptions&) {
   add("panoptic", "Compare two folders of segmented images: PQ, STQ, IoU", AddMetricPanoptic);
   add("pose", "Compare an object's poses at its model's points: ADD, ADD-S, MSSD, MSPD, AUC",
       AddMetricPose);
+  add("list", "Print every metric of comparisons and experiments, with its definition",
+      AddMetricList);
   return [&app, runs] { return runs->at(app.get_subcommands().front())(); };
 }
 

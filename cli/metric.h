@@ -9,6 +9,8 @@
 
 namespace tsdfpp {
 
+// Prints SweepMetrics() as a table in Markdown, or as JSON.
+Run AddMetricList(CLI::App& app);
 Run AddMetricTrajectory(CLI::App& app);
 Run AddMetricSurface(CLI::App& app);
 Run AddMetricPanoptic(CLI::App& app);

@@ -10,12 +10,29 @@
 
 namespace tsdfpp {
 
+enum class Better { kHigher, kLower };
+
+// Which values are better. It has no default: a metric without one does not compile.
+class Direction {
+ public:
+  constexpr Direction(Better better) : better_(better) {}
+  constexpr operator Better() const { return better_; }
+
+ private:
+  Better better_;
+};
+
+// All that is known of a metric, in one row.
 struct EvaluationColumn {
   std::string title;  // in tables
-  std::string csv;    // in frames.csv
+  std::string csv;    // in frames.csv, JSON and experiments
+  std::string words;  // in sentences and on axes, e.g. "hidden table kept"
+  std::string unit;   // empty: a share or a count
+  Direction better;
+  int decimals;
+  std::string definition;  // as docs/metrics.md prints it
   // Of the evaluation, where these objects are the ones that the experiment removes.
   std::function<Measured(const std::set<InstanceId>& movers, const Evaluation&)> value;
-  int decimals;
   // Its standard error, of sampling alone, in the same unit; empty where none is known. In
   // frames.csv the column after it, with "_se" after its name.
   std::function<Measured(const Evaluation&)> error = {};

@@ -1,42 +1,18 @@
 #include "eval/sweep/sweep_metrics.h"
 
-#include <cstdlib>
+#include <fmt/format.h>
 
-#include "eval/score/evaluation_columns.h"
+#include <cstdlib>
+#include <functional>
+
 #include "metrics/statistics.h"
 
 namespace tsdfpp {
 namespace {
 
-// Words and direction of the evaluation's columns, by name.
-struct Words {
-  const char* name;
-  const char* words;
-  const char* unit;
-  Better better;
-};
-constexpr Words kEvaluationWords[] = {
-    {"table_preservation_behind_other", "hidden table kept", "", Better::kHigher},
-    {"table_retention_behind_other", "retention of the hidden table", "", Better::kHigher},
-    {"table_hole_area_cm2", "hole in the table", "cm²", Better::kLower},
-    {"visible_completion", "visible completion", "", Better::kHigher},
-    {"table_visible_completion", "visible completion of the table", "", Better::kHigher},
-    {"movers_completion", "completion of the moving objects", "", Better::kHigher},
-    {"ghost_area_cm2", "ghost area", "cm²", Better::kLower},
-    {"revealed_ghost_area_cm2", "ghost area after the removal", "cm²", Better::kLower},
-    {"revealed_unseen_area_cm2", "surface in unseen space after the removal", "cm²",
-     Better::kLower},
-    {"sanity_all", "right pixels", "", Better::kHigher},
-    {"sanity_least", "right pixels of the worst object", "", Better::kHigher},
-    {"seam_share", "missing background beside objects", "", Better::kLower},
-    {"seam_area_cm2", "ring of missing background around objects", "cm²", Better::kLower},
-    {"bulge_share", "background beside objects hidden by bulges", "", Better::kLower},
-    {"table_preservation_any_label", "hidden table kept under any label", "", Better::kHigher},
-    {"table_label_purity", "purity of the table", "", Better::kHigher},
-};
-
 // Root mean square distance of the reconstruction to the truth, mean over the moving objects.
-Measured MoversAccuracy(const Evaluation& evaluation, const std::set<InstanceId>& movers) {
+Measured MoversAccuracy(const Evaluation& evaluation, const std::set<InstanceId>& movers,
+                        const RunCosts&) {
   double sum = 0;
   int count = 0;
   for (const ObjectScores& object : evaluation.objects) {
@@ -49,7 +25,7 @@ Measured MoversAccuracy(const Evaluation& evaluation, const std::set<InstanceId>
                     : Measured::Of(sum / count);
 }
 
-Measured TableAccuracy(const Evaluation& evaluation) {
+Measured TableAccuracy(const Evaluation& evaluation, const std::set<InstanceId>&, const RunCosts&) {
   const Measured& rmse_m = evaluation.objects.front().accuracy.distance.rmse_m;
   return rmse_m.value ? Measured::Of(1e3 * *rmse_m.value) : rmse_m;
 }
@@ -61,30 +37,66 @@ Measured Median(const RunCosts& costs, const char* step) {
                           : Measured::Of(spread["median_ms"].get<double>());
 }
 
+// What is measured besides an evaluation's columns: a row each.
+struct RunMetric {
+  SweepMetric metric;
+  std::function<Measured(const Evaluation&, const std::set<InstanceId>& movers, const RunCosts&)>
+      value;
+};
+
+// Of these, the first ones are an evaluation's.
+constexpr std::size_t kAccuracies = 2;
+
+const std::vector<RunMetric>& RunMetrics() {
+  const auto median = [](const char* step) {
+    return [step](const Evaluation&, const std::set<InstanceId>&, const RunCosts& costs) {
+      return Median(costs, step);
+    };
+  };
+  static const std::vector<RunMetric> metrics{
+      {{"movers_accuracy_rmse_mm", "", "distance error of the moving objects", "mm", Better::kLower,
+        2,
+        "root mean square distance of the reconstruction to the truth, mean over the moving "
+        "objects"},
+       MoversAccuracy},
+      {{"table_accuracy_rmse_mm", "", "distance error of the table", "mm", Better::kLower, 2,
+        "the same of the background"},
+       TableAccuracy},
+      {{kFrameTimeMetric, "", "time to map a frame", "ms", Better::kLower, 2,
+        "median wall-clock time of a frame, all steps together"},
+       [](const Evaluation&, const std::set<InstanceId>&, const RunCosts& costs) {
+         return costs.frame_s.empty() ? Measured::Undefined("no frame was mapped")
+                                      : Measured::Of(1e3 * MedianOf(costs.frame_s));
+       }},
+      {{"move_ms", "move ms", "time to move objects, a frame", "ms", Better::kLower, 2,
+        "median wall-clock time a frame of the pose update (III-E)"},
+       median("update_poses")},
+      {{"fuse_ms", "fuse ms", "time to fuse, a frame", "ms", Better::kLower, 2,
+        "median wall-clock time a frame of the fusion (III-F)"},
+       median("fuse")},
+      {{"mesh_ms", "", "time to mesh the scene", "ms", Better::kLower, 2,
+        "median wall-clock time of the visible scene's mesh"},
+       median("mesh_scene")},
+      {{"map_mb", "MB", "size of the map", "MB", Better::kLower, 1,
+        "bytes of the map's blocks and tables at the end"},
+       [](const Evaluation&, const std::set<InstanceId>&, const RunCosts& costs) {
+         return costs.bytes ? Measured::Of(static_cast<double>(*costs.bytes) / 1e6)
+                            : Measured::Undefined("the mapper does not tell its size");
+       }},
+  };
+  return metrics;
+}
+
 }  // namespace
 
 const std::vector<SweepMetric>& SweepMetrics() {
   static const std::vector<SweepMetric> metrics = [] {
     std::vector<SweepMetric> all;
     for (const EvaluationColumn& column : EvaluationColumns()) {
-      SweepMetric metric{column.csv, column.csv, "", Better::kHigher, column.decimals};
-      for (const Words& words : kEvaluationWords) {
-        if (column.csv != words.name) continue;
-        metric.words = words.words;
-        metric.unit = words.unit;
-        metric.better = words.better;
-      }
-      all.push_back(std::move(metric));
+      all.push_back({column.csv, column.title, column.words, column.unit, column.better,
+                     column.decimals, column.definition});
     }
-    all.push_back({"movers_accuracy_rmse_mm", "distance error of the moving objects", "mm",
-                   Better::kLower, 2});
-    all.push_back(
-        {"table_accuracy_rmse_mm", "distance error of the table", "mm", Better::kLower, 2});
-    all.push_back({kFrameTimeMetric, "time to map a frame", "ms", Better::kLower, 2});
-    all.push_back({"move_ms", "time to move objects, a frame", "ms", Better::kLower, 2});
-    all.push_back({"fuse_ms", "time to fuse, a frame", "ms", Better::kLower, 2});
-    all.push_back({"mesh_ms", "time to mesh the scene", "ms", Better::kLower, 2});
-    all.push_back({"map_mb", "size of the map", "MB", Better::kLower, 1});
+    for (const RunMetric& of_run : RunMetrics()) all.push_back(of_run.metric);
     return all;
   }();
   return metrics;
@@ -103,7 +115,7 @@ std::size_t MetricIndex(std::string_view name) {
   return static_cast<std::size_t>(metric - SweepMetrics().data());
 }
 
-std::size_t EvaluationMetricCount() { return EvaluationColumns().size() + 2; }
+std::size_t EvaluationMetricCount() { return EvaluationColumns().size() + kAccuracies; }
 
 std::vector<Measured> MeasureAll(const Evaluation& evaluation, const std::set<InstanceId>& movers,
                                  const RunCosts& costs) {
@@ -111,16 +123,33 @@ std::vector<Measured> MeasureAll(const Evaluation& evaluation, const std::set<In
   for (const EvaluationColumn& column : EvaluationColumns()) {
     values.push_back(column.value(movers, evaluation));
   }
-  values.push_back(MoversAccuracy(evaluation, movers));
-  values.push_back(TableAccuracy(evaluation));
-  values.push_back(costs.frame_s.empty() ? Measured::Undefined("no frame was mapped")
-                                         : Measured::Of(1e3 * MedianOf(costs.frame_s)));
-  for (const char* step : {"update_poses", "fuse", "mesh_scene"}) {
-    values.push_back(Median(costs, step));
+  for (const RunMetric& of_run : RunMetrics()) {
+    values.push_back(of_run.value(evaluation, movers, costs));
   }
-  values.push_back(costs.bytes ? Measured::Of(static_cast<double>(*costs.bytes) / 1e6)
-                               : Measured::Undefined("the mapper does not tell its size"));
   return values;
+}
+
+nlohmann::json MetricsJson() {
+  nlohmann::json list = nlohmann::json::array();
+  for (const SweepMetric& metric : SweepMetrics()) {
+    list.push_back({{"name", metric.name},
+                    {"title", metric.title},
+                    {"words", metric.words},
+                    {"unit", metric.unit},
+                    {"better", metric.better == Better::kHigher ? "higher" : "lower"},
+                    {"decimals", metric.decimals},
+                    {"definition", metric.definition}});
+  }
+  return list;
+}
+
+std::string MetricsMarkdown() {
+  std::string text = "| metric | in tables | unit | better | meaning |\n|---|---|---|---|---|\n";
+  for (const SweepMetric& metric : SweepMetrics()) {
+    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", metric.name, metric.title, metric.unit,
+                        metric.better == Better::kHigher ? "higher" : "lower", metric.definition);
+  }
+  return text;
 }
 
 }  // namespace tsdfpp

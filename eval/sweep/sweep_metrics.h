@@ -2,6 +2,7 @@
 // (eval/score/evaluation_columns.h) and those of a whole run.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -10,21 +11,22 @@
 
 #include "eval/picture/map_output.h"
 #include "eval/score/evaluation.h"
+#include "eval/score/evaluation_columns.h"
 #include "mapper/map_representation.h"
 
 namespace tsdfpp {
-
-enum class Better { kHigher, kLower };
 
 // The time to map a frame, of all mappers alike.
 inline constexpr const char* kFrameTimeMetric = "frame_ms";
 
 struct SweepMetric {
   std::string name;   // in CSV, JSON and experiments
+  std::string title;  // in tables; empty for those that no table of a comparison has
   std::string words;  // in sentences and on axes, e.g. "hidden table kept"
   std::string unit;   // empty: a share or a count
-  Better better = Better::kHigher;
-  int decimals = 3;
+  Direction better;
+  int decimals;
+  std::string definition;  // as docs/metrics.md prints it
 };
 
 // Those of an evaluation first, in the order of EvaluationColumns().
@@ -46,5 +48,11 @@ struct RunCosts {
 // The values of SweepMetrics(), in their order. `movers` are the objects that were removed.
 std::vector<Measured> MeasureAll(const Evaluation& evaluation, const std::set<InstanceId>& movers,
                                  const RunCosts& costs);
+
+// SweepMetrics() as a list of objects: name, title, words, unit, better ("higher" or "lower"),
+// decimals, definition.
+nlohmann::json MetricsJson();
+// The same as a table in Markdown: what docs/metrics.md has.
+std::string MetricsMarkdown();
 
 }  // namespace tsdfpp

@@ -1,0 +1,41 @@
+// The table of metrics: a row each, whole, and what the page says.
+#include "eval/sweep/sweep_metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <type_traits>
+
+#include "core/files.h"
+
+namespace tsdfpp {
+namespace {
+
+static_assert(!std::is_default_constructible_v<Direction>);
+static_assert(!std::is_default_constructible_v<SweepMetric>);
+static_assert(!std::is_default_constructible_v<EvaluationColumn>);
+
+TEST(SweepMetrics, EveryRowIsWhole) {
+  std::set<std::string> names;
+  for (const SweepMetric& metric : SweepMetrics()) {
+    EXPECT_TRUE(names.insert(metric.name).second) << metric.name << " is there twice";
+    EXPECT_NE(metric.words, "") << metric.name;
+    EXPECT_NE(metric.words, metric.name);
+    EXPECT_GT(metric.definition.size(), 20U) << metric.name;
+    EXPECT_EQ(metric.definition.find('\n'), std::string::npos) << metric.name;
+  }
+  EXPECT_EQ(MetricsJson().size(), SweepMetrics().size());
+  EXPECT_EQ(FindMetric("seam_share")->better, Better::kLower);
+  EXPECT_EQ(FindMetric("movers_completion")->better, Better::kHigher);
+  EXPECT_EQ(FindMetric("map_mb")->better, Better::kLower);
+}
+
+TEST(SweepMetrics, ThePageIsMadeOfIt) {
+  const std::string page = ReadFile(TSDFPP_SOURCE_DIR "/docs/metrics.md").value();
+  EXPECT_NE(page.find(MetricsMarkdown()), std::string::npos)
+      << "make it anew: /usr/bin/python3 scripts/pages.py make metric-list";
+}
+
+}  // namespace
+}  // namespace tsdfpp
