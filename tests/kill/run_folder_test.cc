@@ -264,7 +264,9 @@ TEST(RunFolder, WhatIsInTheWayIsNamed) {
     ASSERT_TRUE(run.has_value());
     const auto asked = run->CheckPlaces({file});
     EXPECT_EQ(asked.has_value(), file[0] == 'b');  // a name of its own is no place
-    if (!asked) EXPECT_NE(asked.error().message.find(words), std::string::npos) << words;
+    if (!asked) {
+      EXPECT_NE(asked.error().message.find(words), std::string::npos) << words;
+    }
     ASSERT_TRUE(WriteFile(run->path() / file, "new").has_value());
     const auto done = run->Commit();
     ASSERT_FALSE(done.has_value()) << file;
