@@ -36,7 +36,7 @@ Expected<void> CheckInRoom(TomlReader& reader, const SceneConfig& config) {
 }
 
 Expected<void> ReadCamera(const toml::table& table, const std::string& where,
-                          const std::filesystem::path& folder, SceneConfig& config) {
+                          const SceneFolder& folder, SceneConfig& config) {
   TomlReader reader(table, where, "camera");
   ReadIntrinsics(reader, table, config.intrinsics);
   TSDFPP_RETURN_IF_ERROR(ReadCameraPath(reader, folder, config.camera));
@@ -108,8 +108,7 @@ Expected<SceneExperiment> ReadExperiment(const toml::table& table, const std::st
 }
 
 Expected<SceneConfig> ReadScene(const toml::table& root, const std::string& where,
-                                const std::filesystem::path& folder,
-                                std::optional<std::uint64_t> seed) {
+                                const SceneFolder& folder, std::optional<std::uint64_t> seed) {
   TomlReader reader(root, where);
   SceneConfig config;
   reader.Get("name", config.name, true).Get("purpose", config.purpose, true);
@@ -158,17 +157,17 @@ Expected<SceneConfig> ReadScene(const toml::table& root, const std::string& wher
 }  // namespace
 
 Expected<SceneConfig> LoadSceneConfig(const std::filesystem::path& path,
-                                      std::optional<std::uint64_t> seed) {
+                                      std::optional<std::uint64_t> seed, SceneOrigin origin) {
   TSDFPP_ASSIGN(const toml::table root, ParseTomlFile(path));
   if (IsRandomScene(root)) {
     TSDFPP_ASSIGN(const RandomSceneConfig random, ReadRandomScene(root, path.string()));
     return DrawRandomScene(random, seed.value_or(random.seed));
   }
-  return ReadScene(root, path.string(), AbsolutePath(path).parent_path(), seed);
+  return ReadScene(root, path.string(), {AbsolutePath(path).parent_path(), origin}, seed);
 }
 
 Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where,
-                                       const std::filesystem::path& folder) {
+                                       const SceneFolder& folder) {
   TSDFPP_ASSIGN(const toml::table root, ParseToml(text, where));
   return ReadScene(root, std::string(where), folder, std::nullopt);
 }

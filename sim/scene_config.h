@@ -87,11 +87,12 @@ inline constexpr int kMaxObjectId = 255;
 // the scene; those of DrawRandomScene; kData where a trajectory that the camera follows is
 // unusable.
 Expected<SceneConfig> LoadSceneConfig(const std::filesystem::path& path,
-                                      std::optional<std::uint64_t> seed = std::nullopt);
+                                      std::optional<std::uint64_t> seed = std::nullopt,
+                                      SceneOrigin origin = SceneOrigin::kUser);
 // The same from text; `where` stands for the file's name in messages, `folder` is where the names
 // of files in it start (empty: the working directory).
 Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where,
-                                       const std::filesystem::path& folder = {});
+                                       const SceneFolder& folder = {});
 
 // The scene as a file: ParseSceneConfig(SceneToToml(c)) is c, number by number.
 std::string SceneToToml(const SceneConfig& config);

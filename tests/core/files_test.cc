@@ -109,6 +109,25 @@ TEST(Files, NothingElseIsWrittenInto) {
   EXPECT_EQ(folder.Entries(), 7);
 }
 
+// A device or a pipe is nobody's old result.
+TEST(Files, OnlyRegularFilesAreReplaced) {
+  const TempFolder folder;
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink(folder / "pipe", folder / "link");
+  std::filesystem::create_directory(folder / "folder");
+  for (const auto& [name, kind] : {std::pair{"pipe", "a pipe"}, std::pair{"link", "a pipe"},
+                                   std::pair{"folder", "a folder"}}) {
+    const auto written = WriteFile(folder / name, "bytes");
+    ASSERT_FALSE(written.has_value()) << name;
+    EXPECT_EQ(written.error().kind, ErrorKind::kEnvironment);
+    EXPECT_EQ(written.error().message, fmt::format("{}: is {}, expected a regular file or nothing",
+                                                   (folder / name).string(), kind));
+  }
+  EXPECT_TRUE(std::filesystem::is_fifo(folder / "pipe"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(folder.Entries(), 3);
+}
+
 TEST(Files, MissingFileAndFolderAreNamed) {
   const TempFolder folder;
   const auto missing = ReadFile(folder / "none");

@@ -69,6 +69,7 @@ function(tsdfpp_add_readers target)
       random_scene_config.cc
       room_model.cc
       scene_config.cc
+      scene_folder.cc
       scene_inputs.cc
       scene_object_config.cc
       scene_readers.cc

@@ -255,9 +255,12 @@ TEST(RunFolder, WhatIsInTheWayIsNamed) {
   const fs::path out = folder / "out";
   ASSERT_TRUE(WriteFile(out / "mesh", "mine").has_value());
   ASSERT_TRUE(WriteFile(out / "page/mine", "mine").has_value());
+  fs::create_directory(folder / "far");
+  fs::create_directory_symlink(folder / "far", out / "linked");
   const Content before = ContentOf(out);
   for (const auto& [file, words] :
        {std::pair{"mesh/a.ply", "mesh: is a file, expected a folder"},
+        std::pair{"linked/a.ply", "linked: is a link, expected a folder"},
         std::pair{"page", "page: is a folder with files in it, expected a file"},
         std::pair{"b\xff", "has a name that cannot be printed"}}) {
     auto run = RunFolder::Begin(out, "c");
