@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <thread>
 
 #include "core/files.h"
@@ -253,12 +254,13 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
                            OneLine(name));
         }
         const SweepMetric* metric = FindMetric(name);
-        const auto most = metric == nullptr ? std::nullopt : MostOf(*metric);
+        constexpr double kNoEnd = std::numeric_limits<double>::infinity();
+        const double most = metric == nullptr ? kNoEnd : MostOf(*metric).value_or(kNoEnd);
         const double score = scores[name].value.value_or(0);
-        if (score < 0 || (most && score > *most)) {
+        if (score < 0 || score > most) {
           return DataError("{}: {} of sequence {} is {}, expected {}", where, OneLine(name),
                            JsonShown(entry.at("sequence")), JsonShown(value),
-                           most ? fmt::format("0 to {}", *most) : "0 or more");
+                           most < kNoEnd ? fmt::format("0 to {}", most) : "0 or more");
         }
       }
     }

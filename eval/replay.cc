@@ -1,7 +1,6 @@
 #include "eval/replay.h"
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -36,17 +35,10 @@ struct Recorded {
   std::set<InstanceId> removed;
 };
 
-// These throw where it is none; nlohmann's own conversions wrap what does not fit.
-int FrameOf(const json& json) {
-  const auto frame = WholeIn(json, 0, std::numeric_limits<int>::max());
-  if (!frame) throw std::out_of_range(fmt::format("{} is no frame", JsonShown(json)));
-  return static_cast<int>(*frame);
-}
-
 std::vector<int> FramesOf(const json& list) {
   std::vector<int> frames;
   for (const json& frame : list) {
-    frames.push_back(FrameOf(frame));
+    frames.push_back(FrameFromJson(frame));
     if (frames.size() > 1 && frames.back() <= *std::prev(frames.end(), 2)) {
       throw std::out_of_range("frames are not in order");
     }
@@ -65,8 +57,8 @@ void ReadSequence(const json& sequence, SequenceVariant& variant) {
                                         last));
   }
   variant.evaluated = FramesOf(sequence.at("evaluated"));
-  variant.examined = FrameOf(sequence.at("examined"));
-  variant.fuse_until = FrameOf(sequence.at("fuse_until"));
+  variant.examined = FrameFromJson(sequence.at("examined"));
+  variant.fuse_until = FrameFromJson(sequence.at("fuse_until"));
   CellSettings probe;
   const json& error = sequence.at("object_error");
   if (!error.is_number()) throw std::out_of_range("'object_error' is no number");
@@ -79,16 +71,14 @@ void ReadSequence(const json& sequence, SequenceVariant& variant) {
 
 void ReadCell(const json& cell, Recorded& recorded) {
   for (const json& entry : cell.at("frames")) {
-    recorded.maps[std::to_string(FrameOf(entry.at("frame")))] =
+    recorded.maps[std::to_string(FrameFromJson(entry.at("frame")))] =
         entry.at("map_digest").get<std::string>();
   }
   for (const auto& [frame, digest] : cell.at("images").items()) {
     recorded.images[frame] = digest.get<std::string>();
   }
   for (const json& object : cell.at("removed")) {
-    const auto id = WholeIn(object, 0, kNoInstance);
-    if (!id) throw std::out_of_range(fmt::format("{} is no object", JsonShown(object)));
-    recorded.removed.insert(static_cast<InstanceId>(*id));
+    recorded.removed.insert(ObjectFromJson(object));
   }
 }
 
