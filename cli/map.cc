@@ -94,6 +94,18 @@ std::string CommandText(const CLI::App& app) {
   return text;
 }
 
+// Whether the file is, or lies below, what the run itself writes to its folder.
+bool IsOfTheRun(const std::filesystem::path& save, const std::filesystem::path& out) {
+  static const std::set<std::string> kOwn{"mesh", "trajectories", "views", "stats.json", kRunNote};
+  std::error_code failure;
+  const auto place = std::filesystem::weakly_canonical(save, failure);
+  const auto folder = std::filesystem::weakly_canonical(out, failure);
+  const std::filesystem::path inside = place.lexically_relative(folder);
+  if (failure || inside.empty() || *inside.begin() == "..") return false;
+  const std::string first = inside.begin()->string();
+  return first.starts_with('.') || kOwn.contains(first);
+}
+
 // Before anything is mapped, which may take long.
 Expected<void> CheckOutputs(const MapArguments& options) {
   if (!options.remove.empty() && SplitList(options.remove).empty()) {
@@ -107,6 +119,14 @@ Expected<void> CheckOutputs(const MapArguments& options) {
   std::error_code ignored;
   if (std::filesystem::is_directory(save, ignored)) {
     return UsageError("--save '{}' is a folder, expected a file", options.save);
+  }
+  if (std::filesystem::exists(save, ignored) && !std::filesystem::is_regular_file(save, ignored)) {
+    return UsageError("--save '{}' is a device or a pipe, expected a file or nothing",
+                      options.save);
+  }
+  if (IsOfTheRun(save, options.out)) {
+    return UsageError("--save '{}' is a place of what --out '{}' gets, expected another",
+                      options.save, options.out);
   }
   return save.has_parent_path() ? MakeWritableFolder(save.parent_path()) : Expected<void>{};
 }

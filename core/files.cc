@@ -31,13 +31,17 @@ class Descriptor {
   int number_;
 };
 
+const char* KindOf(const struct stat& status) {
+  if (S_ISREG(status.st_mode)) return "a file";
+  if (S_ISDIR(status.st_mode)) return "a folder";
+  if (S_ISFIFO(status.st_mode)) return "a pipe";
+  return S_ISSOCK(status.st_mode) ? "a socket" : "a device";
+}
+
 Expected<void> CheckKind(const struct stat& status, const fs::path& path) {
   if (S_ISREG(status.st_mode)) return {};
   if (S_ISDIR(status.st_mode)) return DataError("{}: is a folder, not a file", path.string());
-  const char* kind = S_ISFIFO(status.st_mode)   ? "a pipe"
-                     : S_ISSOCK(status.st_mode) ? "a socket"
-                                                : "a device";
-  return DataError("{}: is {}, expected a regular file", path.string(), kind);
+  return DataError("{}: is {}, expected a regular file", path.string(), KindOf(status));
 }
 
 Error CannotRead(const fs::path& path, int number) {
@@ -166,6 +170,12 @@ Expected<void> WriteFile(const fs::path& path, std::string_view bytes) {
       return EnvironmentError("{}: the folder cannot be made ({})", path.parent_path().string(),
                               code.message());
     }
+  }
+  // What is in place goes; a device or a pipe is nobody's old result, also behind a link.
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    return EnvironmentError("{}: is {}, expected a regular file or nothing", path.string(),
+                            KindOf(status));
   }
   PartFile part(path);
   int fault = part.Write(bytes);

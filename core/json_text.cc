@@ -34,20 +34,12 @@ std::int64_t DepthOf(std::string_view text) {
 }
 
 // What the text holds; discarded where it is no JSON.
-template <typename Json>
-Expected<Json> ParseAs(std::string_view text, std::string_view where) {
+Expected<nlohmann::json> ParseWithinLimits(std::string_view text, std::string_view where) {
   TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::json_bytes, static_cast<std::int64_t>(text.size()),
                                     where, "bytes of JSON"));
   TSDFPP_RETURN_IF_ERROR(
       CheckLimit(&Limits::nesting, DepthOf(text), where, "lists and objects within one another"));
-  return Json::parse(text, nullptr, false);
-}
-
-template <typename Json>
-Expected<Json> ParseObjectAs(std::string_view text, std::string_view where) {
-  TSDFPP_ASSIGN(Json value, ParseAs<Json>(text, where));
-  if (!value.is_object()) return DataError("{}: not a JSON object", where);
-  return value;
+  return nlohmann::json::parse(text, nullptr, false);
 }
 
 template <typename Json>
@@ -55,34 +47,18 @@ std::string TextOfJson(const Json& value, int indent) {
   return value.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
-template <typename Json>
-std::optional<std::int64_t> WholeNumberIn(const Json& value, std::int64_t lowest,
-                                          std::int64_t highest) {
-  if (!value.is_number_integer()) return std::nullopt;
-  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  if (value.is_number_unsigned() && value.template get<std::uint64_t>() > kMost) {
-    return std::nullopt;
-  }
-  const auto number = value.template get<std::int64_t>();
-  if (number < lowest || number > highest) return std::nullopt;
-  return number;
-}
-
 }  // namespace
 
 Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view where) {
-  TSDFPP_ASSIGN(nlohmann::json value, ParseAs<nlohmann::json>(text, where));
+  TSDFPP_ASSIGN(nlohmann::json value, ParseWithinLimits(text, where));
   if (value.is_discarded()) return DataError("{}: not JSON", where);
   return value;
 }
 
 Expected<nlohmann::json> ParseJsonObject(std::string_view text, std::string_view where) {
-  return ParseObjectAs<nlohmann::json>(text, where);
-}
-
-Expected<nlohmann::ordered_json> ParseOrderedJsonObject(std::string_view text,
-                                                        std::string_view where) {
-  return ParseObjectAs<nlohmann::ordered_json>(text, where);
+  TSDFPP_ASSIGN(nlohmann::json value, ParseWithinLimits(text, where));
+  if (!value.is_object()) return DataError("{}: not a JSON object", where);
+  return value;
 }
 
 Expected<nlohmann::json> ReadJsonObject(const std::filesystem::path& path) {
@@ -100,18 +76,14 @@ std::string JsonShown(const nlohmann::json& value) {
   return OneLine(JsonText(value), kMostShownJson);
 }
 
-std::string JsonShown(const nlohmann::ordered_json& value) {
-  return OneLine(JsonText(value), kMostShownJson);
-}
-
 std::optional<std::int64_t> WholeIn(const nlohmann::json& value, std::int64_t lowest,
                                     std::int64_t highest) {
-  return WholeNumberIn(value, lowest, highest);
-}
-
-std::optional<std::int64_t> WholeIn(const nlohmann::ordered_json& value, std::int64_t lowest,
-                                    std::int64_t highest) {
-  return WholeNumberIn(value, lowest, highest);
+  if (!value.is_number_integer()) return std::nullopt;
+  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  if (value.is_number_unsigned() && value.get<std::uint64_t>() > kMost) return std::nullopt;
+  const auto number = value.get<std::int64_t>();
+  if (number < lowest || number > highest) return std::nullopt;
+  return number;
 }
 
 }  // namespace tsdfpp

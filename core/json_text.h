@@ -1,6 +1,7 @@
 // The one way from text to JSON and back. nlohmann's own copies, prints and destroys with a place
-// on the stack for each level, wraps numbers that do not fit, and throws for text that is not
-// UTF-8.
+// on the stack for each level, looks through all members for each that it adds to an ordered
+// object (which is written here, therefore, and not read), wraps numbers that do not fit, and
+// throws for text that is not UTF-8.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +23,6 @@ Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view where
 // The same, of a JSON object: "<where>: not a JSON object" covers what is no JSON, too.
 Expected<nlohmann::json> ParseJsonObject(std::string_view text, std::string_view where);
 
-// The same with the members in the text's order.
-Expected<nlohmann::ordered_json> ParseOrderedJsonObject(std::string_view text,
-                                                        std::string_view where);
-
 // A file with a JSON object. Errors: also those of ReadFile.
 Expected<nlohmann::json> ReadJsonObject(const std::filesystem::path& path);
 
@@ -35,12 +32,9 @@ std::string JsonText(const nlohmann::ordered_json& value, int indent = -1);
 
 // A value for a message: at most 100 bytes of its text.
 std::string JsonShown(const nlohmann::json& value);
-std::string JsonShown(const nlohmann::ordered_json& value);
 
 // The whole number from `lowest` to `highest`; nothing where the value is another.
 std::optional<std::int64_t> WholeIn(const nlohmann::json& value, std::int64_t lowest,
-                                    std::int64_t highest);
-std::optional<std::int64_t> WholeIn(const nlohmann::ordered_json& value, std::int64_t lowest,
                                     std::int64_t highest);
 
 }  // namespace tsdfpp

@@ -33,8 +33,13 @@ std::size_t EndOfString(std::string_view text, std::size_t at) {
   for (std::size_t i = at + (multiline ? 3 : 1); i < text.size(); ++i) {
     if (text[i] == '\\' && quote == '"') {
       ++i;
-    } else if (multiline ? text.substr(i, 3) == three : text[i] == quote || text[i] == '\n') {
-      return i + (multiline ? 2 : 0);
+    } else if (multiline && text.substr(i, 3) == three) {
+      // Up to two more are the string's own last characters.
+      std::size_t last = i + 2;
+      while (last < i + 4 && last + 1 < text.size() && text[last + 1] == quote) ++last;
+      return last;
+    } else if (!multiline && (text[i] == quote || text[i] == '\n')) {
+      return i;
     }
   }
   return text.size();

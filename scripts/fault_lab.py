@@ -165,7 +165,9 @@ class Lab:
             if content not in (before.get(path), whole.get(path)):
                 outcome.lost.append(f"{path} is a half-written file, or of neither run" +
                                     (f" ({content})" if content.startswith("broken") else ""))
-        if state == "between":
+        # A map's own file (--save) is no part of the run.
+        own = [{path: of for path, of in content.items() if path.startswith("out/")} for content in (left, before, whole)]
+        if state == "between" and own[0] not in own[1:]:
             there = [name for name in command.notes if os.path.exists(os.path.join(trial, "out", name))]
             if there and not fault_commands.read_notes(os.path.join(trial, "out"), there):
                 outcome.lost.append("files of two runs lie side by side, and nothing says so: " +

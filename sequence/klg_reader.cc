@@ -4,6 +4,7 @@
 #include <fstream>
 #include <set>
 
+#include "core/data_folder.h"
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/limits.h"
@@ -40,6 +41,7 @@ class KlgSource : public DatasetSource {
                                   index.bytes_after, index.entries.size()));
     }
     const fs::path folder = AbsolutePath(file).parent_path();
+    TSDFPP_RETURN_IF_ERROR(CheckBeside(folder));
     TSDFPP_RETURN_IF_ERROR(SetCamera(folder, options, notes));
     TSDFPP_RETURN_IF_ERROR(SetPoses(folder, index, options, notes));
     if (entries_.empty()) {
@@ -116,6 +118,18 @@ class KlgSource : public DatasetSource {
   }
 
  private:
+  // Of what lies beside the recording only what is read may not lead out of the folder: it may be
+  // one of many things.
+  static Expected<void> CheckBeside(const fs::path& folder) {
+    const DataFolder data(folder);
+    for (const char* name : {"calibration.txt", "groundtruth.txt", "mask", "masks"}) {
+      TSDFPP_ASSIGN(const fs::path beside, data.Find(name));
+      std::error_code code;
+      if (fs::is_directory(beside, code)) TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(beside));
+    }
+    return {};
+  }
+
   static double Seconds(const KlgEntry& entry) { return static_cast<double>(entry.time_us) / 1e6; }
 
   Expected<void> SetCamera(const fs::path& folder, const SequenceOptions& options,

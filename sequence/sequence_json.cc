@@ -25,7 +25,7 @@ constexpr int kLeastSide_px = 2;
 // nlohmann's own conversion would wrap a number that does not fit. Throws as that does where the
 // value is of another type.
 template <typename T>
-T WholeOf(const Json& json, const char* what, std::int64_t lowest, std::int64_t highest) {
+T WholeOf(const nlohmann::json& json, const char* what, std::int64_t lowest, std::int64_t highest) {
   const auto number = WholeIn(json, lowest, highest);
   if (!number) {
     throw std::out_of_range(fmt::format("{} is {}, expected a whole number from {} to {}", what,
@@ -34,11 +34,11 @@ T WholeOf(const Json& json, const char* what, std::int64_t lowest, std::int64_t 
   return static_cast<T>(*number);
 }
 
-InstanceId IdOf(const Json& json) {
+InstanceId IdOf(const nlohmann::json& json) {
   return WholeOf<InstanceId>(json, "an object's id", 0, kNoInstance - 1);
 }
 
-std::int64_t CountOf(const Json& json, const char* what) {
+std::int64_t CountOf(const nlohmann::json& json, const char* what) {
   return WholeOf<std::int64_t>(json, what, 0, std::numeric_limits<std::int64_t>::max());
 }
 
@@ -49,7 +49,7 @@ Json ResidualJson(const Residual& residual) {
           {"violations", residual.violations}};
 }
 
-Residual ResidualOf(const Json& json) {
+Residual ResidualOf(const nlohmann::json& json) {
   return {json.at("mean_m").get<double>(),
           json.at("p99_m").get<double>(),
           json.at("max_m").get<double>(),
@@ -67,7 +67,7 @@ Json CertificateJson(const Certificate& certificate) {
           {"wrong_ids", certificate.wrong_ids}};
 }
 
-Certificate CertificateOf(const Json& json) {
+Certificate CertificateOf(const nlohmann::json& json) {
   return {WholeOf<int>(json.at("frames"), "frames", 0, kGreatestFrame),
           WholeOf<int>(json.at("ray_frames"), "ray_frames", 0, kGreatestFrame),
           ResidualOf(json.at("model")), ResidualOf(json.at("ray_depth")),
@@ -75,11 +75,11 @@ Certificate CertificateOf(const Json& json) {
 }
 
 // `version` is the schema's.
-SequenceRecord FromJson(const Json& json, int version) {
+SequenceRecord FromJson(const nlohmann::json& json, int version) {
   SequenceRecord record;
   SequenceInfo& info = record.info;
   info.name = json.at("scene").get<std::string>();
-  const Json& camera = json.at("intrinsics");
+  const nlohmann::json& camera = json.at("intrinsics");
   const std::int64_t most_side = CurrentLimits().image_side;
   info.intrinsics = {WholeOf<int>(camera.at("width"), "width", kLeastSide_px, most_side),
                      WholeOf<int>(camera.at("height"), "height", kLeastSide_px, most_side),
@@ -90,18 +90,18 @@ SequenceRecord FromJson(const Json& json, int version) {
   info.rate_hz = json.at("rate_hz").get<double>();
   info.first_index = WholeOf<int>(json.at("first_index"), "first_index", -1, kGreatestFrame);
   info.frame_count = WholeOf<int>(json.at("frame_count"), "frame_count", 0, CurrentLimits().frames);
-  for (const Json& object : json.at("objects")) {
+  for (const nlohmann::json& object : json.at("objects")) {
     info.objects.push_back({IdOf(object.at("id")), object.at("name").get<std::string>(),
                             object.at("class").get<std::string>()});
   }
-  if (const Json& reveal = json.at("reveal"); !reveal.is_null()) {
+  if (const nlohmann::json& reveal = json.at("reveal"); !reveal.is_null()) {
     info.reveal =
         RevealPlan{WholeOf<int>(reveal.at("frame"), "the reveal's frame", 0, kGreatestFrame), {}};
-    for (const Json& id : reveal.at("removed")) info.reveal->removed.push_back(IdOf(id));
+    for (const nlohmann::json& id : reveal.at("removed")) info.reveal->removed.push_back(IdOf(id));
   }
   GeneratorInfo& generator = record.generator;
   generator.version = json.at("version").get<std::string>();
-  if (const Json& seed = json.at("seed"); !seed.is_null()) {
+  if (const nlohmann::json& seed = json.at("seed"); !seed.is_null()) {
     if (!seed.is_number_unsigned()) throw std::out_of_range("seed is no whole number from 0");
     generator.seed = seed.get<std::uint64_t>();
   }
@@ -109,11 +109,11 @@ SequenceRecord FromJson(const Json& json, int version) {
   generator.backend = json.at("backend").get<std::string>();
   generator.renderer = json.at("renderer").get<std::string>();
   if (version >= 2) {
-    if (const Json& certificate = json.at("certificate"); !certificate.is_null()) {
+    if (const nlohmann::json& certificate = json.at("certificate"); !certificate.is_null()) {
       record.certificate = CertificateOf(certificate);
     }
   }
-  const Json& files = json.at("files");
+  const nlohmann::json& files = json.at("files");
   for (const auto& [file, hash] : files.at("fnv1a64").items()) {
     record.hashes.emplace(file, hash.get<std::string>());
   }
@@ -171,11 +171,11 @@ std::string SequenceToJson(const SequenceRecord& record) {
 Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
   TSDFPP_ASSIGN(const std::string text, ReadFile(path, &Limits::json_bytes));
   const std::string file = path.string();
-  TSDFPP_ASSIGN(const Json json, ParseOrderedJsonObject(text, file));
+  TSDFPP_ASSIGN(const nlohmann::json json, ParseJsonObject(text, file));
   if (!json.contains("generator") || json["generator"] != kGenerator) {
     return DataError("{}: 'generator' is not \"{}\"", file, kGenerator);
   }
-  const Json version = json.value("schema_version", Json(nullptr));
+  const nlohmann::json version = json.value("schema_version", nlohmann::json(nullptr));
   if (!version.is_number_integer() || version < kOldestSchemaVersion || version > kSchemaVersion) {
     return DataError("{}: 'schema_version' is {}, this program reads {} to {}", file,
                      version.is_null() ? "missing" : JsonShown(version), kOldestSchemaVersion,

@@ -1,3 +1,5 @@
+#include <map>
+
 #include "core/files.h"
 #include "core/pose_text.h"
 #include "sequence/calibration.h"
@@ -17,10 +19,12 @@ class TumWriter : public DatasetWriter {
   Expected<void> Add(const Frame& frame) override {
     const std::string stamp = fmt::format("{:.6f}", frame.time_s);
     const std::string name = fmt::format("frame {}", frame.index);
-    if (stamp == last_stamp_) {
-      return DataError("{}: its time is that of the frame before, {} s", name, stamp);
+    // Files are called by their times.
+    const auto [other, is_new] = frame_at_.try_emplace(stamp, frame.index);
+    if (!is_new) {
+      return DataError("{}: its time is that of frame {}, {} s, expected another", name,
+                       other->second, stamp);
     }
-    last_stamp_ = stamp;
     const std::string colour = fmt::format("rgb/{}.png", stamp);
     const std::string depth = fmt::format("depth/{}.png", stamp);
     TSDFPP_RETURN_IF_ERROR(WriteEncoded(folder_ / colour, EncodeColour(frame.colour, name)));
@@ -52,7 +56,7 @@ class TumWriter : public DatasetWriter {
  private:
   Intrinsics camera_;
   std::filesystem::path folder_;
-  std::string last_stamp_;
+  std::map<std::string, int> frame_at_;  // by time
   std::string colours_;
   std::string depths_;
   std::string pairs_;

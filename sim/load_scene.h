@@ -18,6 +18,7 @@ namespace tsdfpp {
 // the scene; those of DrawRandomScene; kData where a trajectory that the camera follows is
 // unusable.
 Expected<SceneConfig> LoadSceneConfig(const std::filesystem::path& path,
-                                      std::optional<std::uint64_t> seed = std::nullopt);
+                                      std::optional<std::uint64_t> seed = std::nullopt,
+                                      SceneOrigin origin = SceneOrigin::kUser);
 
 }  // namespace tsdfpp

@@ -101,16 +101,30 @@ struct Attendance {
   std::string ended_for;  // what we had it ended for
 };
 
+// A program that stops its supervisor would never meet its limits: it goes on, and where it comes
+// to no report even so, it is ended.
+void KeepAwake(pid_t supervisor, Clock::time_point last) {
+  siginfo_t state{};
+  if (waitid(P_PID, static_cast<id_t>(supervisor), &state, WSTOPPED | WNOHANG) == 0 &&
+      state.si_pid == supervisor) {
+    kill(supervisor, SIGCONT);
+  }
+  if (Clock::now() > last) kill(supervisor, SIGKILL);
+}
+
 // Takes the program's words into the log and looks at its disk until the supervisor reports.
-Attendance Attend(const PipeEnds& said, const PipeEnds& reported, OpenEnd& control,
-                  const fs::path& folder, const ChildLimits& limits, const ControlGroup* group,
-                  CappedLog& log) {
+Attendance Attend(pid_t supervisor, const PipeEnds& said, const PipeEnds& reported,
+                  OpenEnd& control, const fs::path& folder, const ChildLimits& limits,
+                  const ControlGroup* group, CappedLog& log) {
+  constexpr std::chrono::duration<double> kToReport{30};
   constexpr int kWait_ms = 100;
   constexpr std::chrono::seconds kDiskLook{1};
   constexpr int kReads = 16;
   Attendance attendance;
   bool said_all = false;
   auto next_look = Clock::now() + kDiskLook;
+  const auto last = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                       std::chrono::duration<double>(limits.time_s) + kToReport);
   while (true) {
     std::array<pollfd, 2> ends{pollfd{reported.out.get(), POLLIN, 0},
                                pollfd{said_all ? -1 : said.out.get(), POLLIN, 0}};
@@ -125,6 +139,7 @@ Attendance Attend(const PipeEnds& said, const PipeEnds& reported, OpenEnd& contr
       if (!said_all) Drain(said.out.get(), log, kReads);
       return attendance;
     }
+    KeepAwake(supervisor, last);
     if (control.get() < 0 || Clock::now() < next_look) continue;
     const std::int64_t disk = DiskBytes(folder);
     next_look = Clock::now() + kDiskLook;
@@ -233,7 +248,7 @@ ChildOutcome RunChildProcess(const std::string& name, const std::vector<std::str
   reported.in.Close();
   control.out.Close();
   const Attendance attendance =
-      Attend(said, reported, control.in, at, limits, group ? &*group : nullptr, *log);
+      Attend(supervisor, said, reported, control.in, at, limits, group ? &*group : nullptr, *log);
   control.in.Close();
   int supervisor_status = 0;
   while (waitpid(supervisor, &supervisor_status, 0) < 0 && errno == EINTR) {

@@ -306,11 +306,7 @@ Expected<GateSabotage> ReadSabotage(const toml::table& table, const std::string&
 
 }  // namespace
 
-Bounds RangeOf(const SweepMetric& metric) {
-  // Retention is relative to an earlier score, which a map can exceed.
-  const bool share = metric.unit.empty() && metric.name.find("retention") == std::string::npos;
-  return {0, share ? std::optional(1.0) : std::nullopt};
-}
+Bounds RangeOf(const SweepMetric& metric) { return {0, MostOf(metric)}; }
 
 std::string ChoiceText(const AxisChoice& choice) {
   std::string text;

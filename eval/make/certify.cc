@@ -115,7 +115,7 @@ void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
     result.notes.emplace_back("scene.toml is not there: the scene was not composed again");
     return;
   }
-  const auto config = LoadSceneConfig(folder / cofusion::kScene);
+  const auto config = LoadSceneConfig(folder / cofusion::kScene, std::nullopt, SceneOrigin::kData);
   const auto inside =
       config ? CheckInside(*config, folder) : Expected<void>(tl::unexpected(config.error()));
   auto scene = inside ? CompiledScene::Compile(*config)

@@ -1,6 +1,7 @@
 #include "eval/report/report_gates.h"
 
-#include "core/files.h"
+#include "core/data_folder.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/gate/gate_report.h"
 #include "eval/tools/base64.h"
@@ -8,6 +9,7 @@
 namespace tsdfpp {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 
 Expected<void> CheckTexts(const json& object, std::initializer_list<const char*> names,
@@ -72,15 +74,19 @@ Expected<json> ReadGateResults(const std::filesystem::path& file) {
   TSDFPP_ASSIGN(json results, ReadJsonObject(file));
   TSDFPP_RETURN_IF_ERROR(Check(results, file.string()));
   json pictures = json::object();
+  const fs::path folder = AbsolutePath(file).parent_path();
   for (const json& gate : results["gates"]) {
     const json explanation = gate.value("explanation", json());
     const json picture = explanation.is_object() ? explanation.value("picture", json()) : json();
     const std::string name = picture.is_string() ? picture.get<std::string>() : "";
     // A file of that folder and no other.
-    if (name.empty() || std::filesystem::path(name).filename() != name) continue;
-    if (const auto bytes = ReadFile(file.parent_path() / kGatePictures / name)) {
-      pictures[gate["name"].get<std::string>()] = "data:image/png;base64," + Base64(*bytes);
-    }
+    if (name.empty() || fs::path(name).filename() != name) continue;
+    // No link leads elsewhere: its bytes would be in the page.
+    const auto path = fs::path(kGatePictures) / name;
+    std::error_code code;
+    if (!fs::exists(fs::symlink_status(folder / path, code))) continue;
+    TSDFPP_ASSIGN(const std::string bytes, DataFolder(folder).Read(path.string()));
+    pictures[gate["name"].get<std::string>()] = "data:image/png;base64," + Base64(bytes);
   }
   results["pictures"] = std::move(pictures);
   return results;

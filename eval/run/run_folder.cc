@@ -199,6 +199,11 @@ Expected<void> RunFolder::CheckPlaces(std::set<std::string> files) const {
     fs::path folder;
     for (const fs::path& part : fs::path(name).parent_path()) {
       folder /= part;
+      // A link would lead the run's files out of its folder.
+      if (fs::is_symlink(fs::symlink_status(out_ / folder, failure)) &&
+          !old.contains(folder.string())) {
+        return UsageError("{}: is a link, expected a folder or nothing", (out_ / folder).string());
+      }
       const fs::file_status status = fs::status(out_ / folder, failure);
       if (fs::exists(status) && !fs::is_directory(status) && !old.contains(folder.string())) {
         return UsageError("{}: is a file, expected a folder or nothing", (out_ / folder).string());

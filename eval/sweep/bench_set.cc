@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <thread>
 
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/json_text.h"
+#include "core/one_line.h"
 #include "eval/sweep/sweep_metrics.h"
 #include "sequence/sequence_json.h"
 #include "sim/load_scene.h"
@@ -22,6 +24,18 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+// A text of a result in a table's cell: one line, and nothing that Markdown or a browser would read
+// as more than text.
+std::string InMarkdown(std::string_view text) {
+  constexpr std::size_t kMostBytes = 200;
+  std::string escaped;
+  for (const char c : OneLine(text, kMostBytes)) {
+    if (std::string_view("\\|<>[]`*&!").find(c) != std::string_view::npos) escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
 
 std::string Rounded(const Eigen::Vector3d& p) {
   constexpr double kUnits_per_m = 1e5;
@@ -237,7 +251,17 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
         scores[name] = value.is_number() ? Measured::Of(value.get<double>())
                                          : Measured::Undefined(value.at("why"));
         if (!value.is_number() && !value.at("value").is_null()) {
-          return DataError("{}: {} is neither a number nor null with a reason", where, name);
+          return DataError("{}: {} is neither a number nor null with a reason", where,
+                           OneLine(name));
+        }
+        const SweepMetric* metric = FindMetric(name);
+        constexpr double kNoEnd = std::numeric_limits<double>::infinity();
+        const double most = metric == nullptr ? kNoEnd : MostOf(*metric).value_or(kNoEnd);
+        const double score = scores[name].value.value_or(0);
+        if (score < 0 || score > most) {
+          return DataError("{}: {} of sequence {} is {}, expected {}", where, OneLine(name),
+                           JsonShown(entry.at("sequence")), JsonShown(value),
+                           most < kNoEnd ? fmt::format("0 to {}", most) : "0 or more");
         }
       }
     }
@@ -319,7 +343,7 @@ Expected<std::string> Leaderboard(const BenchSet& set, const fs::path& folder) {
   }
   page += fmt::format(" version | commit | hardware |{} --- | --- | --- |\n", rule);
   for (const Row& row : rows) {
-    page += fmt::format("| {} |", row.result.method);
+    page += fmt::format("| {} |", InMarkdown(row.result.method));
     for (std::size_t m = 0; m < set.metrics.size(); ++m) {
       const int decimals = FindMetric(set.metrics[m])->decimals;
       page += fmt::format(" {}", Text(row.means[m], decimals));
@@ -329,8 +353,8 @@ Expected<std::string> Leaderboard(const BenchSet& set, const fs::path& folder) {
       }
       page += " |";
     }
-    page += fmt::format(" {} | {} | {} |\n", row.result.version, row.result.commit,
-                        row.result.hardware);
+    page += fmt::format(" {} | {} | {} |\n", InMarkdown(row.result.version),
+                        InMarkdown(row.result.commit), InMarkdown(row.result.hardware));
   }
   for (const std::string& metric : set.metrics) {
     const SweepMetric& words = *FindMetric(metric);
@@ -342,7 +366,7 @@ Expected<std::string> Leaderboard(const BenchSet& set, const fs::path& folder) {
     }
     page += rule + "\n";
     for (const Row& row : rows) {
-      page += fmt::format("| {} |", row.result.method);
+      page += fmt::format("| {} |", InMarkdown(row.result.method));
       for (const BenchSequence& sequence : set.sequences) {
         page += fmt::format(" {} |",
                             Text(row.result.scores.at(sequence.name).at(metric), words.decimals));

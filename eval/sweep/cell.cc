@@ -41,20 +41,19 @@ std::vector<Measured> FromNamed(const nlohmann::json& named, std::size_t count) 
   return values;
 }
 
-// Throws where it is none: nlohmann's own conversion wraps what does not fit.
-int FrameOf(const nlohmann::json& json) {
-  const auto frame = WholeIn(json, 0, std::numeric_limits<int>::max());
-  if (!frame) throw std::out_of_range(fmt::format("{} is no frame", JsonShown(json)));
+}  // namespace
+
+int FrameFromJson(const nlohmann::json& value) {
+  const auto frame = WholeIn(value, 0, std::numeric_limits<int>::max());
+  if (!frame) throw std::out_of_range(fmt::format("{} is no frame", JsonShown(value)));
   return static_cast<int>(*frame);
 }
 
-InstanceId ObjectOf(const nlohmann::json& json) {
-  const auto id = WholeIn(json, 0, kNoInstance);
-  if (!id) throw std::out_of_range(fmt::format("{} is no object", JsonShown(json)));
+InstanceId ObjectFromJson(const nlohmann::json& value) {
+  const auto id = WholeIn(value, 0, kNoInstance);
+  if (!id) throw std::out_of_range(fmt::format("{} is no object", JsonShown(value)));
   return static_cast<InstanceId>(*id);
 }
-
-}  // namespace
 
 Cell MakeCell(const CellSettings& settings, const SequenceVariant& variant,
               const std::string& program, const std::string& renderer) {
@@ -117,13 +116,14 @@ Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
     }
     CellResult result;
     for (const nlohmann::json& entry : json.at("frames")) {
-      result.frames.push_back({FrameOf(entry.at("frame")), entry.at("examined"),
+      result.frames.push_back({FrameFromJson(entry.at("frame")), entry.at("examined"),
                                FromNamed(entry.at("scores"), EvaluationMetricCount()),
                                entry.at("map_digest")});
     }
     result.examined = FromNamed(json.at("examined"), SweepMetrics().size());
     result.evaluation = json.at("evaluation");
-    for (const nlohmann::json& id : json.at("removed")) result.removed.push_back(ObjectOf(id));
+    for (const nlohmann::json& id : json.at("removed"))
+      result.removed.push_back(ObjectFromJson(id));
     const nlohmann::json& times = json.at("times");
     result.times = times.at("steps");
     result.frame_ms = times.at("frame_ms").get<std::vector<double>>();

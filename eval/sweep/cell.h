@@ -52,6 +52,11 @@ std::string ImageDigest(const Frame& frame);
 // Of vertices, triangles, colours and face ids.
 std::string MeshDigest(const TriangleMesh& mesh);
 
+// A frame's number and an object's id in JSON. They throw std::out_of_range, with words, where it
+// is none: nlohmann's own conversion wraps what does not fit.
+int FrameFromJson(const nlohmann::json& value);
+InstanceId ObjectFromJson(const nlohmann::json& value);
+
 nlohmann::json CellToJson(const Cell& cell, const CellResult& result);
 // Errors: kData, in a sentence: not JSON, another schema, a field that is missing or wrong.
 Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell);

@@ -1,6 +1,9 @@
 #include "eval/sweep/replay.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
+#include <stdexcept>
 
 #include "core/data_folder.h"
 #include "core/files.h"
@@ -27,8 +30,57 @@ struct Recorded {
   CellSettings settings;
   SequenceVariant variant;
   std::string program;
-  json cell;  // its file
+  std::map<std::string, std::string> maps;    // digests of the evaluated frames' maps, by frame
+  std::map<std::string, std::string> images;  // digests of frames
+  std::set<InstanceId> removed;
 };
+
+std::vector<int> FramesOf(const json& list) {
+  std::vector<int> frames;
+  for (const json& frame : list) {
+    frames.push_back(FrameFromJson(frame));
+    if (frames.size() > 1 && frames.back() <= *std::prev(frames.end(), 2)) {
+      throw std::out_of_range("frames are not in order");
+    }
+  }
+  if (frames.empty()) throw std::out_of_range("there is no frame");
+  return frames;
+}
+
+void ReadSequence(const json& sequence, SequenceVariant& variant) {
+  variant.frames = FramesOf(sequence.at("frames"));
+  const int first = kFirstFrame;
+  const int last = kFirstFrame + variant.scene.frames - 1;
+  if (variant.frames.front() < first || variant.frames.back() > last) {
+    throw std::out_of_range(fmt::format("frames {} to {} are not all of the scene's {} to {}",
+                                        variant.frames.front(), variant.frames.back(), first,
+                                        last));
+  }
+  variant.evaluated = FramesOf(sequence.at("evaluated"));
+  variant.examined = FrameFromJson(sequence.at("examined"));
+  variant.fuse_until = FrameFromJson(sequence.at("fuse_until"));
+  CellSettings probe;
+  const json& error = sequence.at("object_error");
+  if (!error.is_number()) throw std::out_of_range("'object_error' is no number");
+  // The axis knows what it may be.
+  if (auto set = FindAxis("object_error")->set(probe, error.get<double>()); !set) {
+    throw std::out_of_range(set.error().message);
+  }
+  variant.object_error = probe.object_error;
+}
+
+void ReadCell(const json& cell, Recorded& recorded) {
+  for (const json& entry : cell.at("frames")) {
+    recorded.maps[std::to_string(FrameFromJson(entry.at("frame")))] =
+        entry.at("map_digest").get<std::string>();
+  }
+  for (const auto& [frame, digest] : cell.at("images").items()) {
+    recorded.images[frame] = digest.get<std::string>();
+  }
+  for (const json& object : cell.at("removed")) {
+    recorded.removed.insert(ObjectFromJson(object));
+  }
+}
 
 Expected<std::string> FindCell(const json& cells, const std::string& wanted,
                                const std::string& where) {
@@ -49,7 +101,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
   std::error_code ignored;
   const fs::path file =
       fs::is_directory(options.result, ignored) ? options.result / "results.json" : options.result;
-  const std::string where = file.string();
+  std::string where = file.string();  // what is read
   const fs::path folder = file.parent_path();
   auto results = ReadJsonObject(file);
   if (!results) return UsageError("{}, expected an experiment's folder", results.error().message);
@@ -68,28 +120,24 @@ Expected<Recorded> Load(const ReplayOptions& options) {
                   DataFolder(folder).Find(sequence.at("scene").get<std::string>()));
     SequenceVariant& variant = recorded.variant;
     TSDFPP_ASSIGN(variant.scene_text, ReadFile(scene));
-    TSDFPP_ASSIGN(variant.scene,
-                  ParseSceneConfig(variant.scene_text, scene.string(), scene.parent_path()));
-    variant.frames = sequence.at("frames").get<std::vector<int>>();
-    variant.evaluated = sequence.at("evaluated").get<std::vector<int>>();
-    variant.examined = sequence.at("examined");
-    variant.fuse_until = sequence.at("fuse_until");
-    variant.object_error = sequence.at("object_error");
+    TSDFPP_ASSIGN(variant.scene, ParseSceneConfig(variant.scene_text, scene.string(),
+                                                  {scene.parent_path(), SceneOrigin::kData}));
+    ReadSequence(sequence, variant);
     recorded.program = fmt::format("{}, {}", results->at("program").get<std::string>(),
                                    results->at("renderer").get<std::string>());
-    TSDFPP_ASSIGN(recorded.cell, ReadJsonObject(folder / "cells" / (recorded.id + ".json")));
+    where = (folder / "cells" / (recorded.id + ".json")).string();
+    TSDFPP_ASSIGN(const json noted, ReadJsonObject(where));
+    ReadCell(noted, recorded);
     return recorded;
   } catch (const std::exception& error) {
     return DataError("{}: a field is missing or wrong ({})", where, error.what());
   }
 }
 
-// The digest that the original run noted of a frame's map; empty where it was not evaluated.
-std::string NotedMap(const json& cell, int frame) {
-  for (const json& entry : cell.at("frames")) {
-    if (entry.at("frame") == frame) return entry.at("map_digest");
-  }
-  return {};
+// What the original run noted of a frame; empty where it noted nothing.
+std::string Noted(const std::map<std::string, std::string>& digests, int frame) {
+  const auto found = digests.find(std::to_string(frame));
+  return found == digests.end() ? std::string() : found->second;
 }
 
 Expected<void> CheckSame(const Recorded& recorded, const char* what, int frame,
@@ -149,9 +197,13 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   const SequenceVariant& variant = recorded.variant;
   const auto last = std::find(variant.frames.begin(), variant.frames.end(), options.frame);
   if (last == variant.frames.end()) {
-    return UsageError("cell {}: frame {} is not among the {} that it used, {} to {} of every {}-th",
-                      recorded.id, options.frame, variant.frames.size(), variant.frames.front(),
-                      variant.frames.back(), variant.frames[1] - variant.frames[0]);
+    const std::string step =
+        variant.frames.size() < 2
+            ? ""
+            : fmt::format(" of every {}-th", variant.frames[1] - variant.frames[0]);
+    return UsageError("cell {}: frame {} is not among the {} that it used, {} to {}{}", recorded.id,
+                      options.frame, variant.frames.size(), variant.frames.front(),
+                      variant.frames.back(), step);
   }
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
   CellMapper mapper(recorded.settings, source.info().objects);
@@ -173,14 +225,13 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
     }
     if (index == result.compared_map_frame) {
       TSDFPP_RETURN_IF_ERROR(CheckSame(recorded, "the map's surfaces", index, result.map_digest,
-                                       NotedMap(recorded.cell, index), source.source()));
+                                       Noted(recorded.maps, index), source.source()));
     }
     if (options.progress) options.progress(i + 1, total);
   }
   result.image_digest = ImageDigest(both.frame);
-  TSDFPP_RETURN_IF_ERROR(CheckSame(
-      recorded, "images and poses", options.frame, result.image_digest,
-      recorded.cell.at("images").value(std::to_string(options.frame), ""), source.source()));
+  TSDFPP_RETURN_IF_ERROR(CheckSame(recorded, "images and poses", options.frame, result.image_digest,
+                                   Noted(recorded.images, options.frame), source.source()));
 
   const std::string command =
       fmt::format("tsdfpp replay {} --cell {} --frame {} --out {}", options.result.string(),
@@ -190,11 +241,9 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   TSDFPP_RETURN_IF_ERROR(WriteCamera(both.frame, out / "camera"));
   TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", scene));
   if (const MapRepresentation* map = mapper.map()) {
-    std::set<InstanceId> movers;
-    for (const json& id : recorded.cell.at("removed")) movers.insert(id.get<InstanceId>());
     TSDFPP_RETURN_IF_ERROR(
         WriteViews(*map, source.info().intrinsics, both.frame.T_WC, 2, out / "views"));
-    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, movers)), out));
+    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, recorded.removed)), out));
   }
   const json note{{"cell", recorded.id},
                   {"frame", options.frame},

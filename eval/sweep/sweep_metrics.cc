@@ -102,6 +102,12 @@ const std::vector<SweepMetric>& SweepMetrics() {
   return metrics;
 }
 
+std::optional<double> MostOf(const SweepMetric& metric) {
+  // Retention is relative to an earlier score, which a map can exceed.
+  const bool share = metric.unit.empty() && metric.name.find("retention") == std::string::npos;
+  return share ? std::optional(1.0) : std::nullopt;
+}
+
 const SweepMetric* FindMetric(std::string_view name) {
   for (const SweepMetric& metric : SweepMetrics()) {
     if (metric.name == name) return &metric;

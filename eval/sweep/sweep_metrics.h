@@ -31,6 +31,8 @@ struct SweepMetric {
 
 // Those of an evaluation first, in the order of EvaluationColumns().
 const std::vector<SweepMetric>& SweepMetrics();
+// The most that a metric can be; nothing where there is no end. None can be below 0.
+std::optional<double> MostOf(const SweepMetric& metric);
 // nullptr where there is none of this name.
 const SweepMetric* FindMetric(std::string_view name);
 // The place of the metric of this name, which must be there.

@@ -68,7 +68,7 @@ Expected<void> ReadSpline(TomlReader& reader, SplinePath& path) {
   return {};
 }
 
-void ReadRecorded(TomlReader& reader, const std::filesystem::path& folder, RecordedPath& path) {
+void ReadRecorded(TomlReader& reader, const SceneFolder& folder, RecordedPath& path) {
   reader.Get("file", path.file, true).Get("start_s", path.start_s);
   reader.Get("position", path.position_W, true).Get("target", path.target_W, true);
   if (path.file.empty()) reader.Fault("file", "is empty");
@@ -78,8 +78,7 @@ void ReadRecorded(TomlReader& reader, const std::filesystem::path& folder, Recor
     reader.Fault("target", "is straight above or below the position");
   }
   if (path.file.empty()) return;
-  if (!folder.empty()) path.file = (folder / path.file).lexically_normal().string();
-  CheckFileIsThere(reader, "file", path.file);
+  if (const auto file = folder.Find(reader, "file", path.file)) path.file = file->string();
 }
 
 Expected<HandJitter> ReadJitter(const toml::table& table, const TomlReader& camera) {
@@ -107,8 +106,7 @@ Expected<HandJitter> ReadJitter(const toml::table& table, const TomlReader& came
 
 }  // namespace
 
-Expected<void> ReadCameraPath(TomlReader& reader, const std::filesystem::path& folder,
-                              CameraConfig& camera) {
+Expected<void> ReadCameraPath(TomlReader& reader, const SceneFolder& folder, CameraConfig& camera) {
   std::string name = kPathNames[0];
   reader.Get("path", name);
   if (name == kPathNames[0]) {

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/toml_reader.h"
 #include "core/types.h"
+#include "sim/config/scene_folder.h"
 #include "sim/config/spline.h"
 
 namespace tsdfpp {
@@ -76,10 +77,8 @@ struct CameraConfig {
 };
 
 // Reads the keys of [camera] that say where it is; what is wrong becomes a fault of the reader, and
-// returned where it is in a table of its own. `folder` is where a recorded trajectory's relative
-// name starts.
-Expected<void> ReadCameraPath(TomlReader& reader, const std::filesystem::path& folder,
-                              CameraConfig& camera);
+// returned where it is in a table of its own. A recorded trajectory lies in `folder`.
+Expected<void> ReadCameraPath(TomlReader& reader, const SceneFolder& folder, CameraConfig& camera);
 // Adds those keys to a table.
 void WriteCameraPath(const CameraConfig& camera, toml::table& table);
 

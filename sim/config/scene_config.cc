@@ -35,7 +35,7 @@ Expected<void> CheckInRoom(TomlReader& reader, const SceneConfig& config) {
 }
 
 Expected<void> ReadCamera(const toml::table& table, const std::string& where,
-                          const std::filesystem::path& folder, SceneConfig& config) {
+                          const SceneFolder& folder, SceneConfig& config) {
   TomlReader reader(table, where, "camera");
   ReadIntrinsics(reader, table, config.intrinsics);
   TSDFPP_RETURN_IF_ERROR(ReadCameraPath(reader, folder, config.camera));
@@ -109,7 +109,7 @@ Expected<SceneExperiment> ReadExperiment(const toml::table& table, const std::st
 }  // namespace
 
 Expected<SceneConfig> ReadSceneConfig(const toml::table& root, const std::string& where,
-                                      const std::filesystem::path& folder,
+                                      const SceneFolder& folder,
                                       std::optional<std::uint64_t> seed) {
   TomlReader reader(root, where);
   SceneConfig config;
@@ -157,7 +157,7 @@ Expected<SceneConfig> ReadSceneConfig(const toml::table& root, const std::string
 }
 
 Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where,
-                                       const std::filesystem::path& folder) {
+                                       const SceneFolder& folder) {
   TSDFPP_ASSIGN(const toml::table root, ParseToml(text, where));
   return ReadSceneConfig(root, std::string(where), folder, std::nullopt);
 }

@@ -85,12 +85,11 @@ inline constexpr int kMaxObjectId = 255;
 // for the file's name in messages; `seed` takes the place of the file's own. Errors: those of
 // LoadSceneConfig (sim/load_scene.h).
 Expected<SceneConfig> ReadSceneConfig(const toml::table& root, const std::string& where,
-                                      const std::filesystem::path& folder,
-                                      std::optional<std::uint64_t> seed);
+                                      const SceneFolder& folder, std::optional<std::uint64_t> seed);
 // The same from text; `where` stands for the file's name in messages, `folder` is where the names
 // of files in it start (empty: the working directory).
 Expected<SceneConfig> ParseSceneConfig(std::string_view text, std::string_view where,
-                                       const std::filesystem::path& folder = {});
+                                       const SceneFolder& folder = {});
 
 // The scene as a file: ParseSceneConfig(SceneToToml(c)) is c, number by number.
 std::string SceneToToml(const SceneConfig& config);

@@ -137,7 +137,7 @@ bool IsMeshFile(const std::string& name) {
   return extension == ".obj" || extension == ".stl" || extension == ".ply";
 }
 
-void ReadModel(TomlReader& reader, const toml::table& table, const std::filesystem::path& folder,
+void ReadModel(TomlReader& reader, const toml::table& table, const SceneFolder& folder,
                ModelSpec& model) {
   std::string name;
   std::string picture;
@@ -151,11 +151,13 @@ void ReadModel(TomlReader& reader, const toml::table& table, const std::filesyst
   model.name = name;
   if (IsMeshFile(name)) {
     model.name = kMeshModel;
-    model.file = (folder / name).lexically_normal();
-    CheckFileIsThere(reader, "model", model.file);
+    const auto file = folder.Find(reader, "model", name);
+    if (!file) return;
+    model.file = *file;
     if (!picture.empty()) {
-      model.picture = (folder / picture).lexically_normal();
-      CheckFileIsThere(reader, "picture", model.picture);
+      const auto found = folder.Find(reader, "picture", picture);
+      if (!found) return;
+      model.picture = *found;
     }
   } else if (!name.empty() && FindModel(name) == nullptr) {
     std::vector<std::string> names;
@@ -185,7 +187,7 @@ Pose SceneObject::T_WO() const {
 }
 
 Expected<SceneObject> ReadSceneObject(const toml::table& table, const std::string& where,
-                                      const std::string& path, const std::filesystem::path& folder,
+                                      const std::string& path, const SceneFolder& folder,
                                       const SceneConfig& so_far) {
   TomlReader reader(table, where, path);
   SceneObject object;

@@ -14,7 +14,7 @@ namespace tsdfpp {
 // Reads one object, checked against the scene so far: its frames, its room, its other objects.
 // Errors: kUsage, with file, line and key.
 Expected<SceneObject> ReadSceneObject(const toml::table& table, const std::string& where,
-                                      const std::string& path, const std::filesystem::path& folder,
+                                      const std::string& path, const SceneFolder& folder,
                                       const SceneConfig& so_far);
 
 toml::table SceneObjectToToml(const SceneObject& object);

@@ -22,15 +22,6 @@ void CheckPlainName(TomlReader& reader, std::string_view name) {
   }
 }
 
-void CheckFileIsThere(TomlReader& reader, std::string_view key, const std::filesystem::path& file) {
-  std::error_code code;
-  if (std::filesystem::is_regular_file(file, code)) return;
-  const bool is_folder = std::filesystem::is_directory(file, code);
-  reader.Fault(key,
-               fmt::format("names {}, {}", file.string(),
-                           is_folder ? "which is a folder, not a file" : "which does not exist"));
-}
-
 void GetSeed(TomlReader& reader, const toml::table& table, std::string_view key,
              std::uint64_t& seed) {
   int ignored = 0;

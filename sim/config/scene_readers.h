@@ -22,9 +22,6 @@ void CheckRange(TomlReader& reader, std::string_view key, T value, T low, T high
   }
 }
 
-// A fault unless the file that the key names is there.
-void CheckFileIsThere(TomlReader& reader, std::string_view key, const std::filesystem::path& file);
-
 // Reads a whole number of 64 bits and no sign.
 void GetSeed(TomlReader& reader, const toml::table& table, std::string_view key,
              std::uint64_t& seed);

@@ -16,6 +16,9 @@ namespace {
 
 // Cutting a face that is not convex takes time with its cube.
 constexpr std::size_t kMostConcaveCorners = 400;
+// Of all such faces together, the sum of the cubes of their corners: some seconds.
+constexpr std::size_t kMostConcaveWork =
+    20 * kMostConcaveCorners * kMostConcaveCorners * kMostConcaveCorners;
 // Pictures repeat, but not that often.
 constexpr double kMostTexcoord = 1e4;
 
@@ -76,6 +79,8 @@ class ObjReader {
   int material_ = kNoMaterial;
   std::map<std::string, int> materials_;
   std::size_t not_faces_ = 0;
+  std::size_t concave_work_ = 0;
+  std::size_t library_bytes_ = 0;
 };
 
 Expected<double> ObjReader::ReadNumber(std::string_view word) {
@@ -190,6 +195,12 @@ Expected<void> ObjReader::CutFace(const std::vector<Corner>& corners) {
     return DataError("{}: line {}: a face that is not convex has {} corners, expected {} at most",
                      file_, line_, n, kMostConcaveCorners);
   }
+  concave_work_ += n * n * n;
+  if (concave_work_ > kMostConcaveWork) {
+    return DataError(
+        "{}: line {}: its faces that are not convex take too long to cut, expected triangles",
+        file_, line_);
+  }
   const Eigen::Vector3d u = normal.unitOrthogonal();
   const Eigen::Vector3d v = normal.normalized().cross(u);
   std::vector<Eigen::Vector2d> flat;
@@ -242,6 +253,10 @@ void ObjReader::ReadLibrary(const std::string& name) {
   std::replace(plain.begin(), plain.end(), '\\', '/');
   const Companion library = Find(kMeshFolder, plain);
   const std::filesystem::path path = library.path;
+  // One library has many names: "a.mtl", "./a.mtl".
+  std::error_code code;
+  const std::filesystem::path place = std::filesystem::weakly_canonical(path, code);
+  if (!code && !libraries_.insert("file " + place.string()).second) return;
   const std::filesystem::path from =
       (std::filesystem::path(kMeshFolder) / plain).lexically_normal().parent_path();
   mesh_.companions.push_back(library);
@@ -254,6 +269,13 @@ void ObjReader::ReadLibrary(const std::string& name) {
         fmt::format("{}: its material library cannot be read ({}), so its "
                     "colours are not known",
                     file_, bytes.error().message));
+    return;
+  }
+  library_bytes_ += bytes->size();
+  if (!CheckLimit(&Limits::text_bytes, static_cast<std::int64_t>(library_bytes_), file_, "")) {
+    mesh_.remarks.push_back(
+        fmt::format("{}: is left out, its material libraries are larger together than one may be",
+                    path.string()));
     return;
   }
   RawMaterial* material = nullptr;

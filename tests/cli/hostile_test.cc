@@ -15,6 +15,7 @@
 #include "core/one_line.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_writer.h"
+#include "sequence/export.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 #include "tests/sequence/box_source.h"
@@ -114,6 +115,26 @@ TEST_F(Hostile, LinksThatLeadOutAreFollowedIfAsked) {
   ExpectSentence(Map(folder_ / "set"), kData, "set/colour: leads by a link to '");
   const CommandOutput followed = Map(folder_ / "set", {"--follow-links"});
   EXPECT_EQ(followed.exit_code, 0) << followed.err;
+}
+
+// A .klg that is named itself may lie among other things; what is read beside it stays there.
+TEST_F(Hostile, LinksBesideARecordingThatIsNamed) {
+  test::BoxSource source(3);
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kKlg, folder_ / "set/klg").has_value());
+  fs::path recording;
+  for (const auto& entry : fs::directory_iterator(folder_ / "set/klg")) {
+    if (entry.path().extension() == ".klg") recording = entry.path();
+  }
+  const fs::path poses = folder_ / "set/klg/groundtruth.txt";
+  fs::create_symlink("/etc", folder_ / "set/klg/another");
+  const CommandOutput sound = Map(recording);
+  EXPECT_EQ(sound.exit_code, 0) << sound.err;
+  ASSERT_TRUE(WriteFile(folder_ / "set/secret", "SECRET x").has_value());
+  fs::remove(poses);
+  fs::create_symlink(folder_ / "set/secret", poses);
+  const CommandOutput refused = Map(recording);
+  ExpectSentence(refused, kData, "groundtruth.txt: leads by a link to '");
+  EXPECT_EQ(refused.err.find("SECRET"), std::string::npos) << refused.err;
 }
 
 TEST_F(Hostile, DepthAndSizesAreLimited) {

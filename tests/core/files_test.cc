@@ -48,9 +48,8 @@ TEST(Files, FailedWriteLeavesTheOldAndNothingBeside) {
   const auto result = WriteFile(folder / "taken", "new");
   ASSERT_FALSE(result.has_value());
   EXPECT_EQ(result.error().kind, ErrorKind::kEnvironment);
-  EXPECT_TRUE(
-      result.error().message.starts_with((folder / "taken").string() + ": cannot be written ("))
-      << result.error().message;
+  EXPECT_EQ(result.error().message,
+            (folder / "taken").string() + ": is a folder, expected a regular file or nothing");
   EXPECT_EQ(ReadFile(folder / "taken/inside").value(), "kept");
   EXPECT_EQ(folder.Entries(), 1);
 }
@@ -107,6 +106,25 @@ TEST(Files, NothingElseIsWrittenInto) {
   }
   EXPECT_EQ(ReadFile(folder / "other").value(), "kept");
   EXPECT_EQ(folder.Entries(), 7);
+}
+
+// A device or a pipe is nobody's old result.
+TEST(Files, OnlyRegularFilesAreReplaced) {
+  const TempFolder folder;
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink(folder / "pipe", folder / "link");
+  std::filesystem::create_directory(folder / "folder");
+  for (const auto& [name, kind] : {std::pair{"pipe", "a pipe"}, std::pair{"link", "a pipe"},
+                                   std::pair{"folder", "a folder"}}) {
+    const auto written = WriteFile(folder / name, "bytes");
+    ASSERT_FALSE(written.has_value()) << name;
+    EXPECT_EQ(written.error().kind, ErrorKind::kEnvironment);
+    EXPECT_EQ(written.error().message, fmt::format("{}: is {}, expected a regular file or nothing",
+                                                   (folder / name).string(), kind));
+  }
+  EXPECT_TRUE(std::filesystem::is_fifo(folder / "pipe"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(folder.Entries(), 3);
 }
 
 TEST(Files, MissingFileAndFolderAreNamed) {

@@ -22,8 +22,7 @@ TEST(JsonText, WhatIsWrittenIsRead) {
   const json value{{"a", 1}, {"b", {1.5, "x\n\"", nullptr, true}}, {"c", json::object()}};
   EXPECT_EQ(ParseJson(JsonText(value), "x").value(), value);
   EXPECT_EQ(ParseJsonObject(JsonText(value, 2), "x").value(), value);
-  EXPECT_EQ(JsonText(ParseOrderedJsonObject("{\"b\":1,\"a\":2}", "x").value()),
-            "{\"b\":1,\"a\":2}");
+  EXPECT_EQ(JsonText(nlohmann::ordered_json{{"b", 1}, {"a", 2}}), "{\"b\":1,\"a\":2}");
 }
 
 TEST(JsonText, WhatIsNoJsonHasASentence) {
@@ -34,7 +33,7 @@ TEST(JsonText, WhatIsNoJsonHasASentence) {
     EXPECT_EQ(any.error().kind, ErrorKind::kData);
   }
   EXPECT_EQ(ParseJsonObject("[1]", "x.json").error().message, "x.json: not a JSON object");
-  EXPECT_EQ(ParseOrderedJsonObject("3", "x.json").error().message, "x.json: not a JSON object");
+  EXPECT_EQ(ParseJsonObject("3", "x.json").error().message, "x.json: not a JSON object");
 }
 
 // As deep as this, copying, printing and comparing overflow the stack.

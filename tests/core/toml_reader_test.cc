@@ -171,7 +171,10 @@ TEST(TomlDepth, IsLimitedBeforeAnythingIsMade) {
   for (const std::string& text :
        {"[" + dotted(kMany) + "]\n", dotted(kMany) + " = 1\n", "[[" + dotted(kMany) + "]]\n",
         "x = {" + dotted(kMany) + " = 1}\n", "x = " + std::string(kMany, '['), "x = " + within,
-        "s = '''\n[\n'''\n[" + dotted(kMany) + "]\n"}) {
+        "s = '''\n[\n'''\n[" + dotted(kMany) + "]\n",
+        // Quotes before the end are the string's own, and what follows is on the same line.
+        "x = [\"\"\"y\"\"\"\", {" + dotted(kMany) + " = 1}]\n",
+        "x = ['''y''''', {" + dotted(kMany) + " = 1}]\n"}) {
     EXPECT_NE(said(text).find("tables and lists within one another, over the limit of 64"),
               std::string::npos)
         << said(text);

@@ -115,6 +115,17 @@ TEST_F(SmallSet, ALeaderboardIsBestFirst) {
   EXPECT_NE(page->find("| best | 1.000 | 0.800 |"), std::string::npos) << *page;
 }
 
+// Whoever wrote a result does not write the page.
+TEST_F(SmallSet, TextsOfResultsStayTexts) {
+  json result = Result("a|b <script>x</script> [c](d)\n# e", 1, 1);
+  ASSERT_TRUE(WriteFile(folder_ / "r/1.json", result.dump()).has_value());
+  const auto page = Leaderboard(set_, folder_ / "r");
+  ASSERT_TRUE(page.has_value()) << page.error().message;
+  EXPECT_NE(page->find("| a\\|b \\<script\\>x\\</script\\> \\[c\\](d) # e |"), std::string::npos)
+      << *page;
+  EXPECT_EQ(page->find("\n# e"), std::string::npos);
+}
+
 TEST_F(SmallSet, OurMethodsRunOnItAndEnterThePage) {
   const std::vector<std::string> of_set{"bench-set", "s", "--sets", folder_ / "sets"};
   const auto run = [&](std::vector<std::string> more) {
@@ -164,6 +175,12 @@ TEST_F(SmallSet, AnUnsoundResultIsRefusedInASentence) {
   result = Result("m", 1, 1);
   result["entries"][0]["scores"]["visible_completion"] = nullptr;
   refused(result, "a field is missing or wrong");
+  result = Result("m", 1, 1);
+  result["entries"][0]["scores"]["visible_completion"] = 1.5;
+  refused(result, "visible_completion of sequence \"a\" is 1.5, expected 0 to 1");
+  result = Result("m", 1, 1);
+  result["entries"][0]["scores"]["ghost_area_cm2"] = -1;
+  refused(result, "ghost_area_cm2 of sequence \"a\" is -1, expected 0 or more");
   result = Result("m", 1, 1);
   result["hardware"].erase("cpu");
   refused(result, "a field is missing or wrong");

@@ -243,6 +243,26 @@ TEST_F(Certification, FindsADamagedScene) {
   }
 }
 
+// The scene of a sequence is data: its files are those of the sequence, and no other is opened.
+TEST_F(Certification, TheSceneLeadsNowhereElse) {
+  const std::string scene = Bytes(cofusion::kScene);
+  const std::size_t at = scene.find("model = '");
+  ASSERT_NE(at, std::string::npos) << scene;
+  const std::size_t end = scene.find('\'', at + 9);
+  ASSERT_TRUE(WriteFile(folder_ / "far.obj", "f SECRET\n").has_value());
+  ASSERT_TRUE(WriteFile(set_ / "near.obj", "f SECRET\n").has_value());
+  for (const std::string& file : {(folder_ / "far.obj").string(), std::string("../far.obj"),
+                                  std::string("inputs/0/../../../far.obj"), std::string("near.obj"),
+                                  std::string("/etc/none.obj")}) {
+    Replace(cofusion::kScene, scene.substr(0, at) + "model = '" + file + scene.substr(end));
+    std::string said;
+    for (const Finding& finding : Findings()) said += finding.sentence + "\n";
+    EXPECT_NE(said.find("expected inputs/<number>/<file> beside the scene"), std::string::npos)
+        << said;
+    EXPECT_EQ(said.find("SECRET"), std::string::npos) << said;
+  }
+}
+
 TEST_F(Certification, TheRaysFindItToo) {
   cv::Mat mask = ReadMask(set_ / cofusion::MaskFile(1), {}).value();
   mask.setTo(0, mask == 1);

@@ -117,6 +117,17 @@ TEST(ChildProcess, WhatHangsIsEndedWithAllThatItStarted) {
   EXPECT_TRUE(state == "Z" || state.empty()) << state;
 }
 
+// It goes on watching.
+TEST(ChildProcess, WhoStopsHisWatcherMeetsHisLimit) {
+  const TempFolder folder;
+  const ChildOutcome outcome = Shell(
+      folder, "for i in 1 2 3; do kill -STOP $PPID; sleep 0.3; done; sleep 600", RoomyLimits(3));
+  ASSERT_TRUE(outcome.failure.has_value());
+  EXPECT_NE(outcome.failure->message.find("ran longer than its limit of 3 s, and was ended"),
+            std::string::npos)
+      << outcome.failure->message;
+}
+
 TEST(ChildProcess, WhatEatsMemoryIsEnded) {
   const TempFolder folder;
   ChildLimits small = RoomyLimits();

@@ -80,7 +80,7 @@ TEST(Experiment, FaultsGetOneSentenceWithFileLineAndKey) {
       {good + "except = [{ method = [\"tsdf\", \"anchored\"] }]\n",
        "'except' leaves no cell of grid"},
       {good + "except = [{ voxel = 0.01 }]\n", "'grid.except.voxel' is not a known key here"},
-      {good + "seed = [" + Numbers(300) + "]\nnoise = [" + Numbers(300) + "]\n",
+      {good + "seed = [" + Numbers(600) + "]\nnoise = [" + Numbers(100) + "]\n",
        "'grid' '1' brings the cells to more than 100000, expected that at most"},
       {Replaced(good, "\"tsdf\"", "\"anchored\""), "holds tsdf++/anchored twice"},
       {Replaced(good, "\"tsdf\"", "\"tsdf++\""), "'baseline' is tsdf, which is not among"},

@@ -297,6 +297,12 @@ TEST(GateReportTest, ResultsComeBackForTheReport) {
       spoilt([](Json& j) { j["sabotages"][0].erase("caught"); }),
       "spoilt.json: sabotage 'frozen-object' does not say whether it was caught, and by what");
   EXPECT_EQ(spoilt([](Json& j) { j = Json::array(); }), "spoilt.json: not a JSON object");
+  // A link among the pictures would put another file's bytes into the page.
+  std::filesystem::create_symlink("/etc/hostname", folder.path() / kGatePictures / "far.png");
+  EXPECT_NE(spoilt([](Json& j) {
+              j["gates"][0]["explanation"]["picture"] = "far.png";
+            }).find("leads by a link to '"),
+            std::string::npos);
   // No file but those of the folder of pictures.
   EXPECT_EQ(spoilt([](Json& j) { j["gates"][0]["explanation"]["picture"] = "../gates.json"; }),
             "{}");

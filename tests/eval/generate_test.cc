@@ -182,7 +182,9 @@ TEST_F(Generation, WhatCameMeanwhileIsNotReplaced) {
   options.out = out_;
   options.ray_share = 0;
   options.progress = [&](const std::string& phase, int, int, int) {
-    if (phase == "verify") EXPECT_TRUE(WriteFile(out_ / "theirs.txt", "kept").has_value());
+    if (phase == "verify") {
+      EXPECT_TRUE(WriteFile(out_ / "theirs.txt", "kept").has_value());
+    }
   };
   const auto made = GenerateSequence(scene, "0", options);
   ASSERT_FALSE(made.has_value());

@@ -257,6 +257,59 @@ TEST_F(Sweep, AnyFrameCanBeMadeAgain) {
   EXPECT_NE(wrong(id, "3").find("are not what they were"), std::string::npos);
 }
 
+// What is edited afterwards gets a sentence: the cell's file and the experiment's.
+TEST_F(Sweep, AnEditedResultIsNotReplayed) {
+  const json swept = RunSweep(Experiment("method = [\"tsdf\"]\nvoxel_m = 0.02"), "out");
+  const std::string id = swept.at("cells").items().begin().key();
+  const std::string of = swept.at("cells").at(id).at("sequence");
+  const fs::path all = folder_ / "out/results.json";
+  const fs::path one = folder_ / "out/cells" / (id + ".json");
+  const auto said = [&](const fs::path& file, const std::function<void(json&)>& edit) {
+    const std::string whole = ReadFile(file).value();
+    json edited = json::parse(whole);
+    edit(edited);
+    EXPECT_TRUE(WriteFile(file, edited.dump()).has_value());
+    const auto ran = RunTsdfpp(
+        {"replay", folder_ / "out", "--cell", id, "--frame", "3", "--out", folder_ / "none"},
+        folder_.path());
+    EXPECT_FALSE(fs::exists(folder_ / "none"));
+    EXPECT_TRUE(WriteFile(file, whole).has_value());
+    return fmt::format("{} {}", ran.exit_code, ran.err);
+  };
+  const auto in_sequence = [&](const std::function<void(json&)>& edit) {
+    return said(all, [&](json& value) { edit(value["sequences"][of]); });
+  };
+  const std::vector<std::string> sentences{
+      in_sequence([](json& s) { s["frames"] = json::array(); }),
+      in_sequence([](json& s) {
+        s["frames"] = {1, 3, 2};
+      }),
+      in_sequence([](json& s) {
+        s["frames"] = {1, 3, 4294967299};
+      }),
+      in_sequence([](json& s) {
+        s["frames"] = {1, 3, 1000000};
+      }),
+      in_sequence([](json& s) { s["evaluated"] = json::array(); }),
+      in_sequence([](json& s) { s["object_error"] = 1e308; }),
+      in_sequence([](json& s) { s["fuse_until"] = -1; }),
+      said(one, [](json& c) { c.erase("images"); }),
+      said(one, [](json& c) { c["images"] = {1}; }),
+      said(one, [](json& c) { c["images"]["3"] = 5; }),
+      said(one, [](json& c) { c.erase("removed"); }),
+      said(one, [](json& c) { c["removed"] = {"x"}; }),
+      said(one, [](json& c) { c["removed"] = {70000}; }),
+      said(one, [](json& c) { c.erase("frames"); })};
+  for (const std::string& sentence : sentences) {
+    EXPECT_TRUE(sentence.starts_with("4 tsdfpp: ")) << sentence;
+    EXPECT_NE(sentence.find("a field is missing or wrong"), std::string::npos) << sentence;
+  }
+  // One frame has no step.
+  const std::string single = in_sequence([](json& s) { s["frames"] = {2}; });
+  EXPECT_TRUE(single.starts_with("2 tsdfpp: ")) << single;
+  EXPECT_NE(single.find("is not among the 1 that it used, 2 to 2"), std::string::npos) << single;
+}
+
 // Draws of object poses: of the stated size, each frame alone, the truth untouched; and blind
 // frames.
 TEST_F(Sweep, GivenPosesAreOffAndLateFramesAreBlind) {

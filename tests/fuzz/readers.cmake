@@ -69,6 +69,7 @@ function(tsdfpp_add_readers target)
       config/random_scene_config.cc
       models/room_model.cc
       config/scene_config.cc
+      config/scene_folder.cc
       scene/scene_inputs.cc
       config/scene_object_config.cc
       config/scene_readers.cc

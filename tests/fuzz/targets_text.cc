@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 bool ReadJsonText(std::string_view input) {
   constexpr const char* kWhere = "some.json";
   const auto json = ParseJson(input, kWhere);
-  (void)Accepted(ParseOrderedJsonObject(input, kWhere), kWhere);
+  (void)Accepted(ParseJsonObject(input, kWhere), kWhere);
   if (!Accepted(json, kWhere)) return false;
   const std::string written = JsonText(*json, 2);
   const auto again = ParseJson(written, kWhere);

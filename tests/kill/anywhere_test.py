@@ -68,9 +68,9 @@ class Planted(unittest.TestCase):
         self.lab.learn(command)
         return command
 
-    def lost_by_kills(self, how, count=6):
+    def lost_by_kills(self, how, kills=range(6)):
         command = self.command(how)
-        outcomes = [self.lab.kill(command, k) for k in range(count)]
+        outcomes = [self.lab.kill(command, k) for k in kills]
         return [sentence for outcome in outcomes if outcome for sentence in outcome.lost], outcomes
 
     def lost_by(self, command, name):
@@ -89,7 +89,9 @@ class Planted(unittest.TestCase):
         self.assertTrue(any("half-written" in sentence for sentence in self.lost_by_kills("half")[0]))
 
     def test_a_mixture_is_found(self):
-        self.assertTrue(any("mixture" in sentence for sentence in self.lost_by_kills("mixture")[0]))
+        # Each third kill comes at a change of the folder: the moment between the two files, whatever else the machine does.
+        kills = range(2, 20, 3) if self.lab.shim else range(24)
+        self.assertTrue(any("mixture" in sentence for sentence in self.lost_by_kills("mixture", kills)[0]))
 
     def test_litter_is_found(self):
         self.assertTrue(any("too much" in sentence for sentence in self.lost_by_kills("litter")[0]))

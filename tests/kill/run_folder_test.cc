@@ -255,16 +255,21 @@ TEST(RunFolder, WhatIsInTheWayIsNamed) {
   const fs::path out = folder / "out";
   ASSERT_TRUE(WriteFile(out / "mesh", "mine").has_value());
   ASSERT_TRUE(WriteFile(out / "page/mine", "mine").has_value());
+  fs::create_directory(folder / "far");
+  fs::create_directory_symlink(folder / "far", out / "linked");
   const Content before = ContentOf(out);
   for (const auto& [file, words] :
        {std::pair{"mesh/a.ply", "mesh: is a file, expected a folder"},
+        std::pair{"linked/a.ply", "linked: is a link, expected a folder"},
         std::pair{"page", "page: is a folder with files in it, expected a file"},
         std::pair{"b\xff", "has a name that cannot be printed"}}) {
     auto run = RunFolder::Begin(out, "c");
     ASSERT_TRUE(run.has_value());
     const auto asked = run->CheckPlaces({file});
     EXPECT_EQ(asked.has_value(), file[0] == 'b');  // a name of its own is no place
-    if (!asked) EXPECT_NE(asked.error().message.find(words), std::string::npos) << words;
+    if (!asked) {
+      EXPECT_NE(asked.error().message.find(words), std::string::npos) << words;
+    }
     ASSERT_TRUE(WriteFile(run->path() / file, "new").has_value());
     const auto done = run->Commit();
     ASSERT_FALSE(done.has_value()) << file;

@@ -209,6 +209,23 @@ TEST(ExportRoundTrip, WithoutMasksAndTruth) {
   }
 }
 
+// Files are called by their times, also of frames that are not next to one another.
+TEST(ExportRoundTrip, TumNeedsTimesThatDiffer) {
+  const TempFolder folder;
+  MemorySource source = Noise();
+  const int first = source.info().first_index;
+  source.on_read = [&](Frame& frame) -> Expected<void> {
+    frame.time_s = frame.index == first + 2 ? 0 : frame.index - first;
+    return {};
+  };
+  const auto failed = ExportSequence(source, DatasetFormat::kTum, folder / "out");
+  ASSERT_FALSE(failed.has_value());
+  EXPECT_EQ(failed.error().message,
+            fmt::format("frame {}: its time is that of frame {}, 0.000000 s, expected another",
+                        first + 2, first));
+  EXPECT_EQ(folder.Entries(), 0);
+}
+
 // A frame that cannot be read, or an `out` that holds something, leaves nothing behind.
 TEST(ExportRoundTrip, WholeOrNotAtAll) {
   const TempFolder folder;

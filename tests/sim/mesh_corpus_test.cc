@@ -28,11 +28,15 @@ std::vector<Broken> Corpus() {
   const float inf = INFINITY;
   std::memcpy(infinite.data() + 84 + 12, &inf, sizeof(inf));
   std::string many_corners = "f";
+  std::string concave;  // of as many as a face may have
   std::string zigzag;
   for (int i = 0; i < 500; ++i) {
     zigzag += fmt::format("v {} {} 0\n", i < 250 ? i : 500 - i, (i < 250 ? 0 : 1) + 0.5 * (i % 2));
     many_corners += fmt::format(" {}", i + 1);
+    if (i == 399) concave = many_corners + "\n";
   }
+  std::string many_concave;
+  for (int k = 0; k < 25; ++k) many_concave += concave;
   return {
       {"empty.obj", "", data, "is empty: 0 vertices and no face"},
       {"points.obj", kCorners, data, "is empty: 8 vertices and no face"},
@@ -62,6 +66,8 @@ std::vector<Broken> Corpus() {
       {"binary.obj", std::string("v 0 0 0\n\0\1\2", 11), data, "not an OBJ file: it is not text"},
       {"concave.obj", zigzag + many_corners + "\n", data,
        "a face that is not convex has 500 corners, expected 400 at most"},
+      {"concaves.obj", zigzag + many_concave, data,
+       "its faces that are not convex take too long to cut, expected triangles"},
       {"millimetres.obj", "v 0 0 0\nv 130 0 0\nv 0 80 0\nf 1 2 3\n", usage,
        "is 130 x 80 x 0 m at scale 1, expected a longest side of 0.001 to 10 m: is the file in "
        "another unit? Set scale (0.001 for millimetres)"},

@@ -76,6 +76,14 @@ TEST_F(ObjPaths, PicturesAsWell) {
   EXPECT_EQ(mesh.remarks.size(), 2U);
 }
 
+// By whatever names a library goes, it is read once.
+TEST_F(ObjPaths, ALibraryOfManyNamesIsReadOnce) {
+  ASSERT_TRUE(WriteFile(folder_ / "top/mesh/bad.mtl", "newmtl red\nKd x 0 0\n").has_value());
+  const RawMesh mesh =
+      Read("bad.mtl\nmtllib ./bad.mtl\nmtllib sub/../bad.mtl\nmtllib ../mesh/bad.mtl");
+  EXPECT_EQ(mesh.remarks.size(), 1U);
+}
+
 TEST_F(ObjPaths, WhereOnlyTheSurfaceIsWantedNothingIsOpened) {
   const RawMesh mesh = Read("near.mtl", Materials::kSkip);
   EXPECT_EQ(mesh.triangles.size(), 1U);
