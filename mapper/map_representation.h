@@ -64,10 +64,10 @@ class MapRepresentation {
   virtual Expected<void> Rename(InstanceId from, InstanceId to) = 0;
 
   // Puts a volume into the map as a new object whose pose is T_WO, with the volume's lattice at
-  // T_WL; it arrives as if it had moved there (docs/map.md, "Adding an object"). The voxel size
-  // must be the map's, and every block must hold an observed voxel. Errors: kUsage where the id is
-  // in the map (a pose given is enough), the background or no id; kData where a part would lie
-  // beyond the map's range or a pose is not rigid; the map is then unchanged.
+  // T_WL; it arrives as if it had moved there (docs/map.md, "Renaming and adding an object"). The
+  // voxel size must be the map's, and every block must hold an observed voxel. Errors: kUsage where
+  // the id is in the map (a pose given is enough), the background or no id; kData where a part
+  // would lie beyond the map's range or a pose is not rigid; the map is then unchanged.
   virtual Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
                              const Pose& T_WO) = 0;
 

@@ -1,4 +1,5 @@
-// Reconstruction to truth: accuracy, precision, signed bias, label purity (facts/metrics.md).
+// Reconstruction to truth: accuracy, precision, signed bias, label purity (docs/sources.md,
+// "Accuracy").
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// Ghosts: reconstructed surface where there is nothing (facts/metrics.md).
+// Ghosts: reconstructed surface where there is nothing (docs/sources.md, "Ghosts").
 #pragma once
 
 #include <array>

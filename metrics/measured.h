@@ -1,4 +1,4 @@
-// A number that may be undefined: never 0 in its place (facts/metrics.md, last definition).
+// A number that may be undefined: never 0 in its place (docs/sources.md, "Undefined values").
 #pragma once
 
 #include <optional>

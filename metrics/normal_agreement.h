@@ -10,7 +10,7 @@
 namespace tsdfpp {
 
 // A sample counts as reconstructed only where the surface's normal is within 60 deg of the truth's
-// (facts/metrics.md): a parallel sheet facing the other way does not count.
+// (docs/sources.md, "Reconstructed samples"): a parallel sheet facing the other way does not count.
 inline constexpr double kMaxNormalAngle_rad = std::numbers::pi / 3;
 
 // Per sample, in the order of the samples.

@@ -1,6 +1,6 @@
 // Truth to reconstruction: completion, occlusion preservation, retention, hole area
-// (facts/metrics.md). Nothing is aligned before: an object's samples go to the world by its true
-// pose.
+// (docs/sources.md, "Preservation and retention"). Nothing is aligned before: an object's samples
+// go to the world by its true pose.
 #pragma once
 
 #include <array>
@@ -23,12 +23,13 @@ Selection SelectAll(const SampleSet& samples);
 // The samples of one region of the model.
 Selection SelectRegion(const SampleSet& samples, std::uint16_t region);
 
-// Of the samples in `within`, those seen so far (facts: seen_o(t)).
+// Of the samples in `within`, those seen so far (docs/sources.md, "Seen and hidden").
 Selection SelectSeen(const SeenTracker& tracker, const Selection& within);
 // Of those, the ones whose status in the tracker's last frame is `status`: kVisible, or one cause
 // of hiding.
 Selection SelectSeenWith(const SeenTracker& tracker, SampleStatus status, const Selection& within);
-// Of those, the ones hidden for whatever cause (facts: hidden_o(t)); kUnmeasured is not hidden.
+// Of those, the ones hidden for whatever cause (docs/sources.md, "Seen and hidden"); kUnmeasured is
+// not hidden.
 Selection SelectHidden(const SeenTracker& tracker, const Selection& within);
 
 // Matches the selected samples, placed by `T_WO`, against a surface in the world: the scene's faces
@@ -73,9 +74,10 @@ class LastSeenStore {
   // At an evaluated frame: for the samples visible now, remembers whether they are reconstructed.
   void Update(const Selection& reconstructed, const Selection& visible_now);
 
-  // Retention (facts/metrics.md): of the hidden samples that some evaluation saw, the area
-  // reconstructed now over the area that was reconstructed when they were last seen. May exceed 1.
-  // Undefined where no evaluation saw any of them, or none was reconstructed.
+  // Retention (docs/sources.md, "Preservation and retention"): of the hidden samples that some
+  // evaluation saw, the area reconstructed now over the area that was reconstructed when they were
+  // last seen. May exceed 1. Undefined where no evaluation saw any of them, or none was
+  // reconstructed.
   Measured Retention(const SampleSet& samples, const Selection& hidden,
                      const Selection& reconstructed_now) const;
 

@@ -73,7 +73,7 @@ MeanPanopticQuality MeanQuality(const PanopticCounts& counts);
 // Over those of `classes` only, e.g. the things.
 MeanPanopticQuality MeanQuality(const PanopticCounts& counts, const std::set<int>& classes);
 
-// Intersection over union of labels, followed through a sequence (facts/metrics.md).
+// Intersection over union of labels, followed through a sequence (docs/sources.md, "Segmentation").
 class LabelOverlap {
  public:
   // Takes in a frame: images of labels, CV_32SC1, of one size (a programmer's duty). Pixels that

@@ -63,8 +63,8 @@ struct SurfaceComparison {
   // may lie between the samples.
   double hausdorff_m = 0;
   // Of meshes, else undefined: recall that also asks the surface to face within 60 deg of the way
-  // the truth does (facts/metrics.md), and the share of the precise samples (at the largest
-  // threshold) whose nearest true triangle faces away from theirs.
+  // the truth does (docs/sources.md, "Reconstructed samples"), and the share of the precise samples
+  // (at the largest threshold) whose nearest true triangle faces away from theirs.
   std::vector<Measured> facing_recall;
   Measured facing_away;
   EstimatorFloors floors;

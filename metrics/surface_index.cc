@@ -1,5 +1,5 @@
 // The only file that includes Open3D. Of its RaycastingScene as Debian builds it, only the distance
-// queries are right (facts/peers.md), so nothing else of it is used.
+// queries are right (docs/sources.md, "Open3D's distances"), so nothing else of it is used.
 #include "metrics/surface_index.h"
 
 #include <open3d/core/Tensor.h>

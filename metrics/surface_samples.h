@@ -21,7 +21,7 @@ struct SampleSet {
 };
 
 // How densely a true model is sampled: at least 4 a cm^2 on the table and on objects
-// (facts/metrics.md); floor and walls are large and wait for nobody.
+// (docs/sources.md, "Samples"); floor and walls are large and wait for nobody.
 struct SampleConfig {
   double fine_per_cm2 = 4;
   double coarse_per_cm2 = 0.25;

@@ -62,7 +62,8 @@ std::optional<Alignment> AlignHorn(const PosePairs& pairs, bool with_scale = fal
 PosePairs Aligned(const PosePairs& pairs, const Alignment& alignment);
 
 // A mapper chooses an object's frame, so its trajectory is anchored once, at the first common frame
-// t0: T_est(t) T_est(t0)^-1 T_gt(t0) (facts/metrics.md). No alignment follows.
+// t0: T_est(t) T_est(t0)^-1 T_gt(t0) (docs/sources.md, "Object trajectories"). No alignment
+// follows.
 PosePairs AnchoredAtFirst(const PosePairs& pairs);
 // The Co-Fusion protocol's anchor C = T_WO_est^-1 T_WC_est T_WC_gt^-1 T_WO_gt at the first common
 // frame, with the camera's poses there.

@@ -29,7 +29,7 @@ struct VisibilityConfig {
   int min_frames = 3;             // observations until a sample is "seen"
 };
 
-// Follows the samples of one object through a sequence (facts/metrics.md, seen_o and hidden_o).
+// Follows the samples of one object through a sequence (docs/sources.md, "Seen and hidden").
 //
 // The depth test: the sample is observed where its nearest pixel shows the object's id, its
 // incidence is under the limit, and that pixel's depth (or that of one of the other three pixels

@@ -1,4 +1,4 @@
-// Where a BOP dataset keeps its files (facts/datasets.md).
+// Where a BOP dataset keeps its files (docs/sources.md, "BOP").
 #pragma once
 
 #include <fmt/format.h>

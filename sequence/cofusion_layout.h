@@ -1,4 +1,4 @@
-// Where a Co-Fusion set keeps its files (docs: the dataset's own layout, car4-full and room4).
+// Where a Co-Fusion set keeps its files (docs/sources.md, "Co-Fusion").
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
-// The bytes of a .klg recording (Logger2, ElasticFusion, Co-Fusion; facts/datasets.md): int32 frame
-// count; a frame: int64 time in microseconds, int32 depth bytes, int32 colour bytes, depth, colour.
-// Little-endian.
+// The bytes of a .klg recording (Logger2, ElasticFusion, Co-Fusion; docs/sources.md, "Recordings in
+// .klg"): int32 frame count; a frame: int64 time in microseconds, int32 depth bytes, int32 colour
+// bytes, depth, colour. Little-endian.
 #pragma once
 
 #include <cstdint>

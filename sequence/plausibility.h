@@ -1,5 +1,5 @@
 // Finds what users of such systems get wrong in silence: units, pose directions, intrinsics of
-// another resolution (facts/datasets.md, last section).
+// another resolution (docs/sources.md, "What goes wrong in silence").
 #pragma once
 
 #include <optional>

@@ -12,7 +12,7 @@
 namespace tsdfpp {
 
 // The largest entry of R^T R - I that still passes for a rotation; 7-Scenes has 4e-4
-// (facts/datasets.md).
+// (docs/sources.md, "7-Scenes").
 inline constexpr double kOrthonormalTolerance = 2e-3;
 
 // The rotation nearest to `rotation` (SVD) and the translation. Errors: kData, beginning with

@@ -1,4 +1,4 @@
-// What a mapping run leaves on disk: meshes, trajectories, statistics (docs/formats.md).
+// What a mapping run leaves on disk: meshes, trajectories, statistics (docs/command-line.md).
 #pragma once
 
 #include <filesystem>

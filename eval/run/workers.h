@@ -1,5 +1,6 @@
 // Child processes that work side by side, each with libraries and an OpenGL context of its own:
-// software renderers in one process fight over their threads (facts/rendering.md).
+// software renderers in one process fight over their threads (docs/sources.md, "Renderers side by
+// side").
 #pragma once
 
 #include <sys/types.h>

@@ -1,4 +1,4 @@
-// All scores of one map at one frame (facts/metrics.md; docs/metrics.md).
+// All scores of one map at one frame (docs/sources.md, "Metrics"; docs/metrics.md).
 #pragma once
 
 #include <map>

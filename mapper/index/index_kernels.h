@@ -1,5 +1,5 @@
 // The arithmetic of the global indices over the voxels of a block (docs/map.md, "The index of
-// ...").
+// tsdf++" and "The index of tsdf++/anchored").
 #pragma once
 
 #include "mapper/index/voxel_list.h"

@@ -99,7 +99,7 @@ inline Index3 FloorOf(const Eigen::Vector3d& q) {
 // Corners of the point q, in voxels of the lattice.
 Corners FindCorners(const VoxelReader& reader, const Eigen::Vector3d& q);
 
-// The order of operations of docs/map.md, "Trilinear interpolation".
+// The order of operations of docs/map.md, "Resampling".
 float Trilinear(const std::array<float, 8>& corner, const std::array<float, 3>& fraction);
 
 // The distance at a point, from the corners with a non-zero coefficient; nothing where one of these

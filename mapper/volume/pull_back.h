@@ -1,5 +1,5 @@
 // One object's volume at the voxels of a block of another lattice: what covers them, and what their
-// values are when the volume moves there (docs/map.md, "Cover" and "Move"; paper III-E).
+// values are when the volume moves there (docs/map.md, "Cover" and "Resampling"; paper III-E).
 #pragma once
 
 #include "mapper/map_config.h"

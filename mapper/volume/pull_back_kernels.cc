@@ -84,7 +84,7 @@ V Blend(D d, V low, V high, V fraction) {
   return hn::Add(hn::Mul(low, hn::Sub(hn::Set(d, 1.0F), fraction)), hn::Mul(high, fraction));
 }
 
-// docs/map.md, "Trilinear interpolation".
+// docs/map.md, "Resampling".
 template <class D, class V>
 V Trilinear8(D d, const std::array<V, 8>& c, V fx, V fy, V fz) {
   const V near = Blend(d, Blend(d, c[0], c[1], fx), Blend(d, c[2], c[3], fx), fy);

@@ -1,5 +1,5 @@
 // The arithmetic of reading one lattice at the voxels of a block of another (docs/map.md, "Lattice"
-// and "Trilinear interpolation"), in loops that are compiled for several instruction sets.
+// and "Resampling"), in loops that are compiled for several instruction sets.
 #pragma once
 
 #include <array>

@@ -50,8 +50,8 @@ struct SplinePath {
   std::vector<CameraKey> keys;  // two at least
 };
 
-// A trajectory in TUM's format ("t tx ty tz qx qy qz qw", facts/datasets.md), sampled at the
-// scene's rate (positions linearly, rotations by slerp). The file's world is moved so that its
+// A trajectory in TUM's format ("t tx ty tz qx qy qz qw", docs/sources.md, "TUM RGB-D"), sampled at
+// the scene's rate (positions linearly, rotations by slerp). The file's world is moved so that its
 // camera starts at `position`, looking at `target` with level rows.
 struct RecordedPath {
   std::string file;    // absolute once a scene was loaded from a file

@@ -78,7 +78,7 @@ struct SceneConfig {
   std::optional<SceneExperiment> experiment;
 };
 
-// Ids are written to 8-bit masks (facts/datasets.md).
+// Ids are written to 8-bit masks (docs/sources.md, "Co-Fusion").
 inline constexpr int kMaxObjectId = 255;
 
 // Reads a scene that is not random. Names of files in it are relative to `folder`; `where` stands

@@ -12,7 +12,7 @@
 
 namespace tsdfpp {
 
-// Published models of depth cameras (facts/rendering.md).
+// Published models of depth cameras (docs/sources.md, "Depth noise").
 enum class DepthModel {
   kExact,
   kNguyen2012,  // Kinect v1: axial and lateral noise by distance and angle of incidence

@@ -1,6 +1,6 @@
-// Poses on disk in the layout of a Co-Fusion set (facts/datasets.md): trajectories/gt-cam-0.txt and
-// gt-<name>-<id>.txt, one line a frame, "frame tx ty tz qx qy qz qw". A scene rendered again from
-// them needs no physics and no camera path.
+// Poses on disk in the layout of a Co-Fusion set (docs/sources.md, "Co-Fusion"):
+// trajectories/gt-cam-0.txt and gt-<name>-<id>.txt, one line a frame, "frame tx ty tz qx qy qz qw".
+// A scene rendered again from them needs no physics and no camera path.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // Generators of closed triangle meshes, oriented outwards (counter-clockwise seen from outside).
 // Curved toys are always such meshes: MuJoCo draws its own spheres and cylinders as polygons that
-// differ from what its rays hit (facts/rendering.md). Metres throughout.
+// differ from what its rays hit (docs/sources.md, "Curved shapes"). Metres throughout.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -22,10 +22,10 @@ namespace tsdfpp {
 // hollow, a garage can be entered. Surfaces keep kToyClearance_m apart, as toys at rest do.
 //
 // T_WO of the objects that physics moves, for each frame of the scene, the first of frame 1;
-// nothing where physics moves none. The same on one machine for the same scene (facts/rendering.md:
-// MuJoCo is reproducible only for one version on one architecture). Errors: those of MakeModel;
-// kEnvironment where MuJoCo refuses the model; kUsage where the simulation diverges, naming the
-// frame.
+// nothing where physics moves none. The same on one machine for the same scene (docs/sources.md,
+// "Physics": MuJoCo is reproducible only for one version on one architecture). Errors: those of
+// MakeModel; kEnvironment where MuJoCo refuses the model; kUsage where the simulation diverges,
+// naming the frame.
 Expected<std::map<InstanceId, std::vector<Pose>>> BakePhysics(const SceneConfig& config);
 
 inline constexpr double kConvexTolerance_m = 0.002;

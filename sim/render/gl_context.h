@@ -1,7 +1,8 @@
 // A headless OpenGL context for MuJoCo, from EGL or OSMesa.
 //
 // Exactly one of the two libraries is loaded, at run time: MuJoCo's loader takes eglGetProcAddress
-// before OSMesaGetProcAddress, so a process that has both can use EGL only (facts/rendering.md).
+// before OSMesaGetProcAddress, so a process that has both can use EGL only (docs/sources.md,
+// "OpenGL contexts").
 #pragma once
 
 #include <memory>

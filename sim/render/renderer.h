@@ -36,7 +36,7 @@ struct RenderTimes {
 // Pixel centres are integers: pixel (u, v) shows the ray ((u - cx) / fx, (v - cy) / fy, 1).
 // Depth and ids come from one pass without multisampling, which alone gives true depth; colour has
 // a pass of its own with shadows and, unless told otherwise, four samples a pixel
-// (facts/rendering.md).
+// (docs/sources.md, "Depth of a pixel").
 class Renderer {
  public:
   // Errors: those of GlContext::Create; kEnvironment where GL gives no off-screen buffer of the

@@ -1,5 +1,5 @@
 // Turns MuJoCo's fatal errors into values. Left alone, mju_error prints "Press Enter to exit",
-// waits for input and writes MUJOCO_LOG.TXT (facts/rendering.md).
+// waits for input and writes MUJOCO_LOG.TXT (docs/sources.md, "Fatal errors").
 #pragma once
 
 #include <type_traits>

@@ -1,5 +1,5 @@
-// Published noise models of depth cameras; constants and sources as in facts/rendering.md, formulae
-// in docs/sensors.md. Every draw is keyed by (seed, frame, pixel).
+// Published noise models of depth cameras; constants and sources as in docs/sources.md, "Depth
+// noise", formulae in docs/sensors.md. Every draw is keyed by (seed, frame, pixel).
 #pragma once
 
 #include <cstdint>

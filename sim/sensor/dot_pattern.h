@@ -1,5 +1,5 @@
-// The dot pattern of a structured-light camera and its matching, after simkinect (facts/
-// rendering.md): disparity is measured where the dots of a 9x9 window agree, and nowhere else.
+// The dot pattern of a structured-light camera and its matching, after simkinect (docs/sources.md,
+// "Dot pattern"): disparity is measured where the dots of a 9x9 window agree, and nowhere else.
 #pragma once
 
 #include <cstdint>

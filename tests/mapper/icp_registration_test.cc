@@ -27,7 +27,7 @@ constexpr double kIcpVoxel_m = 0.01;
 
 // Against the truth. Matching points with vertices some millimetres apart, and flat faces with
 // smooth normals, biases the optimum: brute force is off by up to 0.1 mm and 0.075 deg on these
-// shapes (PCL by 0.50 mm and 0.019 deg in facts/peers.md). Twice that.
+// shapes (PCL by 0.50 mm and 0.019 deg in docs/sources.md, "Registration by PCL"). Twice that.
 constexpr double kTruth_m = 2e-4;
 constexpr double kTruth_rad = 0.15 * kDegree;
 // Against brute force run to its end: ICP stops after a step of half of 0.02 voxel, 0.1 mm, or a

@@ -1,5 +1,6 @@
-// docs/map.md, "`tsdf++/anchored`" (and "`volumes`", whose lists are asked of the volumes): volumes
-// that stay in their objects' lattices, and an index that is a pure function of volumes and poses.
+// docs/map.md, "The index of tsdf++/anchored" (and "`volumes`", whose lists are asked of the
+// volumes): volumes that stay in their objects' lattices, and an index that is a pure function of
+// volumes and poses.
 #include <algorithm>
 #include <map>
 #include <optional>

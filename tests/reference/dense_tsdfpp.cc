@@ -1,4 +1,4 @@
-// docs/map.md, "`tsdf++`": object volumes in the world's lattice under lists with votes.
+// docs/map.md, "The index of tsdf++": object volumes in the world's lattice under lists with votes.
 #include <algorithm>
 #include <map>
 #include <set>

@@ -58,7 +58,7 @@ void FuseSeen(const Seen& seen, const MapConfig& config, DenseVoxel& voxel,
 struct Neighbourhood {
   explicit Neighbourhood(const Eigen::Vector3d& q);
   float Coefficient(int corner) const;
-  // docs/map.md, "Trilinear interpolation".
+  // docs/map.md, "Resampling".
   float Interpolate(const std::array<float, 8>& corners) const;
 
   Eigen::Vector3i base;

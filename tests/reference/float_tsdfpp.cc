@@ -1,5 +1,5 @@
-// docs/map.md, "`tsdf++`", in floating point: object volumes in the world's lattice under lists
-// with votes.
+// docs/map.md, "The index of tsdf++", in floating point: object volumes in the world's lattice
+// under lists with votes.
 #include <algorithm>
 #include <map>
 #include <set>

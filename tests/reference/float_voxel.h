@@ -65,7 +65,7 @@ class FloatRule {
   // One observation of that weight, in band or clamped; nothing behind the band.
   void Fuse(const Seen& seen, float weight, FloatVoxel& voxel) const;
 
-  // Sets a voxel to one observation of that weight (docs/map.md, "contradiction").
+  // Sets a voxel to one observation of that weight (docs/map.md, "Fusion": contradiction).
   FloatVoxel Fresh(float distance, float weight) const;
 
   // docs/map.md, "Resampling" with `all`: nothing unless the eight corners are observed.

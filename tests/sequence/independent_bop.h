@@ -1,5 +1,5 @@
-// A reader of BOP written from its specification (facts/datasets.md) alone: it shares no code with
-// ours and trusts nothing but the files.
+// A reader of BOP written from its specification (docs/sources.md, "BOP") alone: it shares no code
+// with ours and trusts nothing but the files.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Exports read by readers that share no code with ours, each written from facts/datasets.md.
+// Exports read by readers that share no code with ours, each written from docs/sources.md, "Dataset
+// formats".
 #include <gtest/gtest.h>
 #include <zlib.h>
 

@@ -165,7 +165,8 @@ TEST(Rendering, PixelCentresAreIntegers) {
   EXPECT_LT(worst, kDepthTolerance_m);
 }
 
-// A viewport beyond the buffer would leave pixels untouched without a word (facts/rendering.md).
+// A viewport beyond the buffer would leave pixels untouched without a word (docs/sources.md,
+// "Buffers").
 TEST(Rendering, AnImageLargerThanTheBufferIsRefused) {
   auto scene = CompiledScene::Compile(LoadScene("mini"));
   ASSERT_TRUE(scene.has_value()) << scene.error().message;
