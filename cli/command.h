@@ -34,6 +34,7 @@ Run AddVerify(CLI::App& app, const CommonOptions& common);
 Run AddExport(CLI::App& app, const CommonOptions& common);
 Run AddGate(CLI::App& app, const CommonOptions& common);
 Run AddMap(CLI::App& app, const CommonOptions& common);
+Run AddMethods(CLI::App& app, const CommonOptions& common);
 Run AddCompare(CLI::App& app, const CommonOptions& common);
 Run AddEvaluate(CLI::App& app, const CommonOptions& common);
 Run AddMetric(CLI::App& app, const CommonOptions& common);

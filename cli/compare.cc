@@ -159,9 +159,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
   app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
   app.add_option("--methods", options->methods,
-                 "Maps to compare, by commas: tsdf, tsdf/min, tsdf/guarded, tsdf/static, tsdf++, "
-                 "tsdf++/literal, tsdf++/anchored, volumes; " +
-                     fmt::format("{}", fmt::join(AdapterNames(), ", ")))
+                 fmt::format("Maps to compare, by commas: {}; {}", MethodNames(),
+                             fmt::join(AdapterNames(), ", ")))
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();

@@ -43,6 +43,7 @@ int RunCommand(int argc, char** argv) {
   add("verify", "Check a sequence of ours against itself and against rays", tsdfpp::AddVerify);
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
+  add("methods", "List the methods that map knows", tsdfpp::AddMethods);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
   add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
       tsdfpp::AddEvaluate);

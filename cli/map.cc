@@ -222,10 +222,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
 Run AddMap(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<MapArguments>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source)->required(false);
-  app.add_option(
-         "--method", options->method,
-         "tsdf, tsdf/min, tsdf/guarded, tsdf/static, tsdf++, tsdf++/literal, tsdf++/anchored, "
-         "volumes")
+  app.add_option("--method", options->method,
+                 MethodNames() + " (tsdfpp methods says what they are)")
       ->capture_default_str();
   app.add_option("--segmentation", options->segmentation,
                  "Where masks come from: gt (the sequence) or none (all is background); by default "

@@ -1,23 +1,9 @@
 #include "mapper/map_config.h"
 
-#include <array>
 #include <cmath>
 
 namespace tsdfpp {
 namespace {
-
-struct Named {
-  Method method;
-  std::string_view name;
-};
-constexpr std::array<Named, 8> kMethods{{{Method::kTsdf, "tsdf"},
-                                         {Method::kTsdfMin, "tsdf/min"},
-                                         {Method::kTsdfGuarded, "tsdf/guarded"},
-                                         {Method::kTsdfStatic, "tsdf/static"},
-                                         {Method::kTsdfpp, "tsdf++"},
-                                         {Method::kTsdfppLiteral, "tsdf++/literal"},
-                                         {Method::kTsdfppAnchored, "tsdf++/anchored"},
-                                         {Method::kVolumes, "volumes"}}};
 
 Expected<void> InRange(std::string_view field, double value, double lowest, double highest) {
   if (std::isfinite(value) && value >= lowest && value <= highest) return {};
@@ -25,35 +11,6 @@ Expected<void> InRange(std::string_view field, double value, double lowest, doub
 }
 
 }  // namespace
-
-bool IsOneField(Method method) {
-  return method == Method::kTsdf || method == Method::kTsdfMin || method == Method::kTsdfGuarded ||
-         method == Method::kTsdfStatic;
-}
-
-std::string_view MethodName(Method method) {
-  for (const Named& named : kMethods) {
-    if (named.method == method) return named.name;
-  }
-  std::abort();
-}
-
-std::vector<Method> AllMethods() {
-  std::vector<Method> methods;
-  for (const Named& named : kMethods) methods.push_back(named.method);
-  return methods;
-}
-
-Expected<Method> MethodFromName(std::string_view name) {
-  std::string known;
-  for (const Named& named : kMethods) {
-    if (named.name == name || (!name.empty() && named.name == fmt::format("tsdf++/{}", name))) {
-      return named.method;
-    }
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", named.name);
-  }
-  return UsageError("method '{}' is unknown, expected one of {}", name, known);
-}
 
 std::string_view ResamplingName(Resampling resampling) {
   switch (resampling) {
@@ -186,22 +143,8 @@ toml::table MapConfig::ToToml() const {
 }
 
 int LayersOf(Method method, const MapConfig& config) {
-  switch (method) {
-    case Method::kTsdf:
-    case Method::kTsdfMin:
-    case Method::kTsdfGuarded:
-    case Method::kTsdfStatic:
-      return 1;
-    case Method::kTsdfppLiteral:
-      return 2;
-    case Method::kTsdfpp:
-      return config.layers == 0 ? 2 : config.layers;
-    case Method::kTsdfppAnchored:
-      return config.layers == 0 ? 4 : config.layers;
-    case Method::kVolumes:
-      return kMaxLayers;
-  }
-  std::abort();
+  const MethodInfo& info = InfoOf(method);
+  return info.layers_can_be_set && config.layers != 0 ? config.layers : info.layers;
 }
 
 }  // namespace tsdfpp

@@ -9,29 +9,9 @@
 #include "core/error.h"
 #include "core/half.h"
 #include "core/toml_reader.h"
+#include "mapper/method_info.h"
 
 namespace tsdfpp {
-
-enum class Method {
-  kTsdf,
-  kTsdfMin,
-  kTsdfGuarded,
-  kTsdfStatic,
-  kTsdfpp,
-  kTsdfppLiteral,
-  kTsdfppAnchored,
-  kVolumes
-};
-
-// Whether all objects share one field, in which a voxel has one distance and one label.
-bool IsOneField(Method method);
-
-// "tsdf", "tsdf/min", "tsdf/guarded", "tsdf/static", "tsdf++", "tsdf++/literal", "tsdf++/anchored",
-// "volumes".
-std::string_view MethodName(Method method);
-std::vector<Method> AllMethods();
-// Errors: kUsage, naming the methods there are. "anchored" and "literal" are understood as well.
-Expected<Method> MethodFromName(std::string_view name);
 
 // Observations farther from the surface colour nothing, or only what has no colour yet: no mesh
 // reads it there (docs/map.md).

@@ -13,6 +13,7 @@
 #include "eval/run/compare_names.h"
 #include "eval/run/run_folder.h"
 #include "eval/tools/base64.h"
+#include "mapper/method_info.h"
 #include "sequence/sequence_json.h"
 #include "viewer/report_template.h"
 
@@ -161,7 +162,12 @@ std::string DataText(const std::vector<Comparison>& comparisons, const json& gat
     }
     reports.push_back(std::move(report));
   }
+  json colours = json::object();
+  for (const MethodInfo& info : Methods()) {
+    colours[std::string(info.name)] = {info.on_light, info.on_dark};
+  }
   const json data{{"schema", 1},
+                  {"colours", std::move(colours)},
                   {"version", TSDFPP_VERSION},
                   {"command", command},
                   {"gates", gates},

@@ -275,9 +275,7 @@ std::string MapKey(const CellSettings& settings) {
     return fmt::format("open3d voxel_m {} truncation_voxels {}{}", config.map.voxel_m,
                        config.map.trunc_front_voxels, sabotage);
   }
-  const bool moves_values = config.method != Method::kTsdfppAnchored &&
-                            config.method != Method::kVolumes &&
-                            config.method != Method::kTsdfStatic;
+  const bool moves_values = InfoOf(config.method).moves_values;
   return fmt::format(
       "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}", MethodName(config.method),
       config.map.voxel_m, config.map.trunc_front_voxels, config.map.trunc_back_voxels,

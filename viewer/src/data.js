@@ -108,6 +108,7 @@ export function loadData() {
   const runs = reports.flatMap((report, r) => report.summary.runs.map((run) => ({
     ...run,
     report: r,
+    colours: data.colours[run.method],
     key: `${r}/${run.folder}`,
     label: nameOf(run, several, report.letter),
     rows: rowsOf(report, run),

@@ -93,20 +93,9 @@ export function shortLabel(run, all) {
   return parts.filter((part, i) => i === 0 || others.some((other) => other[i] !== part)).join(', ');
 }
 
-// A colour a method, of Okabe and Ito's; a dash a truncation profile.
-const kMethodColours = {
-  tsdf: ['#c04a00', '#ff8a4c'],
-  'tsdf/min': ['#8a6100', '#e6b422'],
-  'tsdf/guarded': ['#8f1d1d', '#ff6b6b'],
-  'tsdf/static': ['#6b4a2f', '#c9a27e'],
-  'tsdf++': ['#0064a8', '#62b5ee'],
-  'tsdf++/literal': ['#9a3f78', '#e29ac6'],
-  'tsdf++/anchored': ['#00795a', '#2fcfa0'],
-  volumes: ['#5a5a5a', '#b4b4b4'],
-};
-
+// The method's colour, as mapper/method_info.cc has it; a dash a truncation profile.
 export function colourOfRun(run, dark) {
-  return (kMethodColours[run.method] ?? ['#444444', '#cccccc'])[dark ? 1 : 0];
+  return (run.colours ?? ['#444444', '#cccccc'])[dark ? 1 : 0];
 }
 
 export function dashOfRun(run, runs) {

@@ -1,0 +1,69 @@
+#include "mapper/method_info.h"
+
+#include <array>
+#include <cstdlib>
+
+#include "mapper/map_config.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::array<MethodInfo, 8> kMethods{
+    {{Method::kTsdf, "tsdf", "one field, in which an object's voxels move with it", "#c04a00",
+      "#ff8a4c", true, true, 1, false},
+     {Method::kTsdfMin, "tsdf/min", "one field, in which the nearer surface stays", "#8a6100",
+      "#e6b422", true, true, 1, false},
+     {Method::kTsdfGuarded, "tsdf/guarded",
+      "one field, in which a voxel at a surface takes nothing from behind another's", "#8f1d1d",
+      "#ff6b6b", true, true, 1, false},
+     {Method::kTsdfStatic, "tsdf/static", "one field, in which nothing moves", "#6b4a2f", "#c9a27e",
+      true, false, 1, false},
+     {Method::kTsdfpp, "tsdf++", "layers, in a careful reading of the paper", "#0064a8", "#62b5ee",
+      false, true, 2, true},
+     {Method::kTsdfppLiteral, "tsdf++/literal", "layers, with the paper's sentences at their word",
+      "#9a3f78", "#e29ac6", false, true, 2, false},
+     {Method::kTsdfppAnchored, "tsdf++/anchored",
+      "layers over volumes that stay in their objects' own frames", "#00795a", "#2fcfa0", false,
+      false, 4, true},
+     {Method::kVolumes, "volumes", "a volume for each object in its own frame, and no index",
+      "#5a5a5a", "#b4b4b4", false, false, kMaxLayers, false}}};
+
+}  // namespace
+
+std::span<const MethodInfo> Methods() { return kMethods; }
+
+const MethodInfo& InfoOf(Method method) {
+  for (const MethodInfo& info : kMethods) {
+    if (info.method == method) return info;
+  }
+  std::abort();
+}
+
+std::vector<Method> AllMethods() {
+  std::vector<Method> methods;
+  for (const MethodInfo& info : kMethods) methods.push_back(info.method);
+  return methods;
+}
+
+std::string_view MethodName(Method method) { return InfoOf(method).name; }
+
+bool IsOneField(Method method) { return InfoOf(method).one_field; }
+
+Expected<Method> MethodFromName(std::string_view name) {
+  for (const MethodInfo& info : kMethods) {
+    if (info.name == name || (!name.empty() && info.name == fmt::format("tsdf++/{}", name))) {
+      return info.method;
+    }
+  }
+  return UsageError("method '{}' is unknown, expected one of {}", name, MethodNames());
+}
+
+std::string MethodNames() {
+  std::string names;
+  for (const MethodInfo& info : kMethods) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", info.name);
+  }
+  return names;
+}
+
+}  // namespace tsdfpp
