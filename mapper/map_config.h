@@ -53,8 +53,6 @@ std::string_view ResamplingName(Resampling resampling);
 Expected<Resampling> ResamplingFromName(std::string_view name);
 
 inline constexpr double kSmallestVoxel_m = 0.0005;
-// Objects that a voxel can list.
-inline constexpr int kMaxLayers = 8;
 
 inline constexpr double kLargestVoxel_m = 1;
 

@@ -3,8 +3,6 @@
 #include <array>
 #include <cstdlib>
 
-#include "mapper/map_config.h"
-
 namespace tsdfpp {
 namespace {
 

@@ -11,6 +11,9 @@
 
 namespace tsdfpp {
 
+// Objects that a voxel can list.
+inline constexpr int kMaxLayers = 8;
+
 enum class Method {
   kTsdf,
   kTsdfMin,
