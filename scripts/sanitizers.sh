@@ -3,7 +3,7 @@
 # Usage: bash scripts/sanitizers.sh [asan|tsan] [pattern of tests for ctest -R; all by default]
 #   asan (the default) is ASan and UBSan in build/asan, tsan is TSan in build/tsan.
 # In the environment: ROOMS="core;mapper;tests" builds those rooms only (CMakeLists.txt).
-# SHORT=1 is what .ci/run has the time for, in build/asan-short and build/tsan-short: the mapper's tests without what is
+# SHORT=1 is quick (.ci/run has time for its asan), in build/asan-short and build/tsan-short: the mapper's tests without what is
 # slow to build (tests/sanitizers/CMakeLists.txt) or to run (below), in two processes; five random sequences of events in
 # place of sixty; and without UBSan's checks of every access through a pointer (null, alignment, type, size), which take
 # half of its build and of which ASan notices the first by itself. Under ASan also the inputs that are kept of fuzzing the
