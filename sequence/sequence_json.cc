@@ -126,7 +126,7 @@ SequenceRecord FromJson(const nlohmann::json& json, int version) {
 constexpr double kSlowest_hz = 1e-6;
 constexpr double kFastest_hz = 1e9;
 
-// What is to be removed is there, moves, and is named once.
+// What is to be removed is an object of the sequence, not its background, and is named once.
 Expected<void> CheckReveal(const SequenceInfo& info, const std::string& file) {
   if (!info.reveal) return {};
   std::set<InstanceId> removed;

@@ -87,7 +87,7 @@ class Hostile : public testing::Test {
 
 TEST_F(Hostile, NamesDoNotLeadOutOfTheOutput) {
   ASSERT_EQ(Map(folder_ / "set").exit_code, 0);
-  for (const char* name : {"../../../pwned", "/tmp/pwned", "..", "a\\nb", "\\u0001", ""}) {
+  for (const char* name : {"../../../pwned", "/pwned", "..", "a\\nb", "\\u0001", ""}) {
     SetUp();
     const std::string json = ReadFile(folder_ / "set/sequence.json").value();
     const std::size_t at = json.find("\"name\": \"") + 9;

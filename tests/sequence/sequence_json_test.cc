@@ -133,7 +133,7 @@ TEST(SequenceJson, ListedFilesAreInside) {
 // Names become file names of what map and compare write.
 TEST(SequenceJson, NamesThatEscapeAreRefused) {
   for (const auto& [name, fault] : {std::pair("../../../pwned", "holds a slash"),
-                                    {"/tmp/pwned", "holds a slash"},
+                                    {"/pwned", "holds a slash"},
                                     {"..", "begins with a dot or a dash"},
                                     {"", "is empty"},
                                     {"a\\nb", "holds a control character"},
