@@ -21,7 +21,8 @@ struct NearestSurface {
 };
 
 // An immutable index of one mesh. Distances are point to triangle (facts/metrics.md), single
-// precision. Of several triangles at equal distance the index names one of them. Results do not
+// precision. Of several triangles at equal distance the index names one of them, of equal ones the
+// first. Results do not
 // depend on the number of threads.
 class SurfaceIndex {
  public:
