@@ -251,10 +251,12 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "visible, 2 adds what is behind it")
       ->check(WholeBetween(0, kMaxLayers));
   app.add_option(
-      "--load", options->load,
-      "Begin with the map in this file: with a sequence, go on after the map's last frame; "
-      "without, write its meshes");
-  app.add_option("--save", options->save, "Write the whole map, after the removals, to this file");
+         "--load", options->load,
+         "Begin with the map in this file: with a sequence, go on after the map's last frame; "
+         "without, write its meshes")
+      ->check(NotEmpty("a file"));
+  app.add_option("--save", options->save, "Write the whole map, after the removals, to this file")
+      ->check(NotEmpty("a file"));
   app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
   return [options, &app] { return RunMap(*options, app); };
 }

@@ -9,6 +9,7 @@
 #include "cli/metric.h"
 #include "core/data_folder.h"
 #include "core/json_text.h"
+#include "core/one_line.h"
 #include "eval/score/evaluation.h"
 #include "eval/score/label_image.h"
 #include "metrics/segmentation.h"
@@ -85,7 +86,8 @@ Expected<Annotations> ReadAnnotations(const fs::path& path) {
       }
     }
   } catch (const std::exception& error) {
-    return DataError("{}: is no panoptic JSON as COCO's: {}", path.string(), error.what());
+    return DataError("{}: is no panoptic JSON as COCO's: {}", path.string(),
+                     WithoutTag(error.what()));
   }
   if (out.by_file.empty()) return DataError("{}: has no annotations", path.string());
   return out;

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <numbers>
 #include <optional>
 
@@ -53,7 +55,9 @@ Expected<Intrinsics> CameraFromText(const std::string& text) {
     const auto [end, status] = std::from_chars(word.data(), word.data() + word.size(), number);
     if (status == std::errc() && end == word.data() + word.size()) numbers.push_back(number);
   }
-  if (numbers.size() != 4 || SplitList(text).size() != 4 || !(numbers[0] > 0 && numbers[1] > 0)) {
+  const auto finite = [](double number) { return std::isfinite(number); };
+  if (numbers.size() != 4 || SplitList(text).size() != 4 || !(numbers[0] > 0 && numbers[1] > 0) ||
+      !std::all_of(numbers.begin(), numbers.end(), finite)) {
     return UsageError("--camera '{}': expected fx,fy,cx,cy in pixels", text);
   }
   return Intrinsics{0, 0, numbers[0], numbers[1], numbers[2], numbers[3]};

@@ -23,7 +23,13 @@ Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, 
                               const HeaderCheck& check, const fs::path& path) {
   TSDFPP_ASSIGN(const ImageHeader header, ReadImageHeader(bytes, where));
   if (check) TSDFPP_RETURN_IF_ERROR(check(header, bytes));
-  const int flags = as == DecodeAs::kColour ? cv::IMREAD_COLOR : cv::IMREAD_UNCHANGED;
+  // Turned, it would lie beside other images of its frame and the camera's numbers.
+  if (header.orientation != 1) {
+    return DataError("{}: is to be turned or mirrored, orientation {}, expected 1", where,
+                     header.orientation);
+  }
+  const int flags = as == DecodeAs::kColour ? cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION
+                                            : cv::IMREAD_UNCHANGED;
   const bool is_exr = header.format == ImageFormat::kExr;
   cv::Mat image;
   // What OpenCV counts the bytes with.

@@ -153,6 +153,8 @@ std::optional<ImageHeader> TiffHeader(std::string_view file) {
       header.bits = static_cast<int>(number(value_at, size) & 0xFFFFU);
     } else if (tag == 277) {
       header.channels = static_cast<int>(number(value_at, size) & 0xFFFFU);
+    } else if (tag == 274) {
+      header.orientation = static_cast<int>(number(value_at, size) & 0xFFFFU);
     }
   }
   return bytes.ok() ? std::optional(header) : std::nullopt;

@@ -16,6 +16,9 @@ struct ImageHeader {
   std::int64_t height = 0;
   int channels = 0;  // as stored: a palette's is 3
   int bits = 0;      // of a channel
+  // How TIFF's tag 274 says that it is to be turned or mirrored: 1 as it is stored, 2 to 8
+  // otherwise.
+  int orientation = 1;
 };
 
 // By the bytes, not by the file's name. `where` begins the sentence. Errors: kData where the format

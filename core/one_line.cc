@@ -105,6 +105,12 @@ std::string OneLine(std::string_view text, std::size_t most) {
   return line.substr(0, head) + std::string(kGap) + line.substr(tail);
 }
 
+std::string_view WithoutTag(std::string_view words) {
+  const std::size_t end = words.find("] ");
+  return words.starts_with("[json.") && end != std::string_view::npos ? words.substr(end + 2)
+                                                                      : words;
+}
+
 std::string Quoted(std::string_view text) {
   constexpr std::size_t kMostShown = 100;
   return "'" + OneLine(text, kMostShown) + "'";

@@ -28,6 +28,9 @@ bool IsShowable(std::string_view text);
 // characters stay whole. Text that is fine is returned as it is.
 std::string OneLine(std::string_view text, std::size_t most = kMostMessageBytes);
 
+// What nlohmann's exceptions say, without the name that they begin with: "[json.exception...] ".
+std::string_view WithoutTag(std::string_view words);
+
 // A name or value found in a file, in single quotes, at most 100 bytes of it.
 std::string Quoted(std::string_view text);
 

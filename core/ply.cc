@@ -281,7 +281,10 @@ bool ReadFace(const Element& element, Body& body, Parsed& parsed) {
     for (std::uint32_t i = 0; i < count && body.Ok(); ++i) {
       if (property.name == "vertex_indices" || property.name == "vertex_index") {
         const double value = body.Read(property.type);
-        if (!(value >= 0 && value < static_cast<double>(parsed.mesh.vertices.size()))) return false;
+        const bool whole = value == std::floor(value);
+        if (!(whole && value >= 0 && value < static_cast<double>(parsed.mesh.vertices.size()))) {
+          return false;
+        }
         polygon.push_back(static_cast<std::uint32_t>(value));
       } else if (property.name == "object_id") {
         id = static_cast<InstanceId>(body.ReadWhole(property.type, kMostOfAnId));

@@ -56,7 +56,8 @@ void PointIndex::Search(std::size_t begin, std::size_t end, const Eigen::Vector3
   const double beyond = query[axis] - static_cast<double>(points_[middle][axis]);
   const bool upper_first = beyond > 0;
   Search(upper_first ? middle + 1 : begin, upper_first ? end : middle, query, except, least2);
-  if (beyond * beyond > least2) return;
+  // Also where both are 0: among many equal points one is enough.
+  if (beyond * beyond >= least2) return;
   Search(upper_first ? begin : middle + 1, upper_first ? middle : end, query, except, least2);
 }
 

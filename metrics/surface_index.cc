@@ -6,7 +6,10 @@
 #include <open3d/t/geometry/RaycastingScene.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstring>
+#include <utility>
 
 #include "metrics/mesh_tools.h"
 
@@ -30,6 +33,49 @@ bool IsSliver(const TriangleMesh& mesh, std::size_t triangle, float shortest_m) 
     if (edge.norm() < shortest_m) return true;
   }
   return false;
+}
+
+using Corners = std::array<Eigen::Vector3f, 3>;
+
+bool IsBefore(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+  return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+}
+
+// The corners, the least one first, so that a triangle has one name whichever it begins with. One
+// that faces the other way has another.
+Corners NamedCorners(const TriangleMesh& mesh, std::size_t triangle) {
+  Corners corners{Corner(mesh, triangle, 0), Corner(mesh, triangle, 1), Corner(mesh, triangle, 2)};
+  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end(), IsBefore),
+              corners.end());
+  return corners;
+}
+
+std::uint64_t HashOf(const Corners& corners) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const Eigen::Vector3f& corner : corners) {
+    for (const float value : corner) {
+      // -0 equals 0.
+      hash = (hash ^ std::bit_cast<std::uint32_t>(value + 0.0F)) * 0x100000001b3U;
+      hash ^= hash >> 29U;
+    }
+  }
+  return hash;
+}
+
+// Of triangles that are equal, all but the first: a tree cannot part them, and queries then take
+// time with their number.
+std::vector<bool> FindRepeated(const TriangleMesh& mesh) {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted(mesh.triangles.size());
+  for (std::uint32_t t = 0; t < sorted.size(); ++t) sorted[t] = {HashOf(NamedCorners(mesh, t)), t};
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<bool> repeated(sorted.size());
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    // Others of the same hash would be between two equal ones by chance alone, and cost a repeat.
+    repeated[sorted[i].second] =
+        sorted[i].first == sorted[i - 1].first &&
+        NamedCorners(mesh, sorted[i].second) == NamedCorners(mesh, sorted[i - 1].second);
+  }
+  return repeated;
 }
 
 }  // namespace
@@ -57,8 +103,9 @@ SurfaceIndex::SurfaceIndex(TriangleMesh mesh, double farthest_query_m) : mesh_(s
   std::vector<std::array<std::uint32_t, 3>> kept;
   const auto shortest_m =
       static_cast<float>(std::max(kShortestEdge_m, kShortestEdge * farthest_query_m));
+  const std::vector<bool> repeated = FindRepeated(mesh_);
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-    if (IsSliver(mesh_, t, shortest_m)) continue;
+    if (repeated[t] || IsSliver(mesh_, t, shortest_m)) continue;
     kept.push_back(mesh_.triangles[t]);
     impl->indexed.push_back(static_cast<std::uint32_t>(t));
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/data_folder.h"
 #include "core/folders.h"
 #include "core/json_text.h"
 #include "core/plain_name.h"
@@ -78,6 +79,9 @@ class BopOpener {
   }
 
   Expected<std::unique_ptr<DatasetSource>> Open() {
+    // Where a scene alone is named, its models lie beside it in the dataset.
+    TSDFPP_ASSIGN(const fs::path models, DataFolder(dataset_).Find("models"));
+    if (Exists(models)) TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(models));
     TSDFPP_RETURN_IF_ERROR(ReadCameras());
     if (Exists(scene_ / bop::kTruth)) {
       TSDFPP_RETURN_IF_ERROR(ReadTruth());

@@ -1,8 +1,10 @@
 #include "sequence/sequence_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 
 #include "core/data_folder.h"
@@ -120,6 +122,25 @@ SequenceRecord FromJson(const nlohmann::json& json, int version) {
   return record;
 }
 
+// Times of frames stay numbers that other formats can hold.
+constexpr double kSlowest_hz = 1e-6;
+constexpr double kFastest_hz = 1e9;
+
+// What is to be removed is an object of the sequence, not its background, and is named once.
+Expected<void> CheckReveal(const SequenceInfo& info, const std::string& file) {
+  if (!info.reveal) return {};
+  std::set<InstanceId> removed;
+  for (const InstanceId id : info.reveal->removed) {
+    const bool known = std::any_of(info.objects.begin(), info.objects.end(),
+                                   [&](const ObjectInfo& object) { return object.id == id; });
+    if (id == kBackground || !known || !removed.insert(id).second) {
+      return DataError(
+          "{}: 'reveal' removes object {}, expected objects of the sequence, each once", file, id);
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::uint64_t Fnv1a64(std::string_view bytes) {
@@ -183,9 +204,11 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
   }
   try {
     SequenceRecord record = FromJson(json, version.get<int>());
-    if (!(record.info.rate_hz > 0) || record.info.frame_count < 1 || record.info.first_index < 0) {
-      return DataError("{}: expected rate_hz and frame_count over 0 and first_index 0 or more",
-                       file);
+    if (record.info.frame_count < 1 || record.info.first_index < 0 ||
+        !(record.info.rate_hz >= kSlowest_hz && record.info.rate_hz <= kFastest_hz)) {
+      return DataError(
+          "{}: expected a rate_hz of {:g} to {:g}, frame_count over 0 and first_index 0 or more",
+          file, kSlowest_hz, kFastest_hz);
     }
     const Intrinsics& camera = record.info.intrinsics;
     if (!(camera.fx > 0) || !(camera.fy > 0) || !std::isfinite(camera.fx) ||
@@ -196,6 +219,7 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
     }
     TSDFPP_RETURN_IF_ERROR(CheckLabel(record.info.name, file + ": 'scene'"));
     TSDFPP_RETURN_IF_ERROR(CheckObjects(record.info.objects, file));
+    TSDFPP_RETURN_IF_ERROR(CheckReveal(record.info, file));
     for (const auto& [listed, hash] : record.hashes) {
       TSDFPP_RETURN_IF_ERROR(CheckRelativePath(listed, file + ": 'fnv1a64'"));
     }

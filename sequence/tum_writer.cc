@@ -1,3 +1,4 @@
+#include <cmath>
 #include <map>
 
 #include "core/files.h"
@@ -19,6 +20,9 @@ class TumWriter : public DatasetWriter {
   Expected<void> Add(const Frame& frame) override {
     const std::string stamp = fmt::format("{:.6f}", frame.time_s);
     const std::string name = fmt::format("frame {}", frame.index);
+    if (!std::isfinite(frame.time_s)) {
+      return DataError("{}: its time is {} s, expected a finite one", name, frame.time_s);
+    }
     // Files are called by their times.
     const auto [other, is_new] = frame_at_.try_emplace(stamp, frame.index);
     if (!is_new) {

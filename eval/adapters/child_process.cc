@@ -103,28 +103,27 @@ struct Attendance {
 
 // A program that stops its supervisor would never meet its limits: it goes on, and where it comes
 // to no report even so, it is ended.
-void KeepAwake(pid_t supervisor, Clock::time_point last) {
+void KeepAwake(pid_t supervisor, bool is_late) {
   siginfo_t state{};
   if (waitid(P_PID, static_cast<id_t>(supervisor), &state, WSTOPPED | WNOHANG) == 0 &&
       state.si_pid == supervisor) {
     kill(supervisor, SIGCONT);
   }
-  if (Clock::now() > last) kill(supervisor, SIGKILL);
+  if (is_late) kill(supervisor, SIGKILL);
 }
 
 // Takes the program's words into the log and looks at its disk until the supervisor reports.
 Attendance Attend(pid_t supervisor, const PipeEnds& said, const PipeEnds& reported,
                   OpenEnd& control, const fs::path& folder, const ChildLimits& limits,
                   const ControlGroup* group, CappedLog& log) {
-  constexpr std::chrono::duration<double> kToReport{30};
+  constexpr double kToReport_s = 30;  // to end all that was started, on a busy machine
   constexpr int kWait_ms = 100;
   constexpr std::chrono::seconds kDiskLook{1};
   constexpr int kReads = 16;
   Attendance attendance;
   bool said_all = false;
   auto next_look = Clock::now() + kDiskLook;
-  const auto last = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                       std::chrono::duration<double>(limits.time_s) + kToReport);
+  const auto begin = Clock::now();
   while (true) {
     std::array<pollfd, 2> ends{pollfd{reported.out.get(), POLLIN, 0},
                                pollfd{said_all ? -1 : said.out.get(), POLLIN, 0}};
@@ -139,7 +138,9 @@ Attendance Attend(pid_t supervisor, const PipeEnds& said, const PipeEnds& report
       if (!said_all) Drain(said.out.get(), log, kReads);
       return attendance;
     }
-    KeepAwake(supervisor, last);
+    // In doubles: a limit may be more than the clock can count.
+    const std::chrono::duration<double> passed = Clock::now() - begin;
+    KeepAwake(supervisor, passed.count() > limits.time_s + kToReport_s);
     if (control.get() < 0 || Clock::now() < next_look) continue;
     const std::int64_t disk = DiskBytes(folder);
     next_look = Clock::now() + kDiskLook;

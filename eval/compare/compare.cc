@@ -10,6 +10,7 @@
 
 #include "core/files.h"
 #include "core/guard.h"
+#include "core/one_line.h"
 #include "eval/compare/compare_report.h"
 #include "eval/compare/pictures.h"
 #include "eval/compare/report_record.h"
@@ -62,6 +63,28 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   return runs;
 }
 
+std::set<std::filesystem::path> EntriesOf(const std::filesystem::path& folder) {
+  std::set<std::filesystem::path> entries;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator each(folder, failure), end; !failure && each != end;
+       each.increment(failure)) {
+    entries.insert(each->path());
+  }
+  return entries;
+}
+
+// What an adapter left beside its own folder would become files of the run, or stand in their way.
+void RemoveStrays(AdapterRun& run, const std::filesystem::path& out,
+                  const std::set<std::filesystem::path>& others) {
+  for (const std::filesystem::path& entry : EntriesOf(out)) {
+    if (others.contains(entry)) continue;
+    std::error_code ignored;
+    std::filesystem::remove_all(entry, ignored);
+    run.remarks.push_back(fmt::format("{}: left {} beside its own folder, which is removed",
+                                      run.config.name, Quoted(entry.filename().string())));
+  }
+}
+
 // Runs the adapters, one after the other, on the frames as they are given to a mapper.
 Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const RunFolder& folder,
                            CompareResult& result) {
@@ -81,8 +104,11 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const 
     AdapterTask task = given;
     task.sequence = sequence;
     AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
+    std::set<std::filesystem::path> others = EntriesOf(out);
+    others.insert(out / adapter.name);
     done = RunAdapter(run, task, out / adapter.name, folder.out() / adapter.name);
     if (!done) break;
+    RemoveStrays(run, out, others);
   }
   for (const auto& [layout, sequence] : sequences) {
     std::error_code ignored;

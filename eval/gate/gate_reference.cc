@@ -4,6 +4,7 @@
 
 #include "core/files.h"
 #include "core/json_text.h"
+#include "core/one_line.h"
 
 namespace tsdfpp {
 namespace {
@@ -89,7 +90,8 @@ Expected<References> LoadReferences(const std::filesystem::path& file) {
     }
     return references;
   } catch (const std::exception& error) {
-    return DataError("{}: a field is missing or wrong ({})", file.string(), error.what());
+    return DataError("{}: a field is missing or wrong ({})", file.string(),
+                     WithoutTag(error.what()));
   }
 }
 

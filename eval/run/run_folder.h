@@ -51,7 +51,8 @@ class RunFolder {
   Expected<void> CheckPlaces(std::set<std::string> files) const;
 
   // Moves everything to its place. Of the files named in `rewritten` the size is not kept. Errors:
-  // kUsage where a folder of somebody else's stands in a file's place, or a file in a folder's,
+  // kUsage where a folder of somebody else's stands in a file's place, or a file or link in a
+  // folder's,
   // kData where a name cannot be printed: then all is as before; kEnvironment where the disk
   // refuses: the folder may then be without run.json, and the same command puts it in order.
   Expected<void> Commit(const std::set<std::string>& rewritten = {});

@@ -266,7 +266,7 @@ Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file)
       }
     }
   } catch (const json::exception& error) {
-    return DataError("{}: a field is missing or wrong ({})", where, error.what());
+    return DataError("{}: a field is missing or wrong ({})", where, WithoutTag(error.what()));
   }
   for (const BenchSequence& sequence : set.sequences) {
     const auto scores = result.scores.find(sequence.name);

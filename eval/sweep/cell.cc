@@ -5,6 +5,7 @@
 
 #include "core/files.h"
 #include "core/json_text.h"
+#include "core/one_line.h"
 #include "core/pose_text.h"
 #include "sequence/sequence_json.h"
 
@@ -133,7 +134,8 @@ Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
     }
     return result;
   } catch (const std::exception& error) {
-    return DataError("cell {}: a field is missing or wrong ({})", cell.id, error.what());
+    return DataError("cell {}: a field is missing or wrong ({})", cell.id,
+                     WithoutTag(error.what()));
   }
 }
 

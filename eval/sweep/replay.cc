@@ -9,6 +9,7 @@
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/json_text.h"
+#include "core/one_line.h"
 #include "core/plain_name.h"
 #include "core/ply.h"
 #include "eval/picture/map_slice.h"
@@ -130,7 +131,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     ReadCell(noted, recorded);
     return recorded;
   } catch (const std::exception& error) {
-    return DataError("{}: a field is missing or wrong ({})", where, error.what());
+    return DataError("{}: a field is missing or wrong ({})", where, WithoutTag(error.what()));
   }
 }
 

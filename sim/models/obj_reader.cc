@@ -71,8 +71,8 @@ class ObjReader {
   std::filesystem::path path_;
   std::string file_;
   Materials wanted_;
-  DataFolder above_;                 // of the mesh's folder
-  std::set<std::string> libraries_;  // read
+  DataFolder above_;                           // of the mesh's folder
+  std::set<std::filesystem::path> libraries_;  // read, or found to be unreadable
   int line_ = 0;
   RawMesh mesh_;
   std::vector<std::optional<Eigen::Vector3d>> colours_;  // as written, per vertex
@@ -80,7 +80,7 @@ class ObjReader {
   std::map<std::string, int> materials_;
   std::size_t not_faces_ = 0;
   std::size_t concave_work_ = 0;
-  std::size_t library_bytes_ = 0;
+  std::int64_t library_bytes_ = 0;
 };
 
 Expected<double> ObjReader::ReadNumber(std::string_view word) {
@@ -248,7 +248,7 @@ Companion ObjReader::Find(const std::filesystem::path& from, const std::string& 
 }
 
 void ObjReader::ReadLibrary(const std::string& name) {
-  if (wanted_ == Materials::kSkip || !libraries_.insert(name).second) return;
+  if (wanted_ == Materials::kSkip) return;
   std::string plain = name;
   std::replace(plain.begin(), plain.end(), '\\', '/');
   const Companion library = Find(kMeshFolder, plain);
@@ -256,7 +256,7 @@ void ObjReader::ReadLibrary(const std::string& name) {
   // One library has many names: "a.mtl", "./a.mtl".
   std::error_code code;
   const std::filesystem::path place = std::filesystem::weakly_canonical(path, code);
-  if (!code && !libraries_.insert("file " + place.string()).second) return;
+  if (!libraries_.insert(code ? path : place).second) return;
   const std::filesystem::path from =
       (std::filesystem::path(kMeshFolder) / plain).lexically_normal().parent_path();
   mesh_.companions.push_back(library);
@@ -271,8 +271,8 @@ void ObjReader::ReadLibrary(const std::string& name) {
                     file_, bytes.error().message));
     return;
   }
-  library_bytes_ += bytes->size();
-  if (!CheckLimit(&Limits::text_bytes, static_cast<std::int64_t>(library_bytes_), file_, "")) {
+  library_bytes_ += static_cast<std::int64_t>(bytes->size());
+  if (library_bytes_ > CurrentLimits().text_bytes) {
     mesh_.remarks.push_back(
         fmt::format("{}: is left out, its material libraries are larger together than one may be",
                     path.string()));

@@ -87,7 +87,7 @@ class Hostile : public testing::Test {
 
 TEST_F(Hostile, NamesDoNotLeadOutOfTheOutput) {
   ASSERT_EQ(Map(folder_ / "set").exit_code, 0);
-  for (const char* name : {"../../../pwned", "/tmp/pwned", "..", "a\\nb", "\\u0001", ""}) {
+  for (const char* name : {"../../../pwned", "/pwned", "..", "a\\nb", "\\u0001", ""}) {
     SetUp();
     const std::string json = ReadFile(folder_ / "set/sequence.json").value();
     const std::size_t at = json.find("\"name\": \"") + 9;
@@ -165,6 +165,38 @@ TEST_F(Hostile, LimitsAreSetByTheEnvironment) {
 }
 
 // A path may hold any byte; what is printed of it is text all the same.
+TEST_F(Hostile, WhatIsToBeRemovedIsThere) {
+  for (const char* removed : {"[0]", "[9]", "[1, 1]"}) {
+    SetUp();
+    std::string text = ReadFile(folder_ / "set/sequence.json").value();
+    nlohmann::json edited = nlohmann::json::parse(text);
+    edited["reveal"] = {{"frame", 1}, {"removed", nlohmann::json::parse(removed)}};
+    ASSERT_TRUE(WriteFile(folder_ / "set/sequence.json", edited.dump()).has_value());
+    ExpectSentence(Map(folder_ / "set"), kData, "expected objects of the sequence, each once");
+  }
+  SetUp();
+  nlohmann::json slow = nlohmann::json::parse(ReadFile(folder_ / "set/sequence.json").value());
+  slow["rate_hz"] = 5e-324;
+  ASSERT_TRUE(WriteFile(folder_ / "set/sequence.json", slow.dump()).has_value());
+  ExpectSentence(Map(folder_ / "set"), kData, "expected a rate_hz of 1e-06 to 1e+09");
+}
+
+// A scene of a dataset that is named alone: the models lie beside it.
+TEST_F(Hostile, LinksToModelsOfADataset) {
+  test::BoxSource source(3);
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kBop, folder_ / "set/bop").has_value());
+  const fs::path scene = folder_ / "set/bop/test/000000";
+  const CommandOutput sound = Map(scene);
+  EXPECT_EQ(sound.exit_code, 0) << sound.err;
+  for (const auto& entry : fs::directory_iterator(folder_ / "set/bop/models")) {
+    if (entry.path().extension() != ".ply") continue;
+    fs::remove(entry.path());
+    fs::create_symlink("/etc/hostname", entry.path());
+    break;
+  }
+  ExpectSentence(Map(scene), kData, "leads by a link to '");
+}
+
 TEST_F(Hostile, PathsThatAreNoText) {
   const std::string odd = "b\xff\nc\x1b[31m";
   fs::rename(folder_ / "set", folder_ / odd);

@@ -78,6 +78,34 @@ TEST(ImageHeader, IsThatOfWhatOpenCvWrites) {
   }
 }
 
+// As a camera on its side would write it. OpenCV turns such a TIFF whatever it is told.
+TEST(ImageHeader, TurnedImagesAreRefused) {
+  std::string bytes = Encoded(".tiff", cv::Mat(37, 53, CV_8UC3, cv::Scalar(1, 2, 3)));
+  ASSERT_EQ(bytes.substr(0, 2), "II");
+  const auto number = [&](std::size_t at, std::size_t size) {
+    std::size_t value = 0;
+    for (std::size_t i = size; i-- > 0;)
+      value = value << 8U | static_cast<unsigned char>(bytes[at + i]);
+    return value;
+  };
+  // The tag of planes (284: stored in one, as without it) becomes that of the orientation.
+  const std::size_t directory = number(4, 4);
+  bool found = false;
+  for (std::size_t i = 0; i < number(directory, 2); ++i) {
+    const std::size_t at = directory + 2 + 12 * i;
+    if (number(at, 2) != 274 && (number(at, 2) != 284 || found)) continue;
+    found = true;
+    bytes[at] = 0x12;
+    bytes[at + 1] = 0x01;
+    bytes[at + 8] = 6;
+  }
+  ASSERT_TRUE(found);
+  const auto refused = DecodeImage(bytes, "x.tiff", DecodeAs::kColour);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().message,
+            "x.tiff: is to be turned or mirrored, orientation 6, expected 1");
+}
+
 TEST(ImageHeader, ExrIsReadFromItsFile) {
   setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
   const TempFolder folder;

@@ -155,6 +155,9 @@ TEST(Ply, MalformedFilesAreNamed) {
        "PLY property line 'property half w' cannot be read"},
       {vertices + "property list half int w\nend_header\n",
        "PLY property line 'property list half int w' cannot be read"},
+      {vertices + "element face 1\nproperty list uchar float vertex_indices\nend_header\n" +
+           points + "3 0 1.5 2\n",
+       bad_face},
       // Elements that take no bytes would be counted for ever.
       {"ply\nformat ascii 1.0\nelement junk 20\nend_header\n",
        "20 elements 'junk' have no property, expected one at least"},

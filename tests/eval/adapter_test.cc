@@ -279,6 +279,27 @@ TEST_F(AdapterCompare, ALayoutMayBeChosenAndOldFilesDoNotCount) {
   EXPECT_TRUE(result->adapters[0]->failure.has_value());
 }
 
+// They would stand in the way of the run's own files, or pass for some.
+TEST_F(AdapterCompare, WhatIsLeftBesideItsFolderIsRemovedAndSaid) {
+  BoxSource source(7);
+  CompareConfig config;
+  config.methods = {};
+  config.every = 4;
+  config.until = "3";
+  config.adapters = {Script(
+      "stray", std::string(kCopy) + "; mkdir ../summary.json; touch ../summary.json/x ../mine")};
+  const auto result = RunCompare(source, config, folder_ / "out", "the command", {});
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "out/summary.json"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/mine"));
+  const auto& remarks = result->adapters[0]->remarks;
+  for (const char* name : {"'summary.json'", "'mine'"}) {
+    EXPECT_TRUE(std::any_of(remarks.begin(), remarks.end(), [&](const std::string& remark) {
+      return remark.find(name) != std::string::npos;
+    })) << name;
+  }
+}
+
 nlohmann::json CompareMini(const TempFolder& folder, const std::string& methods) {
   const auto command = test::RunTsdfpp(
       {"compare", TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out", folder / "out", "--methods",

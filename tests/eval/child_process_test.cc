@@ -128,6 +128,12 @@ TEST(ChildProcess, WhoStopsHisWatcherMeetsHisLimit) {
       << outcome.failure->message;
 }
 
+TEST(ChildProcess, ALimitMayBeFarAway) {
+  const TempFolder folder;
+  const ChildOutcome outcome = Shell(folder, "sleep 1", RoomyLimits(1e300));
+  EXPECT_FALSE(outcome.failure.has_value()) << outcome.failure->message;
+}
+
 TEST(ChildProcess, WhatEatsMemoryIsEnded) {
   const TempFolder folder;
   ChildLimits small = RoomyLimits();

@@ -296,6 +296,14 @@ TEST(SurfaceFloor, RoundingIsHalfAnUlp) {
   EXPECT_DOUBLE_EQ(RoundingFloor_m(mesh), 1024 * std::pow(2.0, -24));
 }
 
+// Each of them once would take minutes.
+TEST(PointIndex, ManyEqualPointsAreOne) {
+  const std::vector<Eigen::Vector3f> points(300'000, Eigen::Vector3f(1, 2, 3));
+  const PointIndex index(points);
+  for (const double distance : index.Distances_m(points)) ASSERT_EQ(distance, 0);
+  for (const double spacing : index.Spacings_m()) ASSERT_EQ(spacing, 0);
+}
+
 TEST(PointIndex, EqualsBruteForce) {
   auto points = testing::RandomPoints(3000, {0, 0, 0}, {1, 0.2F, 1}, 4);
   points.push_back(points[7]);

@@ -102,6 +102,27 @@ TEST(SurfaceIndex, DegenerateTrianglesChangeNothing) {
   EXPECT_EQ(found.triangle, expected.triangle);
 }
 
+// One triangle 50,000 times, once in each order of its corners: with all of them in the tree the
+// queries would take an hour. What faces the other way stays, as its normal is another.
+TEST(SurfaceIndex, ManyEqualTrianglesAreOne) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, -0.0F}, {0, 1, 0}};
+  for (int i = 0; i < 50000; ++i) {
+    mesh.triangles.push_back({0, 1, 2});
+    mesh.triangles.push_back({1, 3, 0});
+  }
+  const SurfaceIndex front(mesh);
+  EXPECT_EQ(front.indexed(), 1U);
+  mesh.triangles.push_back({0, 2, 1});
+  const SurfaceIndex index(mesh);
+  EXPECT_EQ(index.indexed(), 2U);
+  const NearestSurface nearest =
+      index.Nearest(testing::RandomPoints(50000, {-1, -1, 0.1F}, {1, 1, 1}, 5));
+  for (std::size_t i = 0; i < nearest.triangle.size(); ++i) {
+    ASSERT_TRUE(nearest.triangle[i] == 0 || nearest.triangle[i] == 100000) << nearest.triangle[i];
+  }
+}
+
 TEST(MeshTools, FacesOfAndFacesNear) {
   TriangleMesh mesh = testing::Box({0, 0, 0}, {1, 1, 1});
   testing::Label(mesh, 3);
