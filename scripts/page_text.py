@@ -68,6 +68,15 @@ def front(path):
     return markdown([rows[0]] + [[f"`{row[0]}`"] + row[1:] for row in rows[1:]])
 
 
+def speed(path):
+    """Of the table of times over all cases: its first case."""
+    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in path.read_text().splitlines()
+            if line.startswith("|") and not line.startswith("|--")]
+    if len(rows) < 2 or len(rows[0]) < 3 or len({len(row) for row in rows}) != 1:
+        raise ValueError(f"{path} has no table of times as tsdfpp_bench side-by-side writes it")
+    return markdown([row[:3] for row in rows])
+
+
 def whole(path):
     return "```\n" + parts_of(path)[1].strip("\n") + "\n```\n"
 
@@ -177,6 +186,7 @@ KINDS = {
     "text": as_it_is,
     "fenced": fenced,
     "front": front,
+    "speed": speed,
     "whole": whole,
     "least": least,
     "tracks": tracks,

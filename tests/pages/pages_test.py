@@ -334,6 +334,13 @@ class Texts(unittest.TestCase):
         (table,), _ = page_compare.read(whole)
         self.assertEqual(table.rows, [["tsdf, paper", "3628 ±6.2", "1.2"]])
 
+    def test_the_speed_in_short(self):
+        text = "| 2 threads | 1 cm: equal | alone | 5 mm: equal |\n|---|---|---|---|\n| `tsdf` | 1 ms, 2 [1, 3] | 1 ms | 9 ms |\n"
+        self.assertEqual(self.made("summary.md", text, "speed"),
+                         "| 2 threads | 1 cm: equal | alone |\n| --- | --- | --- |\n| `tsdf` | 1 ms, 2 [1, 3] | 1 ms |\n")
+        with self.assertRaises(ValueError):
+            self.made("summary.md", "| a | b |\n", "speed")
+
     def test_the_least_of_the_frames(self):
         columns = [column for _, column in page_text.FIGURES]
         text = "frame,method,profile," + ",".join(columns) + "\n1,tsdf,paper,0.5,,1,1,1,0.25\n2,tsdf,paper,0.75,0.5,1,1,0.5,1\n"
