@@ -1,6 +1,7 @@
 #include "sequence/open_sequence.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "core/data_folder.h"
 #include "sequence/bop_layout.h"
@@ -113,9 +114,12 @@ Expected<std::unique_ptr<DatasetSource>> OpenOthers(const fs::path& path, Datase
       return OpenScannet(path, options, notes);
     case DatasetFormat::kReplica:
       return OpenReplica(path, options, notes);
-    default:
+    case DatasetFormat::kSevenScenes:
       return OpenSevenScenes(path, options, notes);
+    case DatasetFormat::kCofusion:  // has one of its own
+      break;
   }
+  std::abort();
 }
 
 }  // namespace
