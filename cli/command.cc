@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <optional>
 #include <sstream>
+#include <string_view>
 
 #include "core/data_folder.h"
 
@@ -25,12 +26,19 @@ std::optional<double> FiniteNumber(const std::string& text) {
   return number;
 }
 
+// "010": to CLI11 it is 8, to others 10.
+bool BeginsWithZero(std::string_view text) {
+  const std::size_t at = text.find_first_of("0123456789");
+  return at != std::string_view::npos && text[at] == '0' && at + 1 < text.size() &&
+         text[at + 1] >= '0' && text[at + 1] <= '9';
+}
+
 CLI::Validator Number(bool zero_allowed) {
   // CLI11's own names the greatest double as the other limit. Words are refused by the option.
   return {[zero_allowed](const std::string& text) {
             const double number = std::strtod(text.c_str(), nullptr);
             const bool enough = number > 0 || (zero_allowed && number == 0);
-            if (enough && std::isfinite(number)) return std::string();
+            if (enough && std::isfinite(number) && !BeginsWithZero(text)) return std::string();
             return fmt::format("found {}, expected a number {}", text,
                                zero_allowed ? "from 0" : "above 0");
           },
@@ -56,7 +64,8 @@ CLI::Validator WholeBetween(std::int64_t low, std::int64_t high) {
             std::int64_t number = 0;
             const char* last = text.data() + text.size();
             const auto [end, fault] = std::from_chars(text.data(), last, number);
-            if (fault == std::errc() && end == last && number >= low && number <= high) {
+            if (fault == std::errc() && end == last && !BeginsWithZero(text) && number >= low &&
+                number <= high) {
               return std::string();
             }
             return fmt::format("found '{}', expected a whole number from {} to {}", text, low,

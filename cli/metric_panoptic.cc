@@ -64,7 +64,11 @@ int IdOf(const nlohmann::json& json) {
 // 0 or 1, also as false or true. Throws where it is neither number nor one of these.
 bool IsFlagged(const nlohmann::json& object, const char* key, int otherwise) {
   const nlohmann::json flag = object.value(key, nlohmann::json(otherwise));
-  return flag.is_boolean() ? flag.get<bool>() : IdOf(flag) == 1;
+  if (flag.is_boolean()) return flag.get<bool>();
+  if (IdOf(flag) > 1) {
+    throw std::out_of_range(fmt::format("'{}' is {}, expected 0 or 1", key, JsonShown(flag)));
+  }
+  return IdOf(flag) == 1;
 }
 
 Expected<Annotations> ReadAnnotations(const fs::path& path) {
@@ -77,6 +81,10 @@ Expected<Annotations> ReadAnnotations(const fs::path& path) {
     for (const auto& annotation : json.at("annotations")) {
       const std::string file = annotation.at("file_name");
       const std::string id = JsonText(annotation.at("image_id"));
+      if (out.by_file.contains(file) || out.file_of_id.contains(id)) {
+        throw std::out_of_range(
+            fmt::format("image {} or file {} is there twice", id, Quoted(file)));
+      }
       std::vector<PanopticSegment>& segments = out.by_file[file];
       out.id_of_file[file] = id;
       out.file_of_id[id] = file;

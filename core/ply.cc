@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 
+#include "core/farthest.h"
 #include "core/files.h"
 #include "core/limits.h"
 #include "core/one_line.h"
@@ -360,6 +361,12 @@ Expected<void> WriteTrueModel(const std::filesystem::path& path, const TrueModel
 
 Expected<TrueModel> ReadTrueModel(const std::filesystem::path& path, const ObjectInfo& info) {
   TSDFPP_ASSIGN(Parsed parsed, Parse(path));
+  for (const Eigen::Vector3f& vertex : parsed.mesh.vertices) {
+    if (!(vertex.cwiseAbs().maxCoeff() <= static_cast<float>(kFarthest_m))) {
+      return DataError("{}: a position is {:g} m from the origin, expected at most {:g}",
+                       path.string(), vertex.cwiseAbs().maxCoeff(), kFarthest_m);
+    }
+  }
   if (parsed.regions.empty()) {
     parsed.regions = {info.name};
     parsed.face_region.assign(parsed.mesh.triangles.size(), 0);

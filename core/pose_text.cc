@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/farthest.h"
+
 namespace tsdfpp {
 
 namespace {
@@ -61,6 +63,12 @@ Expected<Pose> PoseFromText(std::string_view text) {
   if (std::abs(q.norm() - 1.0) > kLengthTolerance) {
     return DataError("'{}' is not a pose: the quaternion's length is {:.6f}, not 1", text,
                      q.norm());
+  }
+  for (const double metres : {numbers[0], numbers[1], numbers[2]}) {
+    if (std::abs(metres) > kFarthest_m) {
+      return DataError("'{}' is not a pose: {:g} m from the origin, expected at most {:g}", text,
+                       std::abs(metres), kFarthest_m);
+    }
   }
   q.normalize();
   Pose pose = Pose::Identity();

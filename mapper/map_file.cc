@@ -69,6 +69,8 @@ Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range
     }
   }
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
+  TSDFPP_RETURN_IF_ERROR(CheckLabel(run.sequence, "the sequence's name"));
+  if (!run.poses.empty()) TSDFPP_RETURN_IF_ERROR(CheckLabel(run.poses, "the source of poses"));
   TSDFPP_RETURN_IF_ERROR(CheckObjects(run.objects, "its list"));
   if (run.last_frame < -1 || run.last_frame > kGreatestFrame) {
     return DataError("its last frame is {}, expected -1 to {}", run.last_frame, kGreatestFrame);
@@ -150,6 +152,16 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
   }
   if (auto status = loaded.map->Load(sections); !status) {
     return DataError("{}: its map is wrong: {}", where, status.error().message);
+  }
+  if (loaded.run) {
+    for (const InstanceId id : loaded.map->Objects()) {
+      const auto& listed = loaded.run->objects;
+      if (std::none_of(listed.begin(), listed.end(),
+                       [&](const ObjectInfo& object) { return object.id == id; })) {
+        return DataError("{}: section '{}' is wrong: object {} of the map is not in its list",
+                         where, kRunSection, id);
+      }
+    }
   }
   return loaded;
 }

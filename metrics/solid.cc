@@ -32,35 +32,53 @@ int SideOf(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vect
 Solid::Solid(const TriangleMesh& mesh) : mesh_(mesh), bounds_(BoundsOf(mesh)) {
   if (mesh.triangles.empty()) return;
   constexpr int kMaxColumns = 256;
-  const int columns = std::clamp(
-      static_cast<int>(std::sqrt(static_cast<double>(mesh.triangles.size()))), 1, kMaxColumns);
+  // Of triangles as wide as the mesh every column would hold every one: then there are fewer.
+  constexpr std::size_t kMostEntries = 16;  // a triangle
+  int columns = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(mesh.triangles.size()))),
+                           1, kMaxColumns);
+  while (true) {
+    SetColumns(columns);
+    std::size_t entries = 0;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) entries += ColumnsOf(t).Count();
+    if (columns == 1 || entries <= kMostEntries * mesh.triangles.size()) break;
+    columns /= 2;
+  }
+  first_.assign(static_cast<std::size_t>(columns_x_ * columns_y_) + 1, 0);
+  ForEachEntry([&](std::size_t column, std::uint32_t) { ++first_[column + 1]; });
+  for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
+  members_.resize(first_.back());
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+  ForEachEntry(
+      [&](std::size_t column, std::uint32_t triangle) { members_[next[column]++] = triangle; });
+}
+
+void Solid::SetColumns(int columns) {
   columns_x_ = columns;
   columns_y_ = columns;
   const Eigen::Vector3f size = bounds_.sizes();
   inverse_x_ = size.x() > 0 ? columns / static_cast<double>(size.x()) : 0;
   inverse_y_ = size.y() > 0 ? columns / static_cast<double>(size.y()) : 0;
+}
 
-  const auto for_each_entry = [&](const auto& visit) {
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      Eigen::AlignedBox3f box(Corner(mesh, t, 0));
-      box.extend(Corner(mesh, t, 1)).extend(Corner(mesh, t, 2));
-      const int x1 = Column(box.max().x(), bounds_.min().x(), inverse_x_, columns_x_);
-      const int y1 = Column(box.max().y(), bounds_.min().y(), inverse_y_, columns_y_);
-      for (int y = Column(box.min().y(), bounds_.min().y(), inverse_y_, columns_y_); y <= y1; ++y) {
-        for (int x = Column(box.min().x(), bounds_.min().x(), inverse_x_, columns_x_); x <= x1;
-             ++x) {
-          visit(static_cast<std::size_t>(y * columns_x_ + x), static_cast<std::uint32_t>(t));
-        }
+Solid::Columns Solid::ColumnsOf(std::size_t triangle) const {
+  Eigen::AlignedBox3f box(Corner(mesh_, triangle, 0));
+  box.extend(Corner(mesh_, triangle, 1)).extend(Corner(mesh_, triangle, 2));
+  return {Column(box.min().x(), bounds_.min().x(), inverse_x_, columns_x_),
+          Column(box.max().x(), bounds_.min().x(), inverse_x_, columns_x_),
+          Column(box.min().y(), bounds_.min().y(), inverse_y_, columns_y_),
+          Column(box.max().y(), bounds_.min().y(), inverse_y_, columns_y_)};
+}
+
+template <typename Visit>
+void Solid::ForEachEntry(const Visit& visit) const {
+  for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+    const Columns columns = ColumnsOf(t);
+    for (int y = columns.y0; y <= columns.y1; ++y) {
+      for (int x = columns.x0; x <= columns.x1; ++x) {
+        visit(static_cast<std::size_t>(y * columns_x_ + x), static_cast<std::uint32_t>(t));
       }
     }
-  };
-  first_.assign(static_cast<std::size_t>(columns_x_ * columns_y_) + 1, 0);
-  for_each_entry([&](std::size_t column, std::uint32_t) { ++first_[column + 1]; });
-  for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-  members_.resize(first_.back());
-  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for_each_entry(
-      [&](std::size_t column, std::uint32_t triangle) { members_[next[column]++] = triangle; });
+  }
 }
 
 int Solid::Column(float x, float low, double inverse_size, int count) const {
@@ -77,7 +95,7 @@ int Solid::Winding(const Eigen::Vector3f& point) const {
   const int y = Column(point.y(), bounds_.min().y(), inverse_y_, columns_y_);
   const auto column = static_cast<std::size_t>(y * columns_x_ + x);
   int winding = 0;
-  for (std::uint32_t m = first_[column]; m < first_[column + 1]; ++m) {
+  for (std::size_t m = first_[column]; m < first_[column + 1]; ++m) {
     const std::uint32_t t = members_[m];
     const Eigen::Vector3f& a = Corner(mesh_, t, 0);
     const Eigen::Vector3f& b = Corner(mesh_, t, 1);

@@ -1,6 +1,7 @@
 // Which points lie inside a solid bounded by a triangle mesh.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,6 +23,17 @@ class Solid {
   std::vector<std::uint8_t> Contains(std::span<const Eigen::Vector3f> points) const;
 
  private:
+  // Those that a triangle's bounds meet, inclusive.
+  struct Columns {
+    int x0, x1, y0, y1;
+    std::size_t Count() const {
+      return static_cast<std::size_t>(x1 - x0 + 1) * static_cast<std::size_t>(y1 - y0 + 1);
+    }
+  };
+  void SetColumns(int columns);
+  Columns ColumnsOf(std::size_t triangle) const;
+  template <typename Visit>
+  void ForEachEntry(const Visit& visit) const;
   int Winding(const Eigen::Vector3f& point) const;
   int Column(float x, float low, double inverse_size, int count) const;
 
@@ -32,7 +44,7 @@ class Solid {
   int columns_y_ = 0;
   double inverse_x_ = 0;
   double inverse_y_ = 0;
-  std::vector<std::uint32_t> first_;
+  std::vector<std::size_t> first_;
   std::vector<std::uint32_t> members_;
 };
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
@@ -140,6 +141,9 @@ NearestSurface SurfaceIndex::Nearest(std::span<const Eigen::Vector3f> points) co
   const auto* position = static_cast<const float*>(positions.GetDataPtr());
   const auto* id = static_cast<const std::uint32_t*>(ids.GetDataPtr());
   for (std::size_t i = 0; i < points.size(); ++i) {
+    // Nothing is nearest where single precision has no number for the distance: those who read
+    // files keep such coordinates out (core/farthest.h).
+    if (id[i] >= impl_->indexed.size()) std::abort();
     out.position[i] = Eigen::Vector3f(position + 3 * i);
     out.distance_m[i] = (points[i] - out.position[i]).norm();
     out.triangle[i] = impl_->indexed[id[i]];

@@ -32,8 +32,9 @@ class SurfaceIndex {
   SurfaceIndex(SurfaceIndex&&) noexcept;
   SurfaceIndex& operator=(SurfaceIndex&&) noexcept;
 
-  // `points` in the mesh's frame, finite. Never ask in bulk for points that are equidistant from
-  // everything (the centre of a sphere): no hierarchy helps there.
+  // `points` in the mesh's frame, finite; they and the mesh within kFarthest_m (core/farthest.h).
+  // Never ask in bulk for points that are equidistant from everything (the centre of a sphere): no
+  // hierarchy helps there.
   NearestSurface Nearest(std::span<const Eigen::Vector3f> points) const;
 
   // Triangles that distances are measured to.

@@ -229,6 +229,7 @@ def main():
             sys.exit(f"fails before anything is broken: {', '.join(sound)}")
 
     rows = []
+    uncompiled = []
     for mutation in mutations:
         room = room_of(mutation)
         original = apply(tree, mutation)
@@ -236,14 +237,16 @@ def main():
         caught = failing_tests(build, room, mutation.test) if built.returncode == 0 else []
         (tree / mutation.file).write_text(original)
         if built.returncode != 0:
-            sys.exit(f"{mutation.name} does not compile:\n{built.stdout}")
+            uncompiled.append(mutation.name)
+            print(f"{mutation.name} does not compile:\n{built.stdout}", flush=True)
+            continue
         rows.append((mutation, caught))
         print(f"{mutation.name}: {', '.join(caught[:2]) or 'SURVIVED'}", flush=True)
         if arguments.page:
             arguments.page.write_text(page(listed, rows, arguments.page))
     survivors = [mutation.name for mutation, caught in rows if not caught]
-    print(f"{len(rows)} mutations, {len(rows) - len(survivors)} caught")
-    sys.exit(1 if survivors else 0)
+    print(f"{len(rows)} mutations, {len(rows) - len(survivors)} caught; {len(uncompiled)} do not compile")
+    sys.exit(1 if survivors or uncompiled else 0)
 
 
 if __name__ == "__main__":

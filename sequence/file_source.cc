@@ -212,6 +212,14 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
         CheckCamera(frame.camera, fmt::format("{}, frame {}", sequence.name, frame.number)));
   }
 
+  const auto twice = std::adjacent_find(
+      frames.begin(), frames.end(),
+      [](const FrameFiles& a, const FrameFiles& b) { return a.number == b.number; });
+  if (twice != frames.end()) {
+    return DataError("{}: {} and {} are both of frame {}", sequence.name, twice->depth.string(),
+                     std::next(twice)->depth.string(), twice->number);
+  }
+
   SequenceInfo info;
   info.name = sequence.name;
   info.intrinsics = frames.front().camera;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/farthest.h"
 #include "sequence/text_lines.h"
 
 namespace tsdfpp {
@@ -12,6 +13,11 @@ Expected<Pose> PoseFromMatrix(const Eigen::Matrix3d& rotation, const Eigen::Vect
                               const std::string& where) {
   if (!rotation.allFinite() || !translation.allFinite()) {
     return DataError("{}: the pose holds numbers that are not finite", where);
+  }
+  const double farthest_m = translation.cwiseAbs().maxCoeff();
+  if (farthest_m > kFarthest_m) {
+    return DataError("{}: the pose is {:g} m from the origin, expected at most {:g}", where,
+                     farthest_m, kFarthest_m);
   }
   const double off =
       (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();

@@ -270,6 +270,12 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
   }
   TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
   TSDFPP_ASSIGN(const SequenceRecord record, ReadSequenceJson(folder / cofusion::kSequence));
+  // Each frame has three images; where far more are claimed there is nothing to look at one by one.
+  if (static_cast<std::size_t>(record.info.frame_count) > record.hashes.size()) {
+    return DataError("{}: frame_count is {}, but only {} files are listed",
+                     (folder / cofusion::kSequence).string(), record.info.frame_count,
+                     record.hashes.size());
+  }
   CertifyResult result;
   result.sequence = record.info.name;
   result.findings = CheckFiles(folder, record);

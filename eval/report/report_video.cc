@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
@@ -235,11 +236,12 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   }
   std::vector<int> stills;
   for (const nlohmann::json& still : recording->json["stills"]) {
-    if (!still.is_number_integer()) {
-      return DataError("'{}': a still is {}, expected a frame's number", run.string(),
-                       JsonShown(still));
+    const auto frame = WholeIn(still, 0, std::numeric_limits<int>::max());
+    if (!frame || (!stills.empty() && *frame <= stills.back())) {
+      return DataError("'{}': a still is {}, expected frames' numbers, each greater than the last",
+                       run.string(), JsonShown(still));
     }
-    stills.push_back(still.get<int>());
+    stills.push_back(static_cast<int>(*frame));
   }
   std::vector<Panel> panels{{"camera", "colour"}, {"objects", "mask"}, {"", ""}};
   for (const nlohmann::json& each : recording->json["runs"]) {

@@ -1,5 +1,8 @@
 #include "eval/run/open_source.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "sequence/open_sequence.h"
 #include "sim/simulated_source.h"
 
@@ -40,6 +43,11 @@ Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,
       }
       return UsageError("object '{}' is not in sequence {}, which has {}", wanted, info.name,
                         known);
+    }
+    const auto other = std::find_if(std::next(found), info.objects.end(), matches);
+    if (other != info.objects.end()) {
+      return UsageError("object '{}' may be {} ({}) or {} ({}) of sequence {}", wanted, found->name,
+                        found->id, other->name, other->id, info.name);
     }
     ids.push_back(found->id);
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <optional>
+#include <vector>
 
 #include "core/data_folder.h"
 #include "core/folders.h"
@@ -41,15 +42,21 @@ Expected<fs::path> FolderOf(const fs::path& folder, int frame, bool alone) {
     return UsageError("--meshes {}: no such folder", folder.string());
   }
   bool has_frames = false;
+  std::vector<fs::path> found;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
        entry.increment(failure)) {
     std::error_code ignored;
     if (!entry->is_directory(ignored)) continue;
     const auto number = FrameOfFolder(entry->path().filename().string());
-    if (number == frame) return entry->path();
+    if (number == frame) found.push_back(entry->path());
     has_frames = has_frames || number.has_value();
   }
   if (failure) return DataError("{}: cannot be read as a folder", folder.string());
+  if (found.size() > 1) {
+    std::sort(found.begin(), found.end());
+    return DataError("{} and {} are both of frame {}", found[0].string(), found[1].string(), frame);
+  }
+  if (!found.empty()) return found.front();
   if (alone && !has_frames) return folder;
   return DataError("{}: holds nothing for frame {}, expected a subfolder {:06d} with its meshes",
                    folder.string(), frame, frame);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/farthest.h"
 #include "core/files.h"
 #include "core/ply.h"
 #include "sim/models/mesh_files.h"
@@ -54,9 +55,10 @@ Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& p
   for (NamedMesh& part : parts) {
     for (Eigen::Vector3f& vertex : part.mesh.vertices) {
       vertex = (scale * vertex.cast<double>()).cast<float>();
-      if (!vertex.allFinite()) {
-        return DataError("{}: at scale {} a position is too large for single precision",
-                         path.string(), scale);
+      if (!(vertex.cwiseAbs().maxCoeff() <= static_cast<float>(kFarthest_m))) {
+        return DataError(
+            "{}: at scale {} a position is {:g} from the origin, expected at most {:g}",
+            path.string(), scale, vertex.cwiseAbs().maxCoeff(), kFarthest_m);
       }
     }
   }

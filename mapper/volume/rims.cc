@@ -28,6 +28,42 @@ constexpr float kLargestStep_voxels = 4;
 // its surface goes on to is out of sight, and nobody knows whether it does.
 constexpr float kInFront_voxels = 2;
 
+// Outlines that reach farther (with everyday images none does) are stamped all at once: one by one
+// they would each go over much of the image.
+constexpr int kWideReach_px = 256;
+
+struct PixelBox {
+  int left, right, top, bottom;  // inclusive
+};
+
+// Sets `near` at the pixels of this label that are in any of the boxes, in one pass over all.
+void StampBoxes(const std::vector<PixelBox>& boxes, std::uint16_t own, const FrameView& frame,
+                std::vector<std::uint8_t>& near) {
+  // Of how many boxes more a pixel is in than the one to its left, and than the row above says.
+  const auto columns = static_cast<std::size_t>(frame.width) + 1;
+  std::vector<std::int32_t> steps(columns * (static_cast<std::size_t>(frame.height) + 1), 0);
+  const auto at = [&](int column, int row) -> std::int32_t& {
+    return steps[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
+  };
+  for (const PixelBox& box : boxes) {
+    ++at(box.left, box.top);
+    --at(box.right + 1, box.top);
+    --at(box.left, box.bottom + 1);
+    ++at(box.right + 1, box.bottom + 1);
+  }
+  std::vector<std::int32_t> above(columns, 0);
+  std::size_t pixel = 0;
+  for (int row = 0; row < frame.height; ++row) {
+    std::int32_t boxes_here = 0;
+    for (int column = 0; column < frame.width; ++column, ++pixel) {
+      std::int32_t& step = above[static_cast<std::size_t>(column)];
+      step += at(column, row);
+      boxes_here += step;
+      if (boxes_here > 0 && frame.kernel.label[pixel] == own) near[pixel] = 1;
+    }
+  }
+}
+
 // The pixels within reach of an outline of their own object, one byte each.
 std::vector<std::uint8_t> PixelsAtOutlines(const FrameView& frame, double voxel_m) {
   const auto width = static_cast<std::size_t>(frame.width);
@@ -36,7 +72,7 @@ std::vector<std::uint8_t> PixelsAtOutlines(const FrameView& frame, double voxel_
       kRimReach_voxels * voxel_m * std::max(frame.intrinsics.fx, frame.intrinsics.fy);
   const std::uint16_t* label = frame.kernel.label;
   const auto in_front_m = static_cast<float>(kInFront_voxels * voxel_m);
-  // Of a pixel, and the one beside it, which has another label.
+  std::map<std::uint16_t, std::vector<PixelBox>> wide;  // by label
   const auto stamp = [&](std::size_t pixel, std::size_t beside) {
     if (!frame.IsUsable(pixel) || !frame.IsUsable(beside)) return;
     if (frame.kernel.depth[pixel] + in_front_m < frame.kernel.depth[beside]) return;
@@ -47,7 +83,13 @@ std::vector<std::uint8_t> PixelsAtOutlines(const FrameView& frame, double voxel_
         std::min(std::ceil(reach_px / double{frame.kernel.depth[pixel]}), double{1 << 14}));
     const int left = std::max(0, u - reach);
     const int right = std::min(frame.width - 1, u + reach);
-    for (int row = std::max(0, v - reach); row <= std::min(frame.height - 1, v + reach); ++row) {
+    const int top = std::max(0, v - reach);
+    const int bottom = std::min(frame.height - 1, v + reach);
+    if (reach >= kWideReach_px) {
+      wide[own].push_back({left, right, top, bottom});
+      return;
+    }
+    for (int row = top; row <= bottom; ++row) {
       // Written so that compilers make vectors of it.
       const std::size_t first =
           static_cast<std::size_t>(row) * width + static_cast<std::size_t>(left);
@@ -89,6 +131,7 @@ std::vector<std::uint8_t> PixelsAtOutlines(const FrameView& frame, double voxel_
       }
     }
   }
+  for (const auto& [own, boxes] : wide) StampBoxes(boxes, own, frame, near);
   return near;
 }
 

@@ -247,6 +247,69 @@ TEST_F(Hostile, WhatIsInTheWayIsSaidFirst) {
                  kUsage, "run.json: is a folder with files in it");
 }
 
+// Beyond where single precision can hold the square of a distance.
+TEST_F(Hostile, WhatLiesBeyondAllDistanceIsRefused) {
+  ASSERT_TRUE(WriteFile(folder_ / "far.ply",
+                        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\n"
+                        "property float y\nproperty float z\nelement face 2\n"
+                        "property list uchar int vertex_indices\nend_header\n"
+                        "0 0 0\n1 0 0\n0 1 0\n-1e20 -1e20 0\n1e20 -1e20 0\n0 1e20 0\n"
+                        "3 0 1 2\n3 3 4 5\n")
+                  .has_value());
+  ExpectSentence(
+      RunTsdfpp({"metric", "surface", folder_ / "far.ply", folder_ / "far.ply"}, folder_.path()),
+      kData, "far.ply: at scale 1 a position is 1e+20 from the origin, expected at most 1e+07");
+  // A mapper's meshes: those without an object, too.
+  ASSERT_EQ(Map(folder_ / "set").exit_code, 0);
+  fs::copy(folder_ / "a/b/out/mesh", folder_ / "meshes");
+  fs::copy_file(folder_ / "far.ply", folder_ / "meshes/scene-without-8.ply");
+  ExpectSentence(RunTsdfpp({"evaluate", folder_ / "set", "--meshes", folder_ / "meshes", "--at",
+                            "2", "--removed", "right"},
+                           folder_.path()),
+                 kData, "scene-without-8.ply: at scale 1 a position is 1e+20");
+  // A path of the truth.
+  const std::string path = "trajectories/gt-right-8.txt";
+  std::string text = ReadFile(folder_ / "set" / path).value();
+  const std::size_t line = text.find("\n1 ");
+  ASSERT_NE(line, std::string::npos);
+  text.replace(line + 3, text.find(' ', line + 3) - line - 3, "1e20");
+  ASSERT_TRUE(WriteFile(folder_ / "set" / path, text).has_value());
+  const CommandOutput verified = RunTsdfpp({"verify", folder_ / "set"}, folder_.path());
+  EXPECT_EQ(verified.exit_code, kData) << verified.err;
+  EXPECT_NE((verified.out + verified.err).find("1e+20 m from the origin"), std::string::npos)
+      << verified.out << verified.err;
+}
+
+// Two things answer to one name: which is meant?
+TEST_F(Hostile, WhatIsThereTwiceIsRefused) {
+  Spoil("sequence.json", "\"left\"", "\"8\"");
+  ExpectSentence(Map(folder_ / "set", {"--remove", "8"}), kUsage,
+                 "object '8' may be 8 (3) or right (8) of sequence ");
+  for (const char* name : {"000002", "2"}) {
+    ASSERT_TRUE(fs::create_directories(folder_ / "meshes" / name));
+  }
+  const CommandOutput evaluated = RunTsdfpp(
+      {"evaluate", folder_ / "set", "--meshes", folder_ / "meshes", "--at", "2"}, folder_.path());
+  EXPECT_EQ(evaluated.exit_code, kData);
+  EXPECT_NE(evaluated.err.find("are both of frame 2"), std::string::npos) << evaluated.err;
+  SetUp();
+  ASSERT_EQ(RunTsdfpp({"export", folder_ / "set", "--to", "7scenes", "--out", folder_ / "seven"},
+                      folder_.path())
+                .exit_code,
+            0);
+  for (const char* part : {"color.png", "depth.png", "pose.txt", "mask.png"}) {
+    const fs::path from = folder_ / "seven" / (std::string("frame-000001.") + part);
+    if (fs::exists(from)) fs::rename(from, folder_ / "seven" / (std::string("frame-2.") + part));
+  }
+  ExpectSentence(Map(folder_ / "seven"), kData, "are both of frame 2");
+}
+
+TEST_F(Hostile, FramesThatAreClaimedAreListed) {
+  Spoil("sequence.json", "\"frame_count\": 3", "\"frame_count\": 1000000");
+  const CommandOutput output = RunTsdfpp({"verify", folder_ / "set"}, folder_.path());
+  ExpectSentence(output, kData, "sequence.json: frame_count is 1000000, but only ");
+}
+
 TEST_F(Hostile, PipesThatAreTypedAreRefused) {
   ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   for (const auto& arguments :

@@ -239,6 +239,24 @@ TEST_F(Metric, PanopticPrintsPanopticapisNumbers) {
   EXPECT_TRUE(json["per_class"]["37"]["sq"]["value"].is_null());
 }
 
+TEST_F(Metric, AnAnnotationIsThereOnce) {
+  const fs::path sample = test::CopiedData("panoptic/panopticapi_sample");
+  fs::copy(sample, folder_ / "sample", fs::copy_options::recursive);
+  const std::string text = ReadFile(sample / "pred.json").value();
+  const nlohmann::json sound = nlohmann::json::parse(text);
+  const auto refused = [&](const nlohmann::json& edited, const std::string& words) {
+    ASSERT_TRUE(WriteFile(folder_ / "sample/pred.json", edited.dump()).has_value());
+    ExpectError({"panoptic", folder_ / "sample/gt", folder_ / "sample/pred", "--encoding", "coco"},
+                kData, {"pred.json", words});
+  };
+  nlohmann::json edited = sound;
+  edited["annotations"].push_back(sound["annotations"][0]);
+  refused(edited, "is there twice");
+  edited = sound;
+  edited["annotations"][0]["segments_info"][0]["iscrowd"] = 2;
+  refused(edited, "'iscrowd' is 2, expected 0 or 1");
+}
+
 TEST_F(Metric, PanopticPrintsDeeplab2sNumbers) {
   const fs::path deeplab = test::CopiedData("panoptic/deeplab2_pq");
   std::ifstream file(deeplab / "expected.json");

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 namespace tsdfpp {
 namespace {
 
@@ -47,6 +49,17 @@ TEST(OneLine, NeverCutsACharacter) {
       EXPECT_FALSE(HasControl(line));
     }
   }
+}
+
+TEST(OneLine, ALibrarysTagIsLeftOut) {
+  try {
+    static_cast<void>(nlohmann::json::object().at("x"));
+    FAIL();
+  } catch (const nlohmann::json::exception& error) {
+    EXPECT_EQ(WithoutTag(error.what()), "key 'x' not found");
+  }
+  EXPECT_EQ(WithoutTag("[1] of mine"), "[1] of mine");
+  EXPECT_EQ(WithoutTag("[json."), "[json.");
 }
 
 TEST(OneLine, MessagesStayUnderFiveHundredBytes) {

@@ -53,10 +53,27 @@ TEST(Ply, RoundTripWithoutColoursAndIds) {
   ExpectSame(ReadPly(folder / "none.ply").value(), {});
 }
 
+// Of what is somewhere in a world: SomeMesh() has a corner at the end of all numbers.
+TriangleMesh SomeModel() {
+  TriangleMesh mesh = SomeMesh();
+  for (Eigen::Vector3f& vertex : mesh.vertices) vertex = vertex.cwiseMin(1e7F).cwiseMax(-1e7F);
+  return mesh;
+}
+
+TEST(Ply, AModelIsSomewhere) {
+  const TempFolder folder;
+  ASSERT_TRUE(WritePly(folder / "m.ply", SomeMesh()).has_value());
+  const auto read = ReadTrueModel(folder / "m.ply", {2, "car", "car"});
+  ASSERT_FALSE(read.has_value());
+  EXPECT_NE(read.error().message.find("m.ply: a position is 3.40282e+38 m from the origin, "),
+            std::string::npos)
+      << read.error().message;
+}
+
 TEST(Ply, TrueModelRoundTripIsExact) {
   const TempFolder folder;
   const ObjectInfo info{0, "background", "background"};
-  const TrueModel model{info, SomeMesh(), {"table", "floor", "north wall"}, {2, 0}};
+  const TrueModel model{info, SomeModel(), {"table", "floor", "north wall"}, {2, 0}};
   ASSERT_TRUE(WriteTrueModel(folder / "m.ply", model).has_value());
   const auto read = ReadTrueModel(folder / "m.ply", info);
   ASSERT_TRUE(read.has_value()) << read.error().message;
@@ -68,7 +85,7 @@ TEST(Ply, TrueModelRoundTripIsExact) {
 
 TEST(Ply, MeshWithoutRegionsIsOneRegionNamedAfterTheObject) {
   const TempFolder folder;
-  ASSERT_TRUE(WritePly(folder / "m.ply", SomeMesh()).has_value());
+  ASSERT_TRUE(WritePly(folder / "m.ply", SomeModel()).has_value());
   const TrueModel read = ReadTrueModel(folder / "m.ply", {2, "car", "car"}).value();
   EXPECT_EQ(read.regions, std::vector<std::string>{"car"});
   EXPECT_EQ(read.face_region, (std::vector<std::uint16_t>{0, 0}));

@@ -67,6 +67,17 @@ TEST(PoseText, IdentityIsExact) {
   EXPECT_TRUE(SameBits(PoseThroughText(Pose::Identity()), Pose::Identity()));
 }
 
+TEST(PoseText, NothingIsBeyondAllDistance) {
+  EXPECT_TRUE(PoseFromText("-1e7 0 1e7 0 0 0 1").has_value());
+  for (const char* text : {"1.1e7 0 0 0 0 0 1", "0 -1e20 0 0 0 0 1", "0 0 1e307 0 0 0 1"}) {
+    const auto pose = PoseFromText(text);
+    ASSERT_FALSE(pose.has_value()) << text;
+    EXPECT_NE(pose.error().message.find("m from the origin, expected at most 1e+07"),
+              std::string::npos)
+        << pose.error().message;
+  }
+}
+
 TEST(PoseText, NoMinusZero) {
   Pose pose = Pose::Identity();
   pose.translation() = Eigen::Vector3d(-1e-12, -0.0, -10);

@@ -342,6 +342,28 @@ TEST(RecordedComparison, HoldsEachMapWithinItsTrianglesAndTheHoleOfTheScore) {
   EXPECT_EQ(frames, video->frames);
   constexpr double kCodecNoise = 2;  // grey values, mean over the picture
   EXPECT_GT(cv::norm(image, first, cv::NORM_L1) / static_cast<double>(image.total()), kCodecNoise);
+  // As long as the record says, were it believed.
+  const std::string whole = ReadFile(folder / "record/record.json").value();
+  const std::string note = ReadFile(folder / "run.json").value();
+  nlohmann::json of_any_size = nlohmann::json::parse(note);
+  for (nlohmann::json& each : of_any_size["files"]) each["bytes"] = nullptr;
+  ASSERT_TRUE(WriteFile(folder / "run.json", of_any_size.dump()).has_value());
+  const nlohmann::json sound = nlohmann::json::parse(whole);
+  ASSERT_GE(sound["stills"].size(), 2U);
+  const int begin = sound["stills"][0];
+  for (const nlohmann::json& stills :
+       {nlohmann::json{begin, begin}, nlohmann::json{begin + (std::int64_t{1} << 32U)},
+        nlohmann::json{-1}, nlohmann::json{"a"}}) {
+    nlohmann::json edited = sound;
+    edited["stills"] = stills;
+    ASSERT_TRUE(WriteFile(folder / "record/record.json", edited.dump()).has_value());
+    const auto refused = WriteReportVideo(folder.path(), folder / "other.mp4");
+    ASSERT_FALSE(refused.has_value()) << stills;
+    EXPECT_NE(refused.error().message.find("a still is "), std::string::npos)
+        << refused.error().message;
+  }
+  ASSERT_TRUE(WriteFile(folder / "record/record.json", whole).has_value());
+  ASSERT_TRUE(WriteFile(folder / "run.json", note).has_value());
   std::filesystem::remove(folder / "record" / "stills" / StillName("mask", 16));
   const auto broken = WriteReportVideo(folder.path(), folder / "other.mp4");
   ASSERT_FALSE(broken.has_value());

@@ -129,6 +129,29 @@ TEST(MapFileNames, ObjectsWithNamesThatEscapeAreRefused) {
 }
 
 // Zeros fold to a thousandth: what they unfold to is summed before memory is taken.
+TEST(MapFileNames, ARunNamesAllObjectsInPlainText) {
+  const auto map = DrivenMap(Method::kTsdfpp, ToyConfig(), 1);
+  MappedRun run = SomeRun();
+  for (const InstanceId id : map->Objects()) {
+    if (id != kBackground && id != kBrick) run.objects.push_back({id, fmt::format("o{}", id), ""});
+  }
+  ASSERT_TRUE(MapFromBytes(MapToBytes(*map, &run), "map.tsdf").has_value());
+  const auto sentence = [&](const MappedRun& wrong) {
+    const auto loaded = MapFromBytes(MapToBytes(*map, &wrong), "map.tsdf");
+    return loaded ? std::string() : loaded.error().message;
+  };
+  MappedRun wrong = run;
+  wrong.sequence = "\x1b]0;pwned\x07\n";
+  EXPECT_TRUE(sentence(wrong).starts_with("map.tsdf: section 'RUN ' is wrong: the sequence's name"))
+      << sentence(wrong);
+  wrong = run;
+  wrong.objects = {{kBackground, "background", ""}};
+  EXPECT_EQ(
+      sentence(wrong),
+      fmt::format("map.tsdf: section 'RUN ' is wrong: object {} of the map is not in its list",
+                  kBrick));
+}
+
 TEST(MapFileSize, WhatUnfoldsToTooMuchIsRefused) {
   constexpr std::size_t kBytes = 8U << 20U;
   const std::string file = PackSections({{"ZERO", std::string(kBytes, '\0')}, {"MORE", "x"}});

@@ -79,6 +79,23 @@ TEST_P(ReferenceTest, CameraAmongItsBlocks) {
   maps.SetPosesAndFuse(frame);
 }
 
+// Eight millimetres over the brick's edge, an outline's reach is wider than the image.
+TEST_P(ReferenceTest, CameraAtAnOutline) {
+  const Scene scene = TableWithToys();
+  SideBySide maps = Begin();
+  maps.SetPosesAndFuse(RenderToys(scene, 0.2));
+  const Eigen::Vector3d edge_W = scene.T_WO.at(kBrick) * Eigen::Vector3d(0, 0.05, 0.045);
+  const Frame frame = reference::Render(scene,
+                                        reference::LookAt(edge_W + Eigen::Vector3d(0, 0, 0.008),
+                                                          edge_W + Eigen::Vector3d(0.002, 0, 0)),
+                                        2);
+  const cv::Mat is_brick = frame.mask == kBrick;
+  ASSERT_GT(cv::countNonZero(is_brick), 0);
+  ASSERT_LT(cv::countNonZero(is_brick), frame.mask.rows * frame.mask.cols);
+  maps.SetPosesAndFuse(frame);
+  maps.CompareWholeBox();
+}
+
 TEST_P(ReferenceTest, WeightsAndConfidencesSaturate) {
   const Scene scene = TableWithToys();
   MapConfig capped = config();

@@ -96,6 +96,25 @@ INSTANTIATE_TEST_SUITE_P(Layered, LayeredRims,
                                                               Method::kVolumes),
                                             kProfiles));
 
+// A sensor's fault, or a hostile image: every pixel is an outline, and its reach is the whole
+// image. Looking there for each would take hours.
+TEST_P(Rims, AnImageAtTheCameraItselfEnds) {
+  const auto map = NewMap();
+  Frame frame;
+  frame.intrinsics = {1000, 1000, 900.0, 900.0, 499.5, 499.5};
+  frame.depth = cv::Mat(1000, 1000, CV_32FC1, cv::Scalar(0.02));
+  frame.colour = cv::Mat(1000, 1000, CV_8UC3, cv::Scalar(9, 9, 9));
+  frame.mask = cv::Mat(1000, 1000, CV_16UC1, cv::Scalar(kBackground));
+  for (int v = 0; v < 1000; ++v) {
+    for (int u = v % 2; u < 1000; u += 2) frame.mask.at<std::uint16_t>(v, u) = kHides;
+  }
+  frame.T_WC = Pose::Identity();
+  frame.T_WO[kHides] = Pose::Identity();
+  Map(frame, *map);
+  Map(frame, *map);
+  EXPECT_FALSE(map->FindFault().has_value());
+}
+
 TEST_P(Rims, InventNoTable) {
   const auto map = NewMap();
   std::vector<Eigen::Vector3d> seen_W;

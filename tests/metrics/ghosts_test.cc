@@ -50,6 +50,23 @@ TEST(Solid, OverlappingPartsAndSphere) {
   }
 }
 
+// All over one another, each as wide as the mesh: in a fine grid every column would list each.
+TEST(Solid, ManySheetsAsWideAsTheMesh) {
+  constexpr std::uint32_t kSheets = 70000;  // 2^32 entries in a grid of 256 x 256
+  TriangleMesh mesh;
+  for (std::uint32_t i = 0; i < kSheets; ++i) {
+    const float z = 0.01F * static_cast<float>(i) / static_cast<float>(kSheets);
+    for (const Eigen::Vector3f& corner :
+         {Eigen::Vector3f(0, 0, z), Eigen::Vector3f(1, 0, z), Eigen::Vector3f(0, 1, z)}) {
+      mesh.vertices.push_back(corner);
+    }
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  const std::vector<Eigen::Vector3f> points = {
+      {0.2F, 0.2F, 0.1F}, {0.2F, 0.2F, -0.1F}, {0.2F, 0.2F, 0.005F}, {0.8F, 0.8F, -0.1F}};
+  EXPECT_EQ(Solid(mesh).Contains(points), (std::vector<std::uint8_t>{0, 1, 1, 0}));
+}
+
 TEST(Solid, BelowAFloorSheetIsInside) {
   const TriangleMesh floor = testing::Sheet({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   const std::vector<Eigen::Vector3f> points = {{0.5F, 0.5F, 0.1F}, {0.5F, 0.5F, -0.1F}};
