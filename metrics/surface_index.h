@@ -22,8 +22,7 @@ struct NearestSurface {
 
 // An immutable index of one mesh. Distances are point to triangle (facts/metrics.md), single
 // precision. Of several triangles at equal distance the index names one of them, of equal ones the
-// first. Results do not
-// depend on the number of threads.
+// first. Results do not depend on the number of threads.
 class SurfaceIndex {
  public:
   // Triangles with an edge shorter than 5 um are not indexed (Open3D fails on them); the limit
