@@ -33,14 +33,17 @@ bool BeginsWithZero(std::string_view text) {
          text[at + 1] >= '0' && text[at + 1] <= '9';
 }
 
+constexpr const char* kNoZeros = ", without a 0 before it";
+
 CLI::Validator Number(bool zero_allowed) {
   // CLI11's own names the greatest double as the other limit. Words are refused by the option.
   return {[zero_allowed](const std::string& text) {
             const double number = std::strtod(text.c_str(), nullptr);
             const bool enough = number > 0 || (zero_allowed && number == 0);
-            if (enough && std::isfinite(number) && !BeginsWithZero(text)) return std::string();
-            return fmt::format("found {}, expected a number {}", text,
-                               zero_allowed ? "from 0" : "above 0");
+            const bool octal = BeginsWithZero(text);
+            if (enough && std::isfinite(number) && !octal) return std::string();
+            return fmt::format("found {}, expected a number {}{}", text,
+                               zero_allowed ? "from 0" : "above 0", octal ? kNoZeros : "");
           },
           "", ""};
 }
@@ -68,8 +71,8 @@ CLI::Validator WholeBetween(std::int64_t low, std::int64_t high) {
                 number <= high) {
               return std::string();
             }
-            return fmt::format("found '{}', expected a whole number from {} to {}", text, low,
-                               high);
+            return fmt::format("found '{}', expected a whole number from {} to {}{}", text, low,
+                               high, BeginsWithZero(text) ? kNoZeros : "");
           },
           fmt::format("{} to {}", low, high), ""};
 }

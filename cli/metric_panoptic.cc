@@ -65,10 +65,11 @@ int IdOf(const nlohmann::json& json) {
 bool IsFlagged(const nlohmann::json& object, const char* key, int otherwise) {
   const nlohmann::json flag = object.value(key, nlohmann::json(otherwise));
   if (flag.is_boolean()) return flag.get<bool>();
-  if (IdOf(flag) > 1) {
+  const int number = IdOf(flag);
+  if (number > 1) {
     throw std::out_of_range(fmt::format("'{}' is {}, expected 0 or 1", key, JsonShown(flag)));
   }
-  return IdOf(flag) == 1;
+  return number == 1;
 }
 
 Expected<Annotations> ReadAnnotations(const fs::path& path) {

@@ -21,8 +21,9 @@ enum class DecodeAs {
 // What the caller asks of the header and the file's bytes, before any pixel is made.
 using HeaderCheck = std::function<Expected<void>(const ImageHeader&, std::string_view bytes)>;
 
-// Errors: kData, beginning with `where`: those of ReadImageHeader and of `check`; pixels that
-// cannot be decoded. An EXR image is decoded from its file only: see below.
+// As stored: what a JPEG says of turning it is not followed. Errors: kData, beginning with `where`:
+// those of ReadImageHeader and of `check`; a TIFF that is to be turned; pixels that cannot be
+// decoded. An EXR image is decoded from its file only: see below.
 Expected<cv::Mat> DecodeImage(std::string_view bytes, const std::string& where,
                               DecodeAs as = DecodeAs::kAsItIs, const HeaderCheck& check = {});
 

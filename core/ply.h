@@ -19,7 +19,8 @@ Expected<TriangleMesh> ReadPly(const std::filesystem::path& path);
 // The same with the regions of a true model: `comment region <index> <name>` lines and a `region`
 // number per face.
 Expected<void> WriteTrueModel(const std::filesystem::path& path, const TrueModel& model);
-// `info` is the caller's; a file without regions gets one, named after the object.
+// `info` is the caller's; a file without regions gets one, named after the object. Errors: those of
+// ReadPly; kData where a position is farther than kFarthest_m (core/farthest.h).
 Expected<TrueModel> ReadTrueModel(const std::filesystem::path& path, const ObjectInfo& info);
 
 }  // namespace tsdfpp

@@ -14,8 +14,8 @@ namespace tsdfpp {
 // point: PoseToText(PoseFromText(text)) is the same text, so a second trip changes no bit.
 std::string PoseToText(const Pose& T_target_source);
 
-// Errors: kData where there are not seven finite numbers or the quaternion's length is not 1 +-
-// 1e-3.
+// Metres. Errors: kData where there are not seven finite numbers, the quaternion's length is not 1
+// +- 1e-3, or the place is farther than kFarthest_m (core/farthest.h).
 Expected<Pose> PoseFromText(std::string_view text);
 
 // PoseFromText(PoseToText(pose)).

@@ -55,9 +55,9 @@ struct FileSequence {
 
 // A source of these frames. Frames are numbered as their files are where no number is left out,
 // else 0, 1, 2...; time_s begins with 0. The camera's missing size is that of the first depth image
-// and holds for all frames. Errors: kData where there is no frame, the first depth image cannot be
-// read, a camera is implausible (sequence/plausibility.h); kUsage where intrinsics with a negative
-// fy meet objects.
+// and holds for all frames. Errors: kData where there is no frame, or two of a number, the first
+// depth image cannot be read, a camera is implausible (sequence/plausibility.h); kUsage where
+// intrinsics with a negative fy meet objects.
 Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
                                                         const SequenceOptions& options,
                                                         SequenceNotes& notes);

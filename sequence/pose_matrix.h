@@ -16,7 +16,7 @@ namespace tsdfpp {
 inline constexpr double kOrthonormalTolerance = 2e-3;
 
 // The rotation nearest to `rotation` (SVD) and the translation. Errors: kData, beginning with
-// `where`: numbers that are not finite, not orthonormal, a reflection.
+// `where`: numbers that are not finite, not orthonormal, a reflection, farther than kFarthest_m.
 Expected<Pose> PoseFromMatrix(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
                               const std::string& where);
 

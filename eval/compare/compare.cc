@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/guard.h"
 #include "core/one_line.h"
 #include "eval/compare/compare_report.h"
@@ -63,21 +64,13 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   return runs;
 }
 
-std::set<std::filesystem::path> EntriesOf(const std::filesystem::path& folder) {
-  std::set<std::filesystem::path> entries;
-  std::error_code failure;
-  for (std::filesystem::directory_iterator each(folder, failure), end; !failure && each != end;
-       each.increment(failure)) {
-    entries.insert(each->path());
-  }
-  return entries;
-}
-
 // What an adapter left beside its own folder would become files of the run, or stand in their way.
 void RemoveStrays(AdapterRun& run, const std::filesystem::path& out,
-                  const std::set<std::filesystem::path>& others) {
+                  const std::vector<std::filesystem::path>& before) {
   for (const std::filesystem::path& entry : EntriesOf(out)) {
-    if (others.contains(entry)) continue;
+    if (entry == out / run.config.name || std::binary_search(before.begin(), before.end(), entry)) {
+      continue;
+    }
     std::error_code ignored;
     std::filesystem::remove_all(entry, ignored);
     run.remarks.push_back(fmt::format("{}: left {} beside its own folder, which is removed",
@@ -104,11 +97,10 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const 
     AdapterTask task = given;
     task.sequence = sequence;
     AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
-    std::set<std::filesystem::path> others = EntriesOf(out);
-    others.insert(out / adapter.name);
+    const std::vector<std::filesystem::path> before = EntriesOf(out);
     done = RunAdapter(run, task, out / adapter.name, folder.out() / adapter.name);
     if (!done) break;
-    RemoveStrays(run, out, others);
+    RemoveStrays(run, out, before);
   }
   for (const auto& [layout, sequence] : sequences) {
     std::error_code ignored;

@@ -16,7 +16,8 @@ Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& s
                                                   const SequenceOptions& options = {},
                                                   SequenceNotes* notes = nullptr);
 
-// The ids that a list of ids or names stands for. Errors: kUsage, naming the objects there are.
+// The ids that a list of ids or names stands for. Errors: kUsage, naming the objects there
+// are, or the two that one word may mean.
 Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,
                                               const std::vector<std::string>& names_or_ids);
 

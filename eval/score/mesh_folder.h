@@ -42,7 +42,7 @@ struct FrameMeshes {
 // - scene-without-<id>[-<id>...].<ending>: the scene after a removal.
 // Endings: IsSurfaceFile. Positions times `scale` are metres in the sequence's world.
 // Errors: kUsage where there is no such folder; kData, naming the file, where there is no mesh for
-// the frame, a file cannot be read, or nothing has a face with an area.
+// the frame, two folders are of it, a file cannot be read, or nothing has a face with an area.
 Expected<FrameMeshes> ReadMeshFolder(const std::filesystem::path& folder, int frame, bool alone,
                                      double scale);
 

@@ -16,7 +16,8 @@ bool IsSurfaceFile(const std::filesystem::path& path);
 // The parts that the file tells apart by name: the nodes of a .glb, else the whole file under no
 // name. Positions are multiplied by `scale`; face ids (PLY's object_id) are kept. Only a PLY may
 // lack faces: then it is a set of points. Errors: kUsage where the name ends in none of the four,
-// kData where the file cannot be read or has a position that is not finite, or too large.
+// kData where the file cannot be read or has a position that is not finite, or farther than
+// kFarthest_m (core/farthest.h).
 Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& path, double scale);
 
 // The parts as one mesh, without labels but a PLY's own. Errors: those of ReadSurfaceParts.

@@ -67,9 +67,10 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
       {{"generate", scene, "--out", "@/o", "--jobs", "0"},
        "--jobs: found '0', expected a whole number from 1 to 256" + see("generate")},
       {{"generate", scene, "--out", "@/o", "--jobs", "010"},
-       "--jobs: found '010', expected a whole number from 1 to 256" + see("generate")},
+       "--jobs: found '010', expected a whole number from 1 to 256, without a 0 before it" +
+           see("generate")},
       {{"map", scene, "--out", "@/o", "--until", "010"},
-       "--until: found 010, expected a number from 0" + see("map")},
+       "--until: found 010, expected a number from 0, without a 0 before it" + see("map")},
       {{"generate", scene, "--out", "@/o", "--seed", "99999999999999999999"},
        "--seed: found '99999999999999999999', expected a whole number from 0 to "
        "9223372036854775807" +

@@ -152,6 +152,16 @@ class AdapterCompare : public testing::Test {
     return config;
   }
 
+  // A comparison of this adapter alone, at frames 0 to 3.
+  static CompareConfig Alone(AdapterConfig adapter) {
+    CompareConfig config;
+    config.methods = {};
+    config.every = 4;
+    config.until = "3";
+    config.adapters = {std::move(adapter)};
+    return config;
+  }
+
   TempFolder folder_;
 };
 
@@ -259,13 +269,9 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
 
 TEST_F(AdapterCompare, ALayoutMayBeChosenAndOldFilesDoNotCount) {
   BoxSource source(7);
-  CompareConfig config;
-  config.methods = {};
-  config.every = 4;
-  config.until = "3";
   AdapterConfig adapter = Script("tum", std::string(kCopy) + "; cp $1/associations.txt .");
   adapter.layout = DatasetFormat::kTum;
-  config.adapters = {adapter};
+  CompareConfig config = Alone(adapter);
   auto result = RunCompare(source, config, folder_ / "out", "the command", {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   EXPECT_FALSE(result->adapters[0]->failure.has_value()) << result->adapters[0]->failure->message;
@@ -282,12 +288,8 @@ TEST_F(AdapterCompare, ALayoutMayBeChosenAndOldFilesDoNotCount) {
 // They would stand in the way of the run's own files, or pass for some.
 TEST_F(AdapterCompare, WhatIsLeftBesideItsFolderIsRemovedAndSaid) {
   BoxSource source(7);
-  CompareConfig config;
-  config.methods = {};
-  config.every = 4;
-  config.until = "3";
-  config.adapters = {Script(
-      "stray", std::string(kCopy) + "; mkdir ../summary.json; touch ../summary.json/x ../mine")};
+  const CompareConfig config = Alone(Script(
+      "stray", std::string(kCopy) + "; mkdir ../summary.json; touch ../summary.json/x ../mine"));
   const auto result = RunCompare(source, config, folder_ / "out", "the command", {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   EXPECT_TRUE(fs::is_regular_file(folder_ / "out/summary.json"));

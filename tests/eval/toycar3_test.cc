@@ -23,7 +23,7 @@ TEST(ToyCar3, LayeredMapsKeepTheTableUnderTheCars) {
   const std::filesystem::path out =
       std::filesystem::path(testing::TempDir()) / fmt::format("tsdfpp-toycar3-{}", getpid());
   CompareConfig config;  // tsdf, tsdf++ and anchored, both profiles, given poses
-  config.every = 128;    // each evaluation of six maps takes as long as some thirty frames
+  config.every = 32;     // as the demo
   const auto result = RunCompare(**source, config, out, "test", {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   std::filesystem::remove_all(out);

@@ -128,7 +128,6 @@ TEST(MapFileNames, ObjectsWithNamesThatEscapeAreRefused) {
             begin + "65535: the id 65535 stands for no object, expected one below");
 }
 
-// Zeros fold to a thousandth: what they unfold to is summed before memory is taken.
 TEST(MapFileNames, ARunNamesAllObjectsInPlainText) {
   const auto map = DrivenMap(Method::kTsdfpp, ToyConfig(), 1);
   MappedRun run = SomeRun();
@@ -152,6 +151,7 @@ TEST(MapFileNames, ARunNamesAllObjectsInPlainText) {
                   kBrick));
 }
 
+// Zeros fold to a thousandth: what they unfold to is summed before memory is taken.
 TEST(MapFileSize, WhatUnfoldsToTooMuchIsRefused) {
   constexpr std::size_t kBytes = 8U << 20U;
   const std::string file = PackSections({{"ZERO", std::string(kBytes, '\0')}, {"MORE", "x"}});
