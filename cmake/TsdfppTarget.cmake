@@ -1,5 +1,41 @@
-# tsdfpp_compile_options(<target>): the warnings and floating-point rules that every target of the project shares.
+# tsdfpp_compile_together(<target>): those of its files that cmake/compiled_together.txt names in one line are compiled as
+# one, where CMAKE_UNITY_BUILD asks for it.
+function(tsdfpp_compile_together target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  get_target_property(sources ${target} SOURCES)
+  get_target_property(folder ${target} SOURCE_DIR)
+  foreach(source IN LISTS sources)
+    get_filename_component(path ${source} ABSOLUTE BASE_DIR ${folder})
+    file(RELATIVE_PATH path ${PROJECT_SOURCE_DIR} ${path})
+    get_property(group GLOBAL PROPERTY TSDFPP_GROUP_OF_${path})
+    if(group)
+      set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+    endif()
+  endforeach()
+endfunction()
+
+file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/compiled_together.txt lines REGEX "^[^#]")
+set_property(
+  DIRECTORY
+  APPEND
+  PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/compiled_together.txt)
+set(group 0)
+foreach(line IN LISTS lines)
+  math(EXPR group "${group} + 1")
+  separate_arguments(files UNIX_COMMAND "${line}")
+  foreach(file IN LISTS files)
+    get_property(other GLOBAL PROPERTY TSDFPP_GROUP_OF_${file})
+    if(other OR NOT EXISTS ${PROJECT_SOURCE_DIR}/${file})
+      message(FATAL_ERROR "cmake/compiled_together.txt: '${file}' is in two lines or no file")
+    endif()
+    set_property(GLOBAL PROPERTY TSDFPP_GROUP_OF_${file} together_${group})
+  endforeach()
+endforeach()
+
+# tsdfpp_compile_options(<target>): the warnings and floating-point rules that every target of the project shares, and which
+# of its files are compiled together.
 function(tsdfpp_compile_options target)
+  tsdfpp_compile_together(${target})
   target_compile_options(
     ${target}
     PRIVATE -Wall
@@ -83,7 +119,7 @@ endfunction()
 function(tsdfpp_order_tbb target)
   set(source ${PROJECT_SOURCE_DIR}/tests/sanitizers/tbb_happens_before.cc)
   target_sources(${target} PRIVATE ${source})
-  set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
+  set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
   target_link_libraries(${target} PRIVATE TBB::tbb ${CMAKE_DL_LIBS})
 endfunction()
 

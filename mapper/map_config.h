@@ -56,6 +56,8 @@ inline constexpr double kSmallestVoxel_m = 0.0005;
 
 inline constexpr double kLargestVoxel_m = 1;
 
+inline constexpr int kMostConfidence = 255;
+
 struct MapConfig {
   double voxel_m = 0.01;
   double trunc_front_voxels = 10;  // F / h

@@ -11,8 +11,6 @@
 
 namespace tsdfpp {
 
-inline constexpr int kMostConfidence = 255;
-
 struct ListEntry {
   InstanceId id = kNoInstance;
   std::int16_t confidence = 0;

@@ -6,6 +6,9 @@
 #include <cstdlib>
 #include <vector>
 
+#include "mapper/map_config.h"
+#include "mapper/volume/block_set.h"
+
 namespace tsdfpp {
 namespace {
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "mapper/map_representation.h"
+#include "mapper/methods/cast_by_removal.h"
 #include "tests/mapper/map_snapshot.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/reference/ray_reference.h"
