@@ -210,8 +210,8 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
   for (const Method method : AllMethods()) {
     runs.emplace_back();
     runs.back().name = MethodName(method);
-    runs.back().pipeline = std::make_unique<Pipeline>(
-        PipelineConfig{method, config, PoseSource::kGiven, {}}, info.objects);
+    runs.back().pipeline =
+        std::make_unique<Pipeline>(PipelineConfig{.method = method, .map = config}, info.objects);
   }
   Open3dVolume peer(config.voxel_m, options.open3d_band * config.voxel_m);
   double peer_growth_mb = 0;

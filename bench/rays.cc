@@ -117,7 +117,7 @@ Expected<void> RunRaysBench(const RaysBenchOptions& options) {
     }
   }
   for (const Method method : AllMethods()) {
-    Pipeline pipeline(PipelineConfig{method, map, PoseSource::kGiven, {}}, info.objects);
+    Pipeline pipeline(PipelineConfig{.method = method, .map = map}, info.objects);
     std::vector<RayTiming> timings;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       TSDFPP_RETURN_IF_ERROR(pipeline.Process(frames[i]));

@@ -13,7 +13,7 @@ Expected<MapConfig> ScalingConfig() {
 
 Pipeline ScalingPipeline(Method method, const MapConfig& config,
                          const std::vector<ObjectInfo>& objects) {
-  return Pipeline(PipelineConfig{method, config, PoseSource::kGiven, {}}, objects);
+  return Pipeline(PipelineConfig{.method = method, .map = config}, objects);
 }
 
 double Times::Median() const { return Quantile(0.5); }

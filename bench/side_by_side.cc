@@ -85,7 +85,7 @@ struct Timed {
 };
 
 Timed MakeTimed(Method method, const SideBySideCase& of, const std::vector<ObjectInfo>& objects) {
-  PipelineConfig config{method, {}, PoseSource::kGiven, {}};
+  PipelineConfig config{.method = method};
   config.map.voxel_m = of.voxel_m;
   config.map.trunc_front_voxels = of.truncation_voxels;
   config.map.trunc_back_voxels = of.truncation_voxels;

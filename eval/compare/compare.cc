@@ -54,7 +54,8 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   for (const PoseSource poses : config.poses) {
     for (const std::string& profile : config.profiles) {
       for (const Method method : config.methods) {
-        PipelineConfig pipeline{method, config.map, poses, config.icp};
+        PipelineConfig pipeline{
+            .method = method, .map = config.map, .poses = poses, .icp = config.icp};
         TSDFPP_RETURN_IF_ERROR(pipeline.map.SetProfile(profile));
         TSDFPP_RETURN_IF_ERROR(pipeline.map.Validate());
         runs.push_back(std::make_unique<CompareRun>(pipeline, profile, info.objects, truth));
