@@ -19,10 +19,10 @@ namespace tsdfpp {
 
 struct PipelineConfig {
   Method method = Method::kTsdfpp;
-  MapConfig map;
+  MapConfig map{};
   Segmentation segmentation = Segmentation::kGiven;
   PoseSource poses = PoseSource::kGiven;
-  IcpConfig icp;
+  IcpConfig icp{};
 };
 
 // Wall-clock seconds of the steps of one frame.
