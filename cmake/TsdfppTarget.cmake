@@ -1,3 +1,5 @@
+get_filename_component(TSDFPP_FOLDER ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)
+
 # tsdfpp_compile_together(<target>): those of its files that cmake/compiled_together.txt names in one line are compiled as
 # one, where CMAKE_UNITY_BUILD asks for it.
 function(tsdfpp_compile_together target)
@@ -6,7 +8,7 @@ function(tsdfpp_compile_together target)
   get_target_property(folder ${target} SOURCE_DIR)
   foreach(source IN LISTS sources)
     get_filename_component(path ${source} ABSOLUTE BASE_DIR ${folder})
-    file(RELATIVE_PATH path ${PROJECT_SOURCE_DIR} ${path})
+    file(RELATIVE_PATH path ${TSDFPP_FOLDER} ${path})
     get_property(group GLOBAL PROPERTY TSDFPP_GROUP_OF_${path})
     if(group)
       set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
@@ -25,7 +27,7 @@ foreach(line IN LISTS lines)
   separate_arguments(files UNIX_COMMAND "${line}")
   foreach(file IN LISTS files)
     get_property(other GLOBAL PROPERTY TSDFPP_GROUP_OF_${file})
-    if(other OR NOT EXISTS ${PROJECT_SOURCE_DIR}/${file})
+    if(other OR NOT EXISTS ${TSDFPP_FOLDER}/${file})
       message(FATAL_ERROR "cmake/compiled_together.txt: '${file}' is in two lines or no file")
     endif()
     set_property(GLOBAL PROPERTY TSDFPP_GROUP_OF_${file} together_${group})

@@ -67,7 +67,10 @@ TEST(StrippedTruth, NoMasksDoesNotReadTheMasks) {
   std::vector<Frame> poisoned = set->frames;
   for (std::size_t i = 0; i < stripped.size(); ++i) {
     stripped[i].mask = cv::Mat();
-    cv::flip(set->frames[i].mask, poisoned[i].mask, 0);
+    // A new image: the frames' copies share their pixels.
+    cv::Mat flipped;
+    cv::flip(set->frames[i].mask, flipped, 0);
+    poisoned[i].mask = flipped;
   }
   for (const Method method : {Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored}) {
     const auto map = [&](const std::vector<Frame>& frames, Segmentation segmentation) {
