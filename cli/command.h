@@ -24,6 +24,8 @@ struct CommandResult {
   nlohmann::json json;
   std::string text;
   int exit_code = 0;  // of a command that ran but whose verdict is not good
+  // A sentence for standard error, of a command that did a part of its work.
+  std::string complaint = {};
 };
 
 // Registers the subcommand's options on `app`; returns what to run once they are parsed.

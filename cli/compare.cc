@@ -143,13 +143,23 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   // What was finished is the result; that something was not decides the exit code.
   for (const std::string& line : FailureLines(result)) spdlog::error("{}", line);
   int exit_code = 0;
-  if (!result.failed.empty()) exit_code = static_cast<int>(result.failed.front().error.kind);
-  if (result.stopped) exit_code = static_cast<int>(result.stopped->kind);
+  std::string complaint;
+  if (!result.failed.empty()) {
+    exit_code = static_cast<int>(result.failed.front().error.kind);
+    complaint =
+        fmt::format("{} of {} maps failed, {} has what the others did", result.failed.size(),
+                    result.failed.size() + result.runs.size(), options.out);
+  }
+  if (result.stopped) {
+    exit_code = static_cast<int>(result.stopped->kind);
+    complaint = fmt::format("the frames ended after frame {}, {} has what was done until then",
+                            result.last_frame, options.out);
+  }
   return CommandResult{
       SummaryJson(result, command),
       FrontTable(result) + "\n" + SummaryTable(result) +
           fmt::format("report: {}/report.html ({:.0f} s)\n", options.out, result.total_s),
-      exit_code};
+      exit_code, complaint};
 }
 
 }  // namespace

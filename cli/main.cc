@@ -9,6 +9,7 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <sstream>
 
 #include "cli/command.h"
 #include "cli/log_lines.h"
@@ -23,6 +24,14 @@ using tsdfpp::CommonOptions;
 using tsdfpp::ErrorKind;
 
 constexpr std::size_t kMostOfAnOption = 300;  // shown of what was typed
+
+// Returns `exit_code`, or another one where the text cannot be printed.
+int Print(const std::string& text, int exit_code) {
+  if (std::fputs(text.c_str(), stdout) >= 0 && std::fflush(stdout) == 0) return exit_code;
+  tsdfpp::PrintError("tsdfpp",
+                     fmt::format("the result cannot be printed ({})", std::strerror(errno)));
+  return static_cast<int>(ErrorKind::kEnvironment);
+}
 
 int RunCommand(int argc, char** argv) {
   CLI::App app("tsdfpp: measures what maps keep of surfaces that they can no longer see", "tsdfpp");
@@ -59,7 +68,9 @@ int RunCommand(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
-    return app.exit(help);
+    std::ostringstream text;
+    app.exit(help, text);
+    return Print(text.str(), 0);
   } catch (const CLI::ParseError& error) {
     // CLI11 misses the subcommand before it looks at the word that is none.
     const CLI::App* deepest = &app;
@@ -85,12 +96,9 @@ int RunCommand(int argc, char** argv) {
     return static_cast<int>(result.error().kind);
   }
   const std::string text = common.json ? tsdfpp::JsonText(result->json, 2) + "\n" : result->text;
-  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0) {
-    tsdfpp::PrintError("tsdfpp",
-                       fmt::format("the result cannot be printed ({})", std::strerror(errno)));
-    return static_cast<int>(ErrorKind::kEnvironment);
-  }
-  return result->exit_code;
+  const int exit_code = Print(text, result->exit_code);
+  if (!result->complaint.empty()) tsdfpp::PrintError("tsdfpp", result->complaint);
+  return exit_code;
 }
 
 }  // namespace

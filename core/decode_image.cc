@@ -28,6 +28,12 @@ Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, 
     return DataError("{}: is to be turned or mirrored, orientation {}, expected 1", where,
                      header.orientation);
   }
+  if (as == DecodeAs::kNumbers && header.is_stretched) {
+    return DataError(
+        "{}: its values are stretched to 0 to 255 when they are read, expected 8 or 16 bits a "
+        "value",
+        where);
+  }
   const int flags = as == DecodeAs::kColour ? cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION
                                             : cv::IMREAD_UNCHANGED;
   const bool is_exr = header.format == ImageFormat::kExr;
@@ -50,6 +56,11 @@ Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, 
     }
   }
   if (image.empty()) return DataError("{}: cannot be decoded as an image", where);
+  // Callers rely on what was checked of the header.
+  if (image.cols != header.width || image.rows != header.height) {
+    return DataError("{}: the image is {}x{}, expected {}x{} (its header)", where, image.cols,
+                     image.rows, header.width, header.height);
+  }
   return image;
 }
 

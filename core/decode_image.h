@@ -16,14 +16,16 @@ namespace tsdfpp {
 enum class DecodeAs {
   kAsItIs,  // the type on disk; of colours the order is blue, green, red
   kColour,  // CV_8UC3, blue-green-red
+  kNumbers  // as it is, of images whose values are the ones on disk
 };
 
 // What the caller asks of the header and the file's bytes, before any pixel is made.
 using HeaderCheck = std::function<Expected<void>(const ImageHeader&, std::string_view bytes)>;
 
 // As stored: what a JPEG says of turning it is not followed. Errors: kData, beginning with `where`:
-// those of ReadImageHeader and of `check`; a TIFF that is to be turned; pixels that cannot be
-// decoded. An EXR image is decoded from its file only: see below.
+// those of ReadImageHeader and of `check`; a TIFF that is to be turned; for kNumbers values that a
+// decoder stretches; pixels that cannot be decoded, or are of another size than the header says. An
+// EXR image is decoded from its file only: see below.
 Expected<cv::Mat> DecodeImage(std::string_view bytes, const std::string& where,
                               DecodeAs as = DecodeAs::kAsItIs, const HeaderCheck& check = {});
 

@@ -39,16 +39,20 @@ class Cursor {
 };
 
 std::vector<ExrChannel> ChannelsOf(std::string_view list) {
-  // Linearity, three reserved bytes and two sampling rates follow the type.
-  constexpr std::size_t kRestOfAChannel = 12;
+  // Linearity and three reserved bytes.
+  constexpr std::size_t kUnused = 4;
   std::vector<ExrChannel> channels;
   Cursor cursor(list);
   while (true) {
     const auto name = cursor.TakeText();
     if (!name || name->empty()) return channels;
     const auto type = cursor.TakeInt();
-    if (!type || *type > 2 || !cursor.Take(kRestOfAChannel)) return {};
-    channels.push_back({std::string(*name), static_cast<ExrType>(*type)});
+    if (!type || *type > 2 || !cursor.Take(kUnused)) return {};
+    const auto x_sampling = cursor.TakeInt();
+    const auto y_sampling = cursor.TakeInt();
+    if (!x_sampling || !y_sampling) return {};
+    channels.push_back(
+        {std::string(*name), static_cast<ExrType>(*type), *x_sampling == 1 && *y_sampling == 1});
   }
 }
 

@@ -15,6 +15,7 @@ enum class ExrType { kInteger = 0, kHalf = 1, kFloat = 2 };
 struct ExrChannel {
   std::string name;
   ExrType type = ExrType::kFloat;
+  bool has_all_pixels = true;  // its sampling rates are 1
 };
 
 struct ExrHeader {

@@ -34,9 +34,14 @@ Expected<std::vector<fs::path>> ListFilesBelow(const fs::path& folder) {
   std::error_code code;
   for (fs::recursive_directory_iterator at(folder, code), end; !code && at != end;
        at.increment(code)) {
-    std::error_code ignored;
-    const bool is_link = at->is_symlink(ignored);
-    if (is_link || !at->is_directory(ignored)) files.push_back(at->path());
+    // Its path may be longer than the system takes.
+    std::error_code unseen;
+    const fs::file_type type = at->symlink_status(unseen).type();
+    if (unseen && type != fs::file_type::not_found) {
+      code = unseen;
+      break;
+    }
+    if (type != fs::file_type::directory) files.push_back(at->path());
   }
   if (code) return tl::unexpected(CannotList(folder, code));
   std::sort(files.begin(), files.end());

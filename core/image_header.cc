@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <optional>
 
 #include "core/exr_header.h"
@@ -57,6 +58,7 @@ std::optional<ImageHeader> PngHeader(std::string_view file) {
   const auto type = bytes.Big(25, 1);
   if (!bytes.ok() || type > 6) return std::nullopt;
   header.channels = kChannels[type];
+  header.is_stretched = header.channels == 1 && header.bits < 8;
   return header;
 }
 
@@ -105,7 +107,7 @@ std::optional<ImageHeader> PnmHeader(std::string_view file) {
   for (int i = 0; i < (bitmap ? 2 : 3); ++i) {
     while (at < file.size() &&
            (std::isspace(static_cast<unsigned char>(file[at])) != 0 || file[at] == '#')) {
-      at = file[at] == '#' ? std::min(file.find('\n', at), file.size()) : at + 1;
+      at = file[at] == '#' ? std::min(file.find_first_of("\n\r", at), file.size()) : at + 1;
     }
     const std::size_t begin = at;
     for (numbers[i] = 0; at < file.size() && file[at] >= '0' && file[at] <= '9'; ++at) {
@@ -114,8 +116,10 @@ std::optional<ImageHeader> PnmHeader(std::string_view file) {
     }
     if (at == begin) return std::nullopt;
   }
-  return ImageHeader{ImageFormat::kPnm, numbers[0], numbers[1], kind == '3' || kind == '6' ? 3 : 1,
+  ImageHeader header{ImageFormat::kPnm, numbers[0], numbers[1], kind == '3' || kind == '6' ? 3 : 1,
                      bitmap ? 1 : (numbers[2] > 255 ? 16 : 8)};
+  header.is_stretched = numbers[2] < 255;
+  return header;
 }
 
 // The first image's directory, of which each tag is there once.
@@ -137,7 +141,9 @@ std::optional<ImageHeader> TiffHeader(std::string_view file) {
     const std::size_t at = directory + count_bytes + entry_bytes * static_cast<std::size_t>(i);
     const auto tag = number(at, 2);
     const auto type = number(at + 2, 2);
-    const std::size_t size = type == 3 ? 2 : (type == 16 ? 8 : 4);  // SHORT, LONG8, LONG
+    // BYTE, ASCII, SHORT and LONG, and their like; the longer ones are no sides of an image.
+    constexpr std::size_t kSizes[] = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4, 0, 0, 8, 8, 8};
+    const std::size_t size = type < std::size(kSizes) ? kSizes[type] : 0;
     // Several values (a channel each) lie elsewhere where they do not fit; one is enough.
     const auto values = number(at + 4, large ? 8 : 4);
     std::size_t value_at = at + (large ? 12 : 8);
@@ -157,6 +163,7 @@ std::optional<ImageHeader> TiffHeader(std::string_view file) {
       header.orientation = static_cast<int>(number(value_at, size) & 0xFFFFU);
     }
   }
+  header.is_stretched = header.bits < 8;
   return bytes.ok() ? std::optional(header) : std::nullopt;
 }
 

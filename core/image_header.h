@@ -19,6 +19,9 @@ struct ImageHeader {
   // How TIFF's tag 274 says that it is to be turned or mirrored: 1 as it is stored, 2 to 8
   // otherwise.
   int orientation = 1;
+  // Decoders stretch its values to 0 to 255: grey of less than 8 bits, PNM of a lower greatest
+  // value.
+  bool is_stretched = false;
 };
 
 // By the bytes, not by the file's name. `where` begins the sentence. Errors: kData where the format

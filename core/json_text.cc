@@ -76,6 +76,26 @@ std::string JsonShown(const nlohmann::json& value) {
   return OneLine(JsonText(value), kMostShownJson);
 }
 
+Expected<void> CheckTextsAreShowable(const nlohmann::json& value, std::string_view where) {
+  const auto check = [&](const std::string& text) -> Expected<void> {
+    if (IsShowable(text)) return {};
+    return DataError("{}: the text {} holds control characters, expected none", where,
+                     Quoted(text));
+  };
+  if (value.is_string()) return check(value.get_ref<const std::string&>());
+  if (value.is_object()) {
+    for (const auto& [name, member] : value.items()) {
+      TSDFPP_RETURN_IF_ERROR(check(name));
+      TSDFPP_RETURN_IF_ERROR(CheckTextsAreShowable(member, where));
+    }
+  } else if (value.is_array()) {
+    for (const nlohmann::json& element : value) {
+      TSDFPP_RETURN_IF_ERROR(CheckTextsAreShowable(element, where));
+    }
+  }
+  return {};
+}
+
 std::optional<std::int64_t> WholeIn(const nlohmann::json& value, std::int64_t lowest,
                                     std::int64_t highest) {
   if (!value.is_number_integer()) return std::nullopt;

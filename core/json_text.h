@@ -33,6 +33,10 @@ std::string JsonText(const nlohmann::ordered_json& value, int indent = -1);
 // A value for a message: at most 100 bytes of its text.
 std::string JsonShown(const nlohmann::json& value);
 
+// Whether all texts in the value, names of members too, are fit to be shown (core/one_line.h).
+// Errors: kData, naming the first that is not; `where` begins the sentence.
+Expected<void> CheckTextsAreShowable(const nlohmann::json& value, std::string_view where);
+
 // The whole number from `lowest` to `highest`; nothing where the value is another.
 std::optional<std::int64_t> WholeIn(const nlohmann::json& value, std::int64_t lowest,
                                     std::int64_t highest);

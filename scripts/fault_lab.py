@@ -158,6 +158,8 @@ class Lab:
     def judge_left(self, command, trial, outcome):
         """Whether what is left is whole files of one run or of the other, and what its readers make of it."""
         learned = self.learned[command.name]
+        if fault_trees.is_part_of_a_run(os.path.join(trial, "out")):
+            return "part"
         before, whole = fault_trees.visible(learned.before), fault_trees.visible(learned.whole)
         left = fault_trees.visible(fault_trees.content_of(trial))
         state = "whole" if left == whole else "before" if left == before else "between"

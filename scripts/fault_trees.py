@@ -132,6 +132,28 @@ def content_of(folder):
     return content
 
 
+def is_part_of_a_run(folder):
+    """Whether a comparison says of itself that a map failed or that frames ended early, and all that its note lists is
+    there in its size, and nothing else: it keeps what was finished."""
+    try:
+        with open(os.path.join(folder, "summary.json"), encoding="utf-8") as file:
+            summary = json.load(file)
+        with open(os.path.join(folder, "run.json"), encoding="utf-8") as file:
+            listed = {entry["name"]: entry["bytes"] for entry in json.load(file)["files"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    if not (summary.get("failed") or summary.get("stopped")):
+        return False
+    found = {}
+    for place, _, names in os.walk(folder):
+        for name in names:
+            path = os.path.relpath(os.path.join(place, name), folder)
+            if not is_hidden(path):
+                found[path] = os.path.getsize(os.path.join(folder, path))
+    found.pop("run.json", None)
+    return found.keys() == listed.keys() and all(size in (None, found[name]) for name, size in listed.items())
+
+
 def is_hidden(path):
     """Hidden, or the name of a file that is being written: nobody takes it for a result."""
     return any(part.startswith(".") or part.endswith(".part") for part in path.split(os.sep))

@@ -4,8 +4,8 @@
 # Usage: bash scripts/fuzz.sh [--minutes M] [--targets a,b] [--jobs N] [--record FILE]
 #        bash scripts/fuzz.sh --bundle DIR     the program, its libraries and the corpora, to be run elsewhere: DIR/run.sh
 #        bash scripts/fuzz.sh --import DIR     adds what DIR/run.sh left in its $OUT
-# M is 1 by default and may be a fraction, N the number of cores, FILE results/fuzz.json. With 0 minutes the record alone
-# is made anew: the lines that the corpora reach.
+# M is minutes of a core, 1 by default, and may be a fraction, N the number of cores, FILE results/fuzz.json. With 0
+# minutes the record alone is made anew: the lines that the corpora reach.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 minutes=1

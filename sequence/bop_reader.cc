@@ -1,3 +1,5 @@
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -119,6 +121,10 @@ class BopOpener {
       if (!((*k)[0] > 0) || !((*k)[4] > 0) || !(scale->get<double>() > 0)) {
         return DataError("{}: focal lengths {} and {} and depth_scale {}, expected all over 0",
                          where, (*k)[0], (*k)[4], scale->get<double>());
+      }
+      if ((*k)[1] != 0 || (*k)[3] != 0 || (*k)[6] != 0 || (*k)[7] != 0 || (*k)[8] != 1) {
+        return DataError("{}: cam_K is {}, expected a camera without skew: fx 0 cx 0 fy cy 0 0 1",
+                         where, fmt::join(*k, " "));
       }
       FrameFiles frame;
       frame.number = number;
@@ -249,8 +255,10 @@ class BopOpener {
   // mask_visib/ where it is there; else mask/, whose silhouettes are painted from far to near.
   Expected<void> SetMasks() {
     if (objects_.empty()) return {};
-    const bool visible = !NamesIn(scene_ / "mask_visib").empty();
-    if (!visible && NamesIn(scene_ / "mask").empty()) return {};
+    TSDFPP_ASSIGN(const auto visible_names, NamesIn(scene_ / "mask_visib"));
+    TSDFPP_ASSIGN(const auto whole_names, NamesIn(scene_ / "mask"));
+    const bool visible = !visible_names.empty();
+    if (!visible && whole_names.empty()) return {};
     const char* folder = visible ? "mask_visib" : "mask";
     if (!visible) {
       notes_.push_back(fmt::format(
@@ -313,10 +321,12 @@ class BopOpener {
 };
 
 // The scene folders two levels below, e.g. test/000001.
-std::vector<fs::path> ScenesBelow(const fs::path& folder) {
+Expected<std::vector<fs::path>> ScenesBelow(const fs::path& folder) {
   std::vector<fs::path> scenes;
-  for (const std::string& split : NamesIn(folder)) {
-    for (const std::string& scene : NamesIn(folder / split)) {
+  TSDFPP_ASSIGN(const auto splits, NamesIn(folder));
+  for (const std::string& split : splits) {
+    TSDFPP_ASSIGN(const auto names, NamesIn(folder / split));
+    for (const std::string& scene : names) {
       if (Exists(folder / split / scene / bop::kCamera)) scenes.push_back(folder / split / scene);
     }
   }
@@ -329,7 +339,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenBop(const fs::path& folder,
                                                  const SequenceOptions& options,
                                                  SequenceNotes& notes) {
   if (Exists(folder / bop::kCamera)) return BopOpener(folder, options, notes).Open();
-  const std::vector<fs::path> scenes = ScenesBelow(folder);
+  TSDFPP_ASSIGN(const std::vector<fs::path> scenes, ScenesBelow(folder));
   if (scenes.size() == 1) return BopOpener(scenes.front(), options, notes).Open();
   return DataError("{}: no {} here and {} scenes below, expected the folder of one scene",
                    folder.string(), bop::kCamera, scenes.size());

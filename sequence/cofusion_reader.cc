@@ -27,17 +27,11 @@ bool Exists(const fs::path& path) {
   return fs::exists(path, code);
 }
 
-// The sorted names of the files in a folder; none where it is not one.
-std::vector<std::string> FileNames(const fs::path& folder) {
-  std::vector<std::string> names;
-  for (const fs::path& entry : EntriesOf(folder)) names.push_back(entry.filename().string());
-  return names;
-}
-
 // First number and count of the images in colour/. Errors: none, a gap, another first number.
 Expected<std::pair<int, int>> NumbersOfImages(const fs::path& folder) {
   std::set<int> numbers;
-  for (const std::string& name : FileNames(folder / cofusion::kColour)) {
+  TSDFPP_ASSIGN(const auto names, NamesIn(folder / cofusion::kColour));
+  for (const std::string& name : names) {
     if (const auto number = cofusion::NumberOf(name, "Color", ".png")) numbers.insert(*number);
   }
   const std::string colour = (folder / cofusion::kColour).string();
@@ -110,7 +104,8 @@ class CofusionSource : public FrameSource {
       }
     }
     std::map<InstanceId, TrueModel> truth;
-    for (const std::string& name : FileNames(models)) {
+    TSDFPP_ASSIGN(const auto names, NamesIn(models));
+    for (const std::string& name : names) {
       const auto file = cofusion::ObjectOf(name, "", ".ply");
       if (!file) continue;
       const auto object =
@@ -177,7 +172,8 @@ class CofusionSource : public FrameSource {
 
   Expected<void> ReadTrajectories() {
     TSDFPP_ASSIGN(camera_, ReadTrajectory(folder_ / cofusion::kCameraTrajectory));
-    for (const std::string& name : FileNames(folder_ / cofusion::kTrajectories)) {
+    TSDFPP_ASSIGN(const auto names, NamesIn(folder_ / cofusion::kTrajectories));
+    for (const std::string& name : names) {
       const fs::path path = folder_ / cofusion::kTrajectories / name;
       if (!name.starts_with("gt-") || !name.ends_with(".txt")) continue;
       const auto object = cofusion::ObjectOf(name, "gt-", ".txt");

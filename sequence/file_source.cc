@@ -159,7 +159,8 @@ Expected<std::vector<fs::path>> FindMasks(const fs::path& folder,
                                           const std::vector<std::string>& stems,
                                           SequenceNotes& notes) {
   for (const char* name : {"mask", "masks"}) {
-    if (NamesIn(folder / name).empty()) continue;
+    TSDFPP_ASSIGN(const auto there, NamesIn(folder / name));
+    if (there.empty()) continue;
     std::vector<fs::path> masks;
     for (const std::string& stem : stems) {
       masks.push_back(folder / name / (stem + ".png"));
@@ -171,7 +172,8 @@ Expected<std::vector<fs::path>> FindMasks(const fs::path& folder,
     }
     return masks;
   }
-  for (const std::string& name : NamesIn(folder)) {
+  TSDFPP_ASSIGN(const auto names, NamesIn(folder));
+  for (const std::string& name : names) {
     std::error_code code;
     const bool is_mask = name.find("mask") != name.npos || name.find("label") != name.npos ||
                          name.find("seg") != name.npos || name.find("instance") != name.npos;

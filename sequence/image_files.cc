@@ -36,8 +36,9 @@ Expected<void> CheckHeaderSize(const ImageHeader& header, cv::Size expected,
 }
 
 Expected<cv::Mat> Decode(const fs::path& path, cv::Size expected,
-                         const std::string& size_source = "calibration.txt") {
-  return ReadImageFile(path, DecodeAs::kAsItIs, [&](const ImageHeader& header, std::string_view) {
+                         const std::string& size_source = "calibration.txt",
+                         DecodeAs as = DecodeAs::kAsItIs) {
+  return ReadImageFile(path, as, [&](const ImageHeader& header, std::string_view) {
     return CheckHeaderSize(header, expected, size_source, path.string());
   });
 }
@@ -101,6 +102,10 @@ Expected<void> CheckDepthChannels(std::string_view bytes, const std::string& fil
       return DataError("{}: depth of an integer type (channel {}), expected 32-bit float metres",
                        file, OneLine(channel.name, 100));
     }
+    if (!channel.has_all_pixels) {
+      return DataError("{}: channel {} does not hold every pixel, expected sampling rates of 1",
+                       file, OneLine(channel.name, 100));
+    }
   }
   const bool colours = names.contains("R") && names.contains("G") && names.contains("B");
   if (!colours && names != std::set<std::string>{"Y"}) {
@@ -135,7 +140,7 @@ Expected<void> CheckImageSize(const cv::Mat& image, cv::Size expected,
                    expected.width, expected.height, size_source);
 }
 
-Expected<cv::Mat> ReadImage(const fs::path& path) { return Decode(path, {}); }
+Expected<cv::Mat> ReadImage(const fs::path& path, DecodeAs as) { return Decode(path, {}, "", as); }
 
 Expected<cv::Mat> DecodeColour(const std::string& bytes, const std::string& file) {
   TSDFPP_ASSIGN(const cv::Mat image, DecodeImage(bytes, file));
@@ -226,7 +231,7 @@ Expected<cv::Mat> ReadDepth(const fs::path& path, cv::Size expected) {
 }
 
 Expected<cv::Mat> ReadMask(const fs::path& path, cv::Size expected) {
-  TSDFPP_ASSIGN(cv::Mat mask, Decode(path, expected));
+  TSDFPP_ASSIGN(cv::Mat mask, Decode(path, expected, "calibration.txt", DecodeAs::kNumbers));
   if (mask.depth() != CV_8U || mask.channels() == 2) {
     return DataError("{}: the mask is {}, expected 8-bit grey ids", path.string(),
                      ImageTypeName(mask));

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "core/decode_image.h"
 #include "core/error.h"
 
 namespace tsdfpp {
@@ -31,7 +32,7 @@ Expected<cv::Mat> ReadDepth(const std::filesystem::path& path, cv::Size expected
 Expected<cv::Mat> ReadMask(const std::filesystem::path& path, cv::Size expected);
 
 // Any image, with the type that it has on disk (channels blue-green-red).
-Expected<cv::Mat> ReadImage(const std::filesystem::path& path);
+Expected<cv::Mat> ReadImage(const std::filesystem::path& path, DecodeAs as = DecodeAs::kAsItIs);
 // ReadColour of an image file's bytes.
 Expected<cv::Mat> DecodeColour(const std::string& bytes, const std::string& file);
 // The bytes of an image of 8 or 16 bits as it is.

@@ -55,7 +55,7 @@ Expected<cv::Mat> ReadIntegerDepth(const std::filesystem::path& path, cv::Size e
 
 Expected<cv::Mat> ReadIds(const std::filesystem::path& path, cv::Size expected,
                           const std::string& size_source) {
-  TSDFPP_ASSIGN(const cv::Mat image, ReadImage(path));
+  TSDFPP_ASSIGN(const cv::Mat image, ReadImage(path, DecodeAs::kNumbers));
   TSDFPP_RETURN_IF_ERROR(CheckImageSize(image, expected, size_source, path.string()));
   if (image.type() == CV_16UC1) return image;
   return ReadMask(path, expected);

@@ -233,7 +233,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenKlg(const fs::path& path,
   fs::path file = path;
   if (fs::is_directory(path, code)) {
     std::vector<std::string> recordings;
-    for (const std::string& name : NamesIn(path)) {
+    TSDFPP_ASSIGN(const auto names, NamesIn(path));
+    for (const std::string& name : names) {
       if (name.ends_with(".klg")) recordings.push_back(name);
     }
     if (recordings.size() != 1) {

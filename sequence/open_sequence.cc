@@ -21,10 +21,15 @@ bool Exists(const fs::path& path) {
   return fs::exists(path, code);
 }
 
+// Of a folder that cannot be read the reader says so.
+std::vector<std::string> NamesOrNone(const fs::path& folder) {
+  return NamesIn(folder).value_or(std::vector<std::string>());
+}
+
 bool HoldsBopScene(const fs::path& folder) {
   if (Exists(folder / bop::kCamera)) return true;
-  for (const std::string& split : NamesIn(folder)) {
-    for (const std::string& scene : NamesIn(folder / split)) {
+  for (const std::string& split : NamesOrNone(folder)) {
+    for (const std::string& scene : NamesOrNone(folder / split)) {
       if (Exists(folder / split / scene / bop::kCamera)) return true;
     }
   }
@@ -33,7 +38,7 @@ bool HoldsBopScene(const fs::path& folder) {
 
 bool LooksLike(const fs::path& path, DatasetFormat format) {
   const auto any_name = [&](const char* prefix, const char* suffix) {
-    const auto names = NamesIn(path);
+    const auto names = NamesOrNone(path);
     return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
       return name.starts_with(prefix) && name.ends_with(suffix);
     });

@@ -60,7 +60,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
 
   const fs::path trajectory = folder / "traj.txt";
   TSDFPP_ASSIGN(const std::vector<TextLine> lines, ReadTextLines(trajectory));
-  for (const std::string& name : NamesIn(folder / "results")) {
+  TSDFPP_ASSIGN(const auto names, NamesIn(folder / "results"));
+  for (const std::string& name : names) {
     const auto number = cofusion::NumberOf(name, "depth", ".png");
     if (!number) continue;
     if (static_cast<std::size_t>(*number) >= lines.size()) {

@@ -54,7 +54,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenScannet(const fs::path& folder,
                     sequence.name));
   }
   std::vector<std::pair<int, std::string>> stems;  // sorted by number, not by name
-  for (const std::string& name : NamesIn(folder / "depth")) {
+  TSDFPP_ASSIGN(const auto names, NamesIn(folder / "depth"));
+  for (const std::string& name : names) {
     const std::string stem = fs::path(name).stem().string();
     const auto number = ParseWholeNumber(stem);
     if (number && name.ends_with(".png")) stems.emplace_back(*number, stem);

@@ -31,7 +31,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
   }
   int masks = 0;
   bool has_labels = false;
-  for (const std::string& name : NamesIn(folder)) {
+  TSDFPP_ASSIGN(const auto names, NamesIn(folder));
+  for (const std::string& name : names) {
     has_labels |= name.ends_with(".label.png");
     const auto number = cofusion::NumberOf(name, "frame-", ".depth.png");
     if (!number) continue;

@@ -65,9 +65,13 @@ Expected<std::vector<double>> ReadNumbers(const fs::path& path) {
   return numbers;
 }
 
-std::vector<std::string> NamesIn(const fs::path& folder) {
+Expected<std::vector<std::string>> NamesIn(const fs::path& folder) {
+  std::error_code code;
+  const fs::file_type type = fs::status(folder, code).type();
   std::vector<std::string> names;
-  for (const fs::path& entry : EntriesOf(folder)) names.push_back(entry.filename().string());
+  if (type == fs::file_type::not_found || (!code && type != fs::file_type::directory)) return names;
+  TSDFPP_ASSIGN(const std::vector<fs::path> entries, ListFolder(folder));
+  for (const fs::path& entry : entries) names.push_back(entry.filename().string());
   return names;
 }
 

@@ -28,8 +28,9 @@ std::optional<int> ParseWholeNumber(std::string_view word);
 // All words of a file as numbers. Errors: kData, naming file, line and word.
 Expected<std::vector<double>> ReadNumbers(const std::filesystem::path& path);
 
-// The sorted names of what lies in a folder; none where it is not one.
-std::vector<std::string> NamesIn(const std::filesystem::path& folder);
+// The sorted names of what lies in a folder; none where there is no such folder. Errors: kData
+// where it is there and cannot be read.
+Expected<std::vector<std::string>> NamesIn(const std::filesystem::path& folder);
 
 // The folder's own name, also where the path ends with a slash or is ".", as text of one line.
 std::string NameOfFolder(const std::filesystem::path& folder);

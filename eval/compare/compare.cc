@@ -79,6 +79,18 @@ void RemoveStrays(AdapterRun& run, const std::filesystem::path& out,
   }
 }
 
+// Folders nested so deep that no path leads to what is in them would be the comparison's end.
+void RemoveWhatCannotBeListed(AdapterRun& run) {
+  const auto files = ListFilesBelow(run.folder);
+  if (files) return;
+  std::error_code ignored;
+  std::filesystem::remove_all(run.folder, ignored);
+  std::filesystem::create_directory(run.folder, ignored);
+  run.failure = Error{ErrorKind::kData,
+                      WithShownFolder(run, fmt::format("{}: what it left is removed: {}",
+                                                       run.config.name, files.error().message))};
+}
+
 // Runs the adapters, one after the other, on the frames as they are given to a mapper.
 Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const RunFolder& folder,
                            CompareResult& result) {
@@ -102,6 +114,7 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const 
     done = RunAdapter(run, task, out / adapter.name, folder.out() / adapter.name);
     if (!done) break;
     RemoveStrays(run, out, before);
+    RemoveWhatCannotBeListed(run);
   }
   for (const auto& [layout, sequence] : sequences) {
     std::error_code ignored;

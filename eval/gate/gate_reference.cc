@@ -79,6 +79,7 @@ Expected<References> LoadReferences(const std::filesystem::path& file) {
                      read.error().message);
   }
   const nlohmann::json& json = *read;
+  TSDFPP_RETURN_IF_ERROR(CheckTextsAreShowable(json, file.string()));
   try {
     if (const nlohmann::json& schema = json.at("schema"); schema != kReferencesSchema) {
       return DataError("{}: has schema {}, expected {}", file.string(), JsonShown(schema),

@@ -5,7 +5,7 @@
 namespace tsdfpp {
 
 Expected<cv::Mat> ReadNumbers(const std::filesystem::path& path, bool rgb_id) {
-  TSDFPP_ASSIGN(const cv::Mat image, ReadImageFile(path));
+  TSDFPP_ASSIGN(const cv::Mat image, ReadImageFile(path, DecodeAs::kNumbers));
   cv::Mat numbers;
   if (!rgb_id && (image.type() == CV_8UC1 || image.type() == CV_16UC1)) {
     image.convertTo(numbers, CV_32SC1);

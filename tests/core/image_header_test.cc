@@ -106,6 +106,58 @@ TEST(ImageHeader, TurnedImagesAreRefused) {
             "x.tiff: is to be turned or mirrored, orientation 6, expected 1");
 }
 
+// Where header and decoder read different sizes, what is checked of the one does not hold of the
+// other.
+TEST(ImageHeader, SizesAreThoseThatAreDecoded) {
+  // OpenCV ends a comment at a carriage return, too.
+  const std::string pgm = "P5\n#\r4 2 255\n80 45 255\n"s + std::string(80 * 45, '\x07');
+  const auto header = ReadImageHeader(pgm, "x.pgm");
+  ASSERT_TRUE(header.has_value());
+  EXPECT_EQ(header->width, 4);
+  EXPECT_EQ(header->height, 2);
+  // A TIFF's width in one byte, the rest of its place being something else.
+  std::string tiff = Encoded(".tiff", cv::Mat(37, 53, CV_8UC1, cv::Scalar(1)));
+  const auto number = [&](std::size_t at, std::size_t size) {
+    std::size_t value = 0;
+    for (std::size_t i = size; i-- > 0;) {
+      value = value << 8U | static_cast<unsigned char>(tiff[at + i]);
+    }
+    return value;
+  };
+  const std::size_t directory = number(4, 4);
+  for (std::size_t i = 0; i < number(directory, 2); ++i) {
+    const std::size_t at = directory + 2 + 12 * i;
+    if (number(at, 2) != 256) continue;
+    tiff[at + 2] = 1;
+    tiff[at + 9] = 1;
+  }
+  const auto one_byte = ReadImageHeader(tiff, "x.tiff");
+  ASSERT_TRUE(one_byte.has_value());
+  EXPECT_EQ(one_byte->width, 53);
+}
+
+TEST(ImageHeader, NumbersAreNotStretched) {
+  const auto decode = [](const std::string& bytes, DecodeAs as) {
+    const auto image = DecodeImage(bytes, "x", as);
+    return image ? std::to_string(int{image->at<std::uint8_t>(0, 0)}) : image.error().message;
+  };
+  const std::string refused =
+      "x: its values are stretched to 0 to 255 when they are read, expected 8 or 16 bits a value";
+  for (const std::string& pnm :
+       {"P2\n2 1\n4\n1 1\n"s, "P5\n2 1\n4\n\x01\x01"s, "P1\n2 1\n1 0\n"s}) {
+    EXPECT_EQ(decode(pnm, DecodeAs::kNumbers), refused) << pnm;
+    EXPECT_NE(decode(pnm, DecodeAs::kAsItIs), refused) << pnm;
+  }
+  EXPECT_EQ(decode("P2\n2 1\n255\n1 1\n", DecodeAs::kNumbers), "1");
+  std::vector<unsigned char> bits;
+  cv::imencode(".png", cv::Mat(2, 2, CV_8UC1, cv::Scalar(255)), bits, {cv::IMWRITE_PNG_BILEVEL, 1});
+  const std::string png(bits.begin(), bits.end());
+  ASSERT_EQ(ReadImageHeader(png, "x")->bits, 1);
+  EXPECT_EQ(decode(png, DecodeAs::kNumbers), refused);
+  EXPECT_EQ(decode(Encoded(".png", cv::Mat(2, 2, CV_8UC1, cv::Scalar(9))), DecodeAs::kNumbers),
+            "9");
+}
+
 TEST(ImageHeader, ExrIsReadFromItsFile) {
   setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
   const TempFolder folder;

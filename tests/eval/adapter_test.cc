@@ -285,6 +285,19 @@ TEST_F(AdapterCompare, ALayoutMayBeChosenAndOldFilesDoNotCount) {
   EXPECT_TRUE(result->adapters[0]->failure.has_value());
 }
 
+// So deep that the whole path is longer than the system takes: no path leads to the innermost.
+TEST_F(AdapterCompare, FoldersNestedTooDeepAreItsFailure) {
+  BoxSource source(7);
+  const CompareConfig config = Alone(Script(
+      "deep", std::string(kCopy) + "; exec /usr/bin/python3 -c 'import os\nfor i in range(300):\n"
+                                   " os.mkdir(\"a\" * 25)\n os.chdir(\"a\" * 25)'"));
+  const auto result = RunCompare(source, config, folder_ / "out", "the command", {});
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  const auto& failure = result->adapters[0]->failure;
+  ASSERT_TRUE(failure.has_value());
+  EXPECT_TRUE(failure->message.starts_with("deep: what it left is removed: ")) << failure->message;
+}
+
 // They would stand in the way of the run's own files, or pass for some.
 TEST_F(AdapterCompare, WhatIsLeftBesideItsFolderIsRemovedAndSaid) {
   BoxSource source(7);

@@ -211,7 +211,8 @@ TEST(ReferencesTest, ComeBackFromTheFile) {
 
   EXPECT_TRUE(LoadReferences(folder.path() / "none.json")->empty());
   for (const char* wrong : {"", "[]", "{\"schema\": 1}", "{\"schema\": 2, \"gates\": {}}",
-                            "{\"schema\": 1, \"gates\": {\"g\": {\"question\": 3}}}"}) {
+                            "{\"schema\": 1, \"gates\": {\"g\": {\"question\": 3}}}",
+                            "{\"schema\": 1, \"gates\": {\"g\\u001b[31m\": {}}}"}) {
     ASSERT_TRUE(WriteFile(file, wrong));
     const auto refused = LoadReferences(file);
     ASSERT_FALSE(refused.has_value()) << wrong;

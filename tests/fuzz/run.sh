@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Fuzzes targets, some at a time, each for some seconds, and goes on from the corpus that it left the last time. Needs
-# nothing but bash: `scripts/fuzz.sh --bundle DIR` copies it with all that it runs. Beside it lie tsdfpp_fuzz, corpus/
-# and, where the libraries are not installed, lib/.
+# Fuzzes targets, some at a time, each for some seconds of a core, and goes on from the corpus that it left the last time.
+# A machine that is busy with other things takes longer for them. Needs nothing but bash: `scripts/fuzz.sh --bundle DIR`
+# copies it with all that it runs. Beside it lie tsdfpp_fuzz, corpus/ and, where the libraries are not installed, lib/.
 # Usage: bash run.sh [--seconds S] [--jobs N] [--targets a,b]
 # In the environment: OUT, where $OUT/<target>/ gets corpus/, crashes/, logs and runs.tsv (by default ./out); FUZZ_HOME,
 # where the program and the corpora are, if not beside this script.
@@ -54,33 +54,37 @@ most_bytes() {
 }
 
 fuzz() {
-  local target=$1 begin now left log status executions line tries=0
+  local target=$1 now left log status executions line used cpu=0 tries=0 TIMEFORMAT='%U %S'
   local to=$OUT/$target
   mkdir -p "$to/corpus" "$to/crashes"
-  begin=$(date +%s)
   export TSDFPP_FUZZ_TARGET=$target
   # After a find it goes on, until there are so many that they want a look first.
   while [ $tries -lt 20 ]; do
     now=$(date +%s)
-    left=$((begin + seconds - now))
-    if [ $left -lt 2 ]; then break; fi
+    left=$((seconds - cpu))
+    if [ $left -lt 1 ]; then break; fi
     log=$to/log-$now-$tries.txt
     status=0
-    "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$left" -max_len="$(most_bytes "$target")" \
+    { time "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$left" -max_len="$(most_bytes "$target")" \
       -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 -use_value_profile=1 -reload=0 -print_final_stats=1 \
-      -artifact_prefix="$to/crashes/" >"$log" 2>&1 || status=$?
+      -artifact_prefix="$to/crashes/" >"$log" 2>&1; } 2>"$to/time.txt" || status=$?
+    used=$(awk '{print int($1 + $2 + 0.5)}' "$to/time.txt")
+    cpu=$((cpu + used))
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -1)
     line=$(grep -a ' cov: ' "$log" | tail -1 || true)
     edges=$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' <<<"$line")
     features=$(sed -n 's/.* ft: \([0-9]*\).*/\1/p' <<<"$line")
-    printf '%s\t%s\t%s\t%s\t%s\t%s\n' "$now" "$(($(date +%s) - now))" "${executions:-0}" "${edges:-0}" \
+    printf '%s\t%s\t%s\t%s\t%s\t%s\n' "$now" "$used" "${executions:-0}" "${edges:-0}" \
       "${features:-0}" "$((status != 0))" >>"$to/runs.tsv"
     # Only logs of finds are worth their place.
     if [ $status = 0 ]; then rm "$log"; else
+      tries=$((tries + 1))
       echo "$target: a find, $log: $(grep -aE '^(complaint|SUMMARY|==[0-9]*== *ERROR)|runtime error' "$log" | head -1)"
     fi
-    tries=$((tries + 1))
+    # A run that took no time at all would be repeated for ever.
+    if [ "$used" = 0 ]; then break; fi
   done
+  rm -f "$to/time.txt"
   echo "$target: $(awk '{s += $2; e += $3} END {print s " s, " e " executions"}' "$to/runs.tsv"), $(find "$to/corpus" -type f | wc -l) inputs, $(find "$to/crashes" -type f | wc -l) finds"
 }
 

@@ -21,6 +21,9 @@ TEST(Malformed, Bop) {
            at + "scene_camera.json: 'first' is not the number of an image"},
           {Json(scene + "scene_camera.json", first("cam_K", {1, 2, 3})),
            at + "scene_camera.json: image 0: expected cam_K of 9 numbers and depth_scale"},
+          {Json(scene + "scene_camera.json", first("cam_K", {60, 0.5, 4, 0, 61, 3, 0, 0, 1})),
+           at + "scene_camera.json: image 0: cam_K is 60 0.5 4 0 61 3 0 0 1, expected a camera "
+                "without skew: fx 0 cx 0 fy cy 0 0 1"},
           {Json(scene + "scene_camera.json", first("depth_scale", "0.1")),
            at + "scene_camera.json: image 0: expected cam_K of 9 numbers and depth_scale"},
           {Json(scene + "scene_camera.json", first("depth_scale", 0)),

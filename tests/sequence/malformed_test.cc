@@ -17,6 +17,12 @@ TEST(Malformed, Tum) {
       Exported(DatasetFormat::kTum),
       {
           {Remove("groundtruth.txt"), "@/groundtruth.txt: no such file"},
+          // As a folder that another user may not read.
+          {[](const fs::path& set) {
+             fs::remove_all(set / "mask");
+             fs::create_symlink("mask", set / "mask");
+           },
+           "@/mask: cannot be read as a folder (Too many levels of symbolic links)"},
           {Text("groundtruth.txt", "# nothing\n"), "@/groundtruth.txt: holds no poses"},
           {Text("groundtruth.txt", "zero 0 0 0 0 0 0 1\n"),
            "@/groundtruth.txt:1: 'zero' is not a time in seconds, expected t tx ty tz qx qy qz qw"},
