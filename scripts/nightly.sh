@@ -21,6 +21,8 @@ if [ "$gates_only" = yes ]; then exit "$status"; fi
 for preset in asan tsan; do ROOMS="core;mapper;tests" bash scripts/sanitizers.sh "$preset" || status=$?; done
 bash scripts/fuzz.sh --record "$out/fuzz.json" || status=$?
 cmake --preset release -B build/plain -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DCMAKE_UNITY_BUILD=OFF && cmake --build build/plain || status=$?
+before=$(git rev-list -1 --before='25 hours ago' HEAD)
+if [ -n "$before" ]; then bash scripts/tidy.sh --since "$before" || status=$?; fi
 # Those of the pages have their cells by now.
 for experiment in eval/experiments/*.toml; do
   "$tsdfpp" sweep "$experiment" --out "$out/experiments/$(basename "$experiment" .toml)" || status=$?
