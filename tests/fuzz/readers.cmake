@@ -90,9 +90,11 @@ function(tsdfpp_add_readers target)
       tools/base64.cc
       sweep/bench_set.cc
       sweep/cell.cc
+      score/coco_panoptic.cc
       run/compare_names.cc
       score/evaluation_columns.cc
       score/evaluation_json.cc
+      score/evaluate_panoptic.cc
       sweep/experiment.cc
       run/folder_lock.cc
       gate/gate_config.cc
