@@ -1,4 +1,4 @@
-#include "eval/sweep/bench_set.h"
+#include "eval/sweep/bench_result.h"
 
 #include <fmt/format.h>
 

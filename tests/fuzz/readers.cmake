@@ -88,6 +88,7 @@ function(tsdfpp_add_readers target)
   set(eval
       adapters/adapter.cc
       tools/base64.cc
+      sweep/bench_result.cc
       sweep/bench_set.cc
       sweep/cell.cc
       score/coco_panoptic.cc
