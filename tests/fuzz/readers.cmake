@@ -63,6 +63,7 @@ function(tsdfpp_add_readers target)
       models/mesh_repair.cc
       models/mesh_shapes.cc
       models/model_catalogue.cc
+      models/obj_materials.cc
       models/obj_reader.cc
       config/object_motion.cc
       models/profile_shapes.cc
