@@ -99,6 +99,7 @@ function(tsdfpp_add_readers target)
       score/evaluate_panoptic.cc
       sweep/experiment.cc
       run/folder_lock.cc
+      gate/axis_choice.cc
       gate/gate_config.cc
       gate/gate_reference.cc
       gate/gate_verdict.cc
