@@ -27,6 +27,7 @@ function(tsdfpp_add_readers target)
       one_line.cc
       plain_name.cc
       ply.cc
+      ply_header.cc
       pose_text.cc
       quiet_stderr.cc
       toml_reader.cc)
