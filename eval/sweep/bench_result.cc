@@ -82,8 +82,8 @@ std::string HardwareText(const json& hardware) {
 // A score of the metric `name`, in the range that the metric has where we know it.
 Expected<Measured> ReadScore(const std::string& name, const json& value, const json& sequence,
                              const std::string& where) {
-  const Measured score = value.is_number() ? Measured::Of(value.get<double>())
-                                           : Measured::Undefined(value.at("why"));
+  const Measured score =
+      value.is_number() ? Measured::Of(value.get<double>()) : Measured::Undefined(value.at("why"));
   if (!value.is_number() && !value.at("value").is_null()) {
     return DataError("{}: {} is neither a number nor null with a reason", where, OneLine(name));
   }
@@ -160,13 +160,12 @@ LeaderboardRow RowOf(BenchResult result, const BenchSet& set) {
 // Best first by the set's first metric; those where it is undefined last.
 void Rank(std::vector<LeaderboardRow>& rows, const BenchSet& set) {
   const bool higher = FindMetric(set.metrics.front())->better == Better::kHigher;
-  std::stable_sort(rows.begin(), rows.end(),
-                   [&](const LeaderboardRow& a, const LeaderboardRow& b) {
-                     const Measured& x = a.means.front();
-                     const Measured& y = b.means.front();
-                     if (!x.value || !y.value) return x.value.has_value() && !y.value;
-                     return higher ? *x.value > *y.value : *x.value < *y.value;
-                   });
+  std::stable_sort(rows.begin(), rows.end(), [&](const LeaderboardRow& a, const LeaderboardRow& b) {
+    const Measured& x = a.means.front();
+    const Measured& y = b.means.front();
+    if (!x.value || !y.value) return x.value.has_value() && !y.value;
+    return higher ? *x.value > *y.value : *x.value < *y.value;
+  });
 }
 
 // A row a result: means over the sequences with their intervals, and who made it on what.

@@ -105,7 +105,8 @@ void AddConfigTargets(std::vector<Target>& targets) {
   targets.push_back(
       {"gates", "", ReadGates, {"eval/gate/gate_config.cc", "eval/gate/gate_reference.cc"}});
   targets.push_back({"adapter", "adapter.toml", ReadAdapterInput, {"eval/adapters/adapter.cc"}});
-  targets.push_back({"bench_set", "", ReadBenchSet, {"eval/sweep/bench_result.cc", "eval/sweep/bench_set.cc"}});
+  targets.push_back(
+      {"bench_set", "", ReadBenchSet, {"eval/sweep/bench_result.cc", "eval/sweep/bench_set.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz
