@@ -136,18 +136,83 @@ ChildResult AskChild(const MeshBenchOptions& options, int block_side) {
   return result;
 }
 
-void PrintMeshing(const std::vector<Run>& runs, const std::vector<double>& final_ms,
-                  const std::vector<std::size_t>& triangles, const Open3dVolume::Mesh& scalable,
+// The maps of all methods, and Open3D's, which get the same frames.
+struct Maps {
+  std::vector<Run> runs;
+  Open3dVolume peer;
+  double peer_growth_mb = 0;
+};
+
+// How much the process grows while the function runs.
+template <typename Function>
+double GrowthOf(const Function& function) {
+  const double before = ResidentMegabytes();
+  function();
+  return ResidentMegabytes() - before;
+}
+
+// The frame's largest object observed alone, again and again, on a copy of the map.
+void MeasureSmallChanges(const Frame& frame, Run& run) {
+  const cv::Mat labels = LargestObjectAlone(frame);
+  const auto copy = run.pipeline->map().Clone();
+  copy->TakeSceneChanges();
+  for (int repeat = 0; repeat < kSmallChanges; ++repeat) {
+    copy->Fuse(frame, labels);
+    run.small.Measure(*copy, true);
+  }
+}
+
+// Gives the first `count` frames to all maps, whose kept meshes are measured on the way.
+Expected<void> MapFrames(FrameSource& source, int count, int every, Maps& maps) {
+  for (int i = 0; i < count; ++i) {
+    TSDFPP_ASSIGN(const Frame frame, source.Read(source.info().first_index + i));
+    maps.peer_growth_mb += GrowthOf([&] { maps.peer.Integrate(frame); });
+    for (Run& run : maps.runs) {
+      run.growth_mb += GrowthOf([&] { run.pipeline->Process(frame).value(); });
+      run.frames.Measure(run.pipeline->map(), (i + 1) % every == 0 || i + 1 == count);
+      if (i + 1 == count) MeasureSmallChanges(frame, run);
+    }
+  }
+  return {};
+}
+
+// Meshes from scratch, medians.
+struct ScratchMeshes {
+  Open3dVolume::Mesh scalable;
+  std::vector<double> ms;  // a run
+  std::vector<std::size_t> triangles;
+};
+
+ScratchMeshes MeshFromScratch(Maps& maps) {
+  ScratchMeshes out;
+  out.triangles.resize(maps.runs.size());
+  std::vector<double> peer_s;
+  std::vector<std::vector<double>> ms(maps.runs.size());
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    out.scalable = maps.peer.ExtractMesh();
+    peer_s.push_back(out.scalable.seconds);
+    for (std::size_t m = 0; m < maps.runs.size(); ++m) {
+      const auto copy = maps.runs[m].pipeline->map().Clone();
+      ms[m].push_back(
+          MillisecondsOf([&] { out.triangles[m] = copy->SceneMesh().triangles.size(); }));
+    }
+  }
+  out.scalable.seconds = Median(peer_s);
+  for (const auto& times : ms) out.ms.push_back(Median(times));
+  return out;
+}
+
+void PrintMeshing(const std::vector<Run>& runs, const ScratchMeshes& scratch,
                   const std::vector<ChildResult>& grids) {
   std::printf("\nvisible scene from scratch, the last frame\n%-28s %10s %10s %12s\n", "",
               "triangles", "ms", "over Open3D");
-  const double scalable_ms = 1e3 * scalable.seconds;
+  const double scalable_ms = 1e3 * scratch.scalable.seconds;
   double peer_ms = scalable_ms;  // the fastest
   for (const ChildResult& grid : grids) {
     if (grid.finished) peer_ms = std::min(peer_ms, grid.mesh_ms);
   }
-  std::printf("%-28s %10zu %10.1f %12.3f\n", "Open3D ScalableTSDFVolume", scalable.triangles,
-              scalable_ms, scalable_ms / peer_ms);
+  std::printf("%-28s %10zu %10.1f %12.3f\n", "Open3D ScalableTSDFVolume",
+              scratch.scalable.triangles, scalable_ms, scalable_ms / peer_ms);
   for (const ChildResult& grid : grids) {
     if (grid.finished) {
       std::printf("%-28s %10.0f %10.1f %12.3f\n", grid.name.c_str(), grid.triangles, grid.mesh_ms,
@@ -157,8 +222,8 @@ void PrintMeshing(const std::vector<Run>& runs, const std::vector<double>& final
     }
   }
   for (std::size_t m = 0; m < runs.size(); ++m) {
-    std::printf("%-28s %10zu %10.1f %12.3f\n", runs[m].name.c_str(), triangles[m], final_ms[m],
-                final_ms[m] / peer_ms);
+    std::printf("%-28s %10zu %10.1f %12.3f\n", runs[m].name.c_str(), scratch.triangles[m],
+                scratch.ms[m], scratch.ms[m] / peer_ms);
   }
   const auto print_kept = [&](const char* title, KeptTimes Run::*times) {
     std::printf(
@@ -173,17 +238,16 @@ void PrintMeshing(const std::vector<Run>& runs, const std::vector<double>& final
   std::printf("(taking: of the parts that changed)\n");
 }
 
-void PrintMemory(const std::vector<Run>& runs, const Open3dVolume& peer, double peer_growth_mb,
-                 const std::vector<ChildResult>& grids) {
+void PrintMemory(const Maps& maps, const std::vector<ChildResult>& grids) {
   std::printf("\nmemory, MB\n%-28s %14s %10s %10s\n", "", "occupied blocks", "growth", "meshes");
   std::printf("%-28s %14.1f %10.1f %10s\n", "Open3D ScalableTSDFVolume",
-              static_cast<double>(peer.OccupiedBytes()) / 1e6, peer_growth_mb, "-");
+              static_cast<double>(maps.peer.OccupiedBytes()) / 1e6, maps.peer_growth_mb, "-");
   for (const ChildResult& grid : grids) {
     if (!grid.finished) continue;
     std::printf("%-28s %14.1f %10.1f %10s\n", grid.name.c_str(), grid.bytes / 1e6, grid.growth_mb,
                 "-");
   }
-  for (const Run& run : runs) {
+  for (const Run& run : maps.runs) {
     const MapMemory memory = run.pipeline->map().Memory();
     std::printf("%-28s %14.1f %10.1f %10.1f\n", run.name.c_str(),
                 static_cast<double>(memory.bytes) / 1e6, run.growth_mb,
@@ -206,64 +270,26 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
                                   static_cast<std::size_t>(options.threads));
   SetOpen3dThreads(options.threads);
 
-  std::vector<Run> runs;
+  Maps maps{{}, Open3dVolume(config.voxel_m, options.open3d_band * config.voxel_m)};
   for (const Method method : AllMethods()) {
-    runs.emplace_back();
-    runs.back().name = MethodName(method);
-    runs.back().pipeline =
+    maps.runs.emplace_back();
+    maps.runs.back().name = MethodName(method);
+    maps.runs.back().pipeline =
         std::make_unique<Pipeline>(PipelineConfig{.method = method, .map = config}, info.objects);
   }
-  Open3dVolume peer(config.voxel_m, options.open3d_band * config.voxel_m);
-  double peer_growth_mb = 0;
   const int count = std::min(info.frame_count, options.frames);
-  for (int i = 0; i < count; ++i) {
-    TSDFPP_ASSIGN(const Frame frame, source->Read(info.first_index + i));
-    const auto growth_of = [](const auto& function) {
-      const double before = ResidentMegabytes();
-      function();
-      return ResidentMegabytes() - before;
-    };
-    peer_growth_mb += growth_of([&] { peer.Integrate(frame); });
-    for (Run& run : runs) {
-      run.growth_mb += growth_of([&] { run.pipeline->Process(frame).value(); });
-      run.frames.Measure(run.pipeline->map(), (i + 1) % options.every == 0 || i + 1 == count);
-      if (i + 1 < count) continue;
-      const cv::Mat labels = LargestObjectAlone(frame);
-      const auto copy = run.pipeline->map().Clone();
-      copy->TakeSceneChanges();
-      for (int repeat = 0; repeat < kSmallChanges; ++repeat) {
-        copy->Fuse(frame, labels);
-        run.small.Measure(*copy, true);
-      }
-    }
-  }
+  TSDFPP_RETURN_IF_ERROR(MapFrames(*source, count, options.every, maps));
   std::printf(
       "%s, frames %d to %d, profile %s (bands of %g voxels in front, %g behind; Open3D's of %g), "
       "voxels of %g m, %d threads\n",
       info.name.c_str(), info.first_index, info.first_index + count - 1, options.profile.c_str(),
       config.trunc_front_voxels, config.trunc_back_voxels, options.open3d_band, options.voxel_m,
       options.threads);
-
-  std::vector<double> peer_ms;
-  std::vector<std::vector<double>> whole_ms(runs.size());
-  std::vector<std::size_t> triangles(runs.size());
-  Open3dVolume::Mesh scalable;
-  for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    scalable = peer.ExtractMesh();
-    peer_ms.push_back(scalable.seconds);
-    for (std::size_t m = 0; m < runs.size(); ++m) {
-      const auto copy = runs[m].pipeline->map().Clone();
-      whole_ms[m].push_back(
-          MillisecondsOf([&] { triangles[m] = copy->SceneMesh().triangles.size(); }));
-    }
-  }
-  scalable.seconds = Median(peer_ms);
-  std::vector<double> final_ms;
-  for (const auto& times : whole_ms) final_ms.push_back(Median(times));
+  const ScratchMeshes scratch = MeshFromScratch(maps);
   std::vector<ChildResult> grids;
   for (const int side : kBlockSides) grids.push_back(AskChild(options, side));
-  PrintMeshing(runs, final_ms, triangles, scalable, grids);
-  PrintMemory(runs, peer, peer_growth_mb, grids);
+  PrintMeshing(maps.runs, scratch, grids);
+  PrintMemory(maps, grids);
   return {};
 }
 

@@ -170,10 +170,9 @@ struct Job {
   std::vector<std::string> weights;
 };
 
-Expected<void> MeasureScene(const SmallScene& scene, const std::vector<Setting>& settings,
-                            const ReleasedOptions& options, FigureTable& weights) {
-  TSDFPP_ASSIGN(const Footage footage,
-                Film({scene.Path(), scene.scale, scene.step, scene.reveal, {scene.reveal}}));
+// Maps and scores every setting with every method; a line each when it is done.
+std::vector<Job> RunJobs(const SmallScene& scene, const std::vector<Setting>& settings,
+                         const Footage& footage) {
   const auto& [reveal, truth] = *footage.truth_from.begin();
   std::vector<Job> jobs;
   for (std::size_t s = 0; s < settings.size(); ++s) {
@@ -203,13 +202,16 @@ Expected<void> MeasureScene(const SmallScene& scene, const std::vector<Setting>&
       std::fflush(stdout);
     }
   };
-  {
-    std::vector<std::jthread> threads;
-    for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
-      threads.emplace_back(work);
-    }
+  std::vector<std::jthread> threads;
+  for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
+    threads.emplace_back(work);
   }
+  threads.clear();  // waits
+  return jobs;
+}
 
+// A row a setting, a column a score and method.
+FigureTable ScoreTable(const std::vector<Setting>& settings, const std::vector<Job>& jobs) {
   std::vector<std::string> columns{"setting"};
   for (const Score& score : kScores) {
     for (const FloatMethod& method : kFloatMethods) {
@@ -226,8 +228,15 @@ Expected<void> MeasureScene(const SmallScene& scene, const std::vector<Setting>&
     }
     table.Add(std::move(row));
   }
-  TSDFPP_RETURN_IF_ERROR(table.Write(options.out, scene.name));
+  return table;
+}
 
+Expected<void> MeasureScene(const SmallScene& scene, const std::vector<Setting>& settings,
+                            const ReleasedOptions& options, FigureTable& weights) {
+  TSDFPP_ASSIGN(const Footage footage,
+                Film({scene.Path(), scene.scale, scene.step, scene.reveal, {scene.reveal}}));
+  const std::vector<Job> jobs = RunJobs(scene, settings, footage);
+  TSDFPP_RETURN_IF_ERROR(ScoreTable(settings, jobs).Write(options.out, scene.name));
   for (const Job& job : jobs) {
     const std::string& name = settings[job.setting].name;
     if (name != kOursName && name != kReleasedName && name != kRaysName) continue;

@@ -1,5 +1,3 @@
-#include "eval/sweep/bench_set.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include "cli/sweep_progress.h"
 #include "core/files.h"
 #include "core/json_text.h"
+#include "eval/sweep/bench_result.h"
 
 namespace tsdfpp {
 namespace {

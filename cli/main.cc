@@ -33,13 +33,9 @@ int Print(const std::string& text, int exit_code) {
   return static_cast<int>(ErrorKind::kEnvironment);
 }
 
-int RunCommand(int argc, char** argv) {
-  CLI::App app("tsdfpp: measures what maps keep of surfaces that they can no longer see", "tsdfpp");
-  app.set_version_flag("--version", TSDFPP_VERSION);
-  app.require_subcommand(1);
-  app.set_help_all_flag("--help-all", "Help of all subcommands");
-  CommonOptions common;
-  std::map<CLI::App*, tsdfpp::Run> runs;
+// Registers the subcommands; returns what each runs once its options are parsed.
+std::map<const CLI::App*, tsdfpp::Run> AddSubcommands(CLI::App& app, CommonOptions& common) {
+  std::map<const CLI::App*, tsdfpp::Run> runs;
   const auto add = [&](const char* name, const char* help, const auto& function) {
     CLI::App* command = app.add_subcommand(name, help);
     command->add_flag("--json", common.json, "Print the result as JSON on stdout");
@@ -64,7 +60,30 @@ int RunCommand(int argc, char** argv) {
   add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
       tsdfpp::AddBenchSet);
   add("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
+  return runs;
+}
 
+// What is wrong with the words, as one sentence that says where help is.
+std::string Complaint(const CLI::App& app, const CLI::ParseError& error) {
+  // CLI11 misses the subcommand before it looks at the word that is none.
+  const CLI::App* deepest = &app;
+  while (!deepest->get_subcommands().empty()) deepest = deepest->get_subcommands().front();
+  const std::vector<std::string> unknown = deepest->remaining();
+  const std::string what = deepest->get_require_subcommand_min() > 0 && !unknown.empty()
+                               ? "'" + unknown.front() + "' is no subcommand or option"
+                               : error.what();
+  const auto used = app.get_subcommands();
+  const std::string command = used.empty() ? "tsdfpp" : "tsdfpp " + used.front()->get_name();
+  return fmt::format("{} (see {} --help)", tsdfpp::OneLine(what, kMostOfAnOption), command);
+}
+
+int RunCommand(int argc, char** argv) {
+  CLI::App app("tsdfpp: measures what maps keep of surfaces that they can no longer see", "tsdfpp");
+  app.set_version_flag("--version", TSDFPP_VERSION);
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "Help of all subcommands");
+  CommonOptions common;
+  const auto runs = AddSubcommands(app, common);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
@@ -72,17 +91,7 @@ int RunCommand(int argc, char** argv) {
     app.exit(help, text);
     return Print(text.str(), 0);
   } catch (const CLI::ParseError& error) {
-    // CLI11 misses the subcommand before it looks at the word that is none.
-    const CLI::App* deepest = &app;
-    while (!deepest->get_subcommands().empty()) deepest = deepest->get_subcommands().front();
-    const std::vector<std::string> unknown = deepest->remaining();
-    const std::string what = deepest->get_require_subcommand_min() > 0 && !unknown.empty()
-                                 ? "'" + unknown.front() + "' is no subcommand or option"
-                                 : error.what();
-    const auto used = app.get_subcommands();
-    const std::string command = used.empty() ? "tsdfpp" : "tsdfpp " + used.front()->get_name();
-    tsdfpp::PrintError("tsdfpp", fmt::format("{} (see {} --help)",
-                                             tsdfpp::OneLine(what, kMostOfAnOption), command));
+    tsdfpp::PrintError("tsdfpp", Complaint(app, error));
     return static_cast<int>(ErrorKind::kUsage);
   }
   std::unique_ptr<tbb::global_control> limit;

@@ -98,47 +98,46 @@ Measured LargestOfDefined(const std::vector<Measured>& errors) {
   return largest ? Measured::Of(*largest) : Measured::Undefined("defined at no pose");
 }
 
-Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
+// What is measured, as the options name it.
+struct PoseInputs {
   std::optional<Intrinsics> camera;
-  if (!options.camera.empty()) {
-    TSDFPP_ASSIGN(camera, CameraFromText(options.camera));
-  }
   std::vector<Pose> symmetries;
+  std::size_t model_points = 0;
+  std::vector<Eigen::Vector3f> points;  // of these
+  TimedPoses truth;
+  TimedPoses estimate;
+  std::vector<std::string> remarks;  // of the files of poses
+};
+
+Expected<PoseInputs> ReadInputs(const MetricPoseArguments& options) {
+  PoseInputs inputs;
+  if (!options.camera.empty()) {
+    TSDFPP_ASSIGN(inputs.camera, CameraFromText(options.camera));
+  }
   for (const std::string& word : SplitList(options.symmetries)) {
     TSDFPP_ASSIGN(const Pose symmetry, SymmetryFromText(word));
-    symmetries.push_back(symmetry);
+    inputs.symmetries.push_back(symmetry);
   }
   TSDFPP_ASSIGN(const TriangleMesh model, ReadSurfaceFile(options.model, options.scale));
   if (model.vertices.empty()) return DataError("{}: holds no vertices", options.model);
-  const std::vector<Eigen::Vector3f> points = Thinned(model.vertices, options.most_points);
-  std::vector<std::string> remarks;
-  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth, &remarks));
-  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate, &remarks));
+  inputs.model_points = model.vertices.size();
+  inputs.points = Thinned(model.vertices, options.most_points);
+  TSDFPP_ASSIGN(inputs.truth, ReadTimedPoses(options.truth, &inputs.remarks));
+  TSDFPP_ASSIGN(inputs.estimate, ReadTimedPoses(options.estimate, &inputs.remarks));
+  return inputs;
+}
 
+// The errors of all true poses that have an estimate.
+struct PoseErrors {
   std::vector<Series> series = {{"ADD", "mm", 1e3, {}},         {"ADD-S", "mm", 1e3, {}},
                                 {"MSSD", "mm", 1e3, {}},        {"MSPD", "px", 1, {}},
                                 {"translation", "mm", 1e3, {}}, {"rotation", "deg", 1, {}}};
   nlohmann::json frames = nlohmann::json::array();
-  std::size_t found = 0;
-  Pose C = Pose::Identity();  // from the true object frame to the estimate's
-  for (const auto& [stamp_s, T_true] : truth) {
-    const auto nearest = NearestInTime(estimate, stamp_s);
-    if (std::abs(nearest->first - stamp_s) > options.max_difference_s) {
-      for (Series& one : series) one.errors.push_back(Measured::Undefined("no estimate"));
-      continue;
-    }
-    if (options.anchor && found == 0) C = nearest->second.inverse() * T_true;
+  std::size_t found = 0;  // estimates
+
+  // `errors` in the order of the series.
+  void Add(double stamp_s, const std::array<Measured, 6>& errors) {
     ++found;
-    const Pose T_estimate = nearest->second * C;
-    const PosePairs pair = {{0}, {T_estimate}, {T_true}};
-    const std::array<Measured, 6> errors = {
-        AddError_m(points, T_estimate, T_true),
-        AddSymmetricError_m(points, T_estimate, T_true),
-        Mssd_m(points, T_estimate, T_true, symmetries),
-        camera ? Mspd_px(points, T_estimate, T_true, *camera, symmetries)
-               : Measured::Undefined("MSPD needs --camera"),
-        Measured::Of(TranslationErrors_m(pair)[0]),
-        Measured::Of(RotationErrors_rad(pair)[0] * 180 / std::numbers::pi)};
     for (std::size_t k = 0; k < series.size(); ++k) series[k].errors.push_back(errors[k]);
     frames.push_back({{"t", stamp_s},
                       {"add_m", ToJson(errors[0])},
@@ -148,42 +147,84 @@ Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
                       {"translation_m", ToJson(errors[4])},
                       {"rotation_deg", ToJson(errors[5])}});
   }
-  if (found == 0) {
-    return DataError("{}: none of its {} poses is within {} s of one of {}", options.estimate,
-                     estimate.size(), options.max_difference_s, options.truth);
+
+  void AddMissing() {
+    for (Series& one : series) one.errors.push_back(Measured::Undefined("no estimate"));
   }
-  const Measured auc_add = AreaUnderCurve(series[0].errors, options.greatest_m);
-  const Measured auc_add_s = AreaUnderCurve(series[1].errors, options.greatest_m);
+};
+
+std::array<Measured, 6> ErrorsOfPose(const PoseInputs& inputs, const Pose& T_estimate,
+                                     const Pose& T_true) {
+  const PosePairs pair = {{0}, {T_estimate}, {T_true}};
+  return {AddError_m(inputs.points, T_estimate, T_true),
+          AddSymmetricError_m(inputs.points, T_estimate, T_true),
+          Mssd_m(inputs.points, T_estimate, T_true, inputs.symmetries),
+          inputs.camera
+              ? Mspd_px(inputs.points, T_estimate, T_true, *inputs.camera, inputs.symmetries)
+              : Measured::Undefined("MSPD needs --camera"),
+          Measured::Of(TranslationErrors_m(pair)[0]),
+          Measured::Of(RotationErrors_rad(pair)[0] * 180 / std::numbers::pi)};
+}
+
+// Compares each true pose with the estimate nearest in time.
+PoseErrors MeasurePoses(const PoseInputs& inputs, const MetricPoseArguments& options) {
+  PoseErrors errors;
+  Pose C = Pose::Identity();  // from the true object frame to the estimate's
+  for (const auto& [stamp_s, T_true] : inputs.truth) {
+    const auto nearest = NearestInTime(inputs.estimate, stamp_s);
+    if (std::abs(nearest->first - stamp_s) > options.max_difference_s) {
+      errors.AddMissing();
+      continue;
+    }
+    if (options.anchor && errors.found == 0) C = nearest->second.inverse() * T_true;
+    errors.Add(stamp_s, ErrorsOfPose(inputs, nearest->second * C, T_true));
+  }
+  return errors;
+}
+
+// Adds the mean and the largest error of a measure to the JSON, and returns its line.
+std::string AddSeries(const Series& one, bool has_camera, nlohmann::json& json) {
+  const Measured mean = MeanOfDefined(one.errors);
+  const Measured largest = LargestOfDefined(one.errors);
+  const std::string key = fmt::format("{}_{}", one.name, one.in_unit == 1 ? one.unit : "m");
+  json["mean"][key] = ToJson(mean);
+  json["max"][key] = ToJson(largest);
+  return mean.value ? fmt::format("{:<12} {:>12.4f} {:>12.4f} {}\n", one.name,
+                                  one.in_unit * *mean.value, one.in_unit * *largest.value, one.unit)
+                    : fmt::format("{:<12} undefined: {}\n", one.name,
+                                  has_camera ? mean.why_not : "MSPD needs --camera");
+}
+
+Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
+  TSDFPP_ASSIGN(const PoseInputs inputs, ReadInputs(options));
+  const PoseErrors errors = MeasurePoses(inputs, options);
+  if (errors.found == 0) {
+    return DataError("{}: none of its {} poses is within {} s of one of {}", options.estimate,
+                     inputs.estimate.size(), options.max_difference_s, options.truth);
+  }
+  const Measured auc_add = AreaUnderCurve(errors.series[0].errors, options.greatest_m);
+  const Measured auc_add_s = AreaUnderCurve(errors.series[1].errors, options.greatest_m);
   nlohmann::json json = {{"model", options.model},
-                         {"points", points.size()},
-                         {"model_points", model.vertices.size()},
-                         {"reference_poses", truth.size()},
-                         {"found", found},
+                         {"points", inputs.points.size()},
+                         {"model_points", inputs.model_points},
+                         {"reference_poses", inputs.truth.size()},
+                         {"found", errors.found},
                          {"anchored", options.anchor},
                          {"auc_limit_m", options.greatest_m},
                          {"auc_add", ToJson(auc_add)},
                          {"auc_add_s", ToJson(auc_add_s)},
-                         {"frames", frames},
-                         {"remarks", remarks}};
+                         {"frames", errors.frames},
+                         {"remarks", inputs.remarks}};
   std::string text =
-      fmt::format("{} of {} true poses have an estimate; {} of the model's {} points\n", found,
-                  truth.size(), points.size(), model.vertices.size());
+      fmt::format("{} of {} true poses have an estimate; {} of the model's {} points\n",
+                  errors.found, inputs.truth.size(), inputs.points.size(), inputs.model_points);
   text += fmt::format("{:<12} {:>12} {:>12}\n", "", "mean", "max");
-  for (const Series& one : series) {
-    const Measured mean = MeanOfDefined(one.errors);
-    const Measured largest = LargestOfDefined(one.errors);
-    const std::string key = fmt::format("{}_{}", one.name, one.in_unit == 1 ? one.unit : "m");
-    json["mean"][key] = ToJson(mean);
-    json["max"][key] = ToJson(largest);
-    text += mean.value
-                ? fmt::format("{:<12} {:>12.4f} {:>12.4f} {}\n", one.name,
-                              one.in_unit * *mean.value, one.in_unit * *largest.value, one.unit)
-                : fmt::format("{:<12} undefined: {}\n", one.name,
-                              camera ? mean.why_not : "MSPD needs --camera");
+  for (const Series& one : errors.series) {
+    text += AddSeries(one, inputs.camera.has_value(), json);
   }
   text += fmt::format("AUC to {} m: ADD {}, ADD-S {}\n", options.greatest_m, ShareText(auc_add),
                       ShareText(auc_add_s));
-  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
+  for (const std::string& remark : inputs.remarks) spdlog::warn("{}", remark);
   return CommandResult{json, text};
 }
 

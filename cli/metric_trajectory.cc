@@ -69,7 +69,7 @@ nlohmann::json AlignmentJson(const Alignment& alignment) {
           {"rotation_is_unique", alignment.rotation_is_unique}};
 }
 
-Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) {
+Expected<TrajectoryOptions> MeasureOf(const MetricTrajectoryArguments& options) {
   TrajectoryOptions measure;
   measure.align = kAlignments.at(options.align);
   measure.max_difference_s = options.max_difference_s;
@@ -80,18 +80,11 @@ Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) 
     TSDFPP_ASSIGN(const RelativeDelta delta, DeltaFromText(word, options.all_pairs));
     measure.deltas.push_back(delta);
   }
-  std::vector<std::string> remarks;
-  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth, &remarks));
-  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate, &remarks));
-  const TrajectoryReport report = ReportTrajectory(truth, estimate, measure);
-  if (report.pairs == 0) {
-    return DataError(
-        "{}: none of its {} poses ({:.3f} to {:.3f} s) is within {} s of one of {} ({:.3f} to "
-        "{:.3f} s): is it another clock?",
-        options.estimate, estimate.size(), estimate.begin()->first, estimate.rbegin()->first,
-        options.max_difference_s, options.truth, truth.begin()->first, truth.rbegin()->first);
-  }
+  return measure;
+}
 
+nlohmann::json ReportJson(const TrajectoryReport& report,
+                          const MetricTrajectoryArguments& options) {
   nlohmann::json json = {
       {"reference", options.truth},
       {"estimate", options.estimate},
@@ -107,8 +100,22 @@ Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) 
        {{"translation_m", ToJson(report.translation_m)},
         {"rotation_deg", ToJson(report.rotation_deg)},
         {"full", ToJson(report.full)}}},
-      {"rpe", nlohmann::json::array()},
-      {"remarks", remarks}};
+      {"rpe", nlohmann::json::array()}};
+  const std::vector<std::string> words = SplitList(options.deltas);
+  for (std::size_t k = 0; k < report.relative.size(); ++k) {
+    const RelativeReport& relative = report.relative[k];
+    const char* rule = relative.delta.unit == RelativeDelta::Unit::kSeconds ? "tum" : "evo";
+    json["rpe"].push_back({{"delta", words[k]},
+                           {"all_pairs", relative.delta.overlapping},
+                           {"rule", rule},
+                           {"stretches", relative.stretches},
+                           {"translation_m", ToJson(relative.translation_m)},
+                           {"rotation_deg", ToJson(relative.rotation_deg)}});
+  }
+  return json;
+}
+
+std::string ReportText(const TrajectoryReport& report, const MetricTrajectoryArguments& options) {
   std::string text = fmt::format(
       "{} pairs of poses; without a partner: {} of the estimate, {} of the reference\n"
       "way of the reference {:.3f} m, of the estimate {:.3f} m; alignment {}\n",
@@ -119,20 +126,32 @@ Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) 
                       "median", "std", "min", "max");
   text += Row("APE translation, m", report.translation_m);
   text += Row("APE rotation, deg", report.rotation_deg);
+  const std::vector<std::string> words = SplitList(options.deltas);
   for (std::size_t k = 0; k < report.relative.size(); ++k) {
     const RelativeReport& relative = report.relative[k];
-    const char* rule = relative.delta.unit == RelativeDelta::Unit::kSeconds ? "tum" : "evo";
-    json["rpe"].push_back({{"delta", words[k]},
-                           {"all_pairs", relative.delta.overlapping},
-                           {"rule", rule},
-                           {"stretches", relative.stretches},
-                           {"translation_m", ToJson(relative.translation_m)},
-                           {"rotation_deg", ToJson(relative.rotation_deg)}});
     text += Row(fmt::format("RPE {} translation, m", words[k]), relative.translation_m);
     text += Row(fmt::format("RPE {} rotation, deg", words[k]), relative.rotation_deg);
   }
+  return text;
+}
+
+Expected<CommandResult> RunTrajectory(const MetricTrajectoryArguments& options) {
+  TSDFPP_ASSIGN(const TrajectoryOptions measure, MeasureOf(options));
+  std::vector<std::string> remarks;
+  TSDFPP_ASSIGN(const TimedPoses truth, ReadTimedPoses(options.truth, &remarks));
+  TSDFPP_ASSIGN(const TimedPoses estimate, ReadTimedPoses(options.estimate, &remarks));
+  const TrajectoryReport report = ReportTrajectory(truth, estimate, measure);
+  if (report.pairs == 0) {
+    return DataError(
+        "{}: none of its {} poses ({:.3f} to {:.3f} s) is within {} s of one of {} ({:.3f} to "
+        "{:.3f} s): is it another clock?",
+        options.estimate, estimate.size(), estimate.begin()->first, estimate.rbegin()->first,
+        options.max_difference_s, options.truth, truth.begin()->first, truth.rbegin()->first);
+  }
+  nlohmann::json json = ReportJson(report, options);
+  json["remarks"] = remarks;
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
-  return CommandResult{json, text};
+  return CommandResult{json, ReportText(report, options)};
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <sstream>
 #include <string>
 
 #include "core/farthest.h"
@@ -14,6 +13,7 @@
 #include "core/limits.h"
 #include "core/one_line.h"
 #include "core/plain_name.h"
+#include "core/ply_header.h"
 
 namespace tsdfpp {
 namespace {
@@ -57,20 +57,6 @@ std::string PlyBytes(const TriangleMesh& mesh, const std::vector<std::string>& r
   return bytes;
 }
 
-enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble, kUnknown };
-
-Scalar ScalarOf(const std::string& name) {
-  if (name == "char" || name == "int8") return Scalar::kInt8;
-  if (name == "uchar" || name == "uint8") return Scalar::kUint8;
-  if (name == "short" || name == "int16") return Scalar::kInt16;
-  if (name == "ushort" || name == "uint16") return Scalar::kUint16;
-  if (name == "int" || name == "int32") return Scalar::kInt32;
-  if (name == "uint" || name == "uint32") return Scalar::kUint32;
-  if (name == "float" || name == "float32") return Scalar::kFloat;
-  if (name == "double" || name == "float64") return Scalar::kDouble;
-  return Scalar::kUnknown;
-}
-
 // Reads scalars from the body, one after the other; Ok() turns false past the end.
 class Body {
  public:
@@ -78,26 +64,26 @@ class Body {
 
   bool Ok() const { return ok_; }
 
-  double Read(Scalar type) {
+  double Read(PlyScalar type) {
     if (ascii_) return ReadAscii();
     switch (type) {
-      case Scalar::kInt8:
+      case PlyScalar::kInt8:
         return ReadRaw<std::int8_t>();
-      case Scalar::kUint8:
+      case PlyScalar::kUint8:
         return ReadRaw<std::uint8_t>();
-      case Scalar::kInt16:
+      case PlyScalar::kInt16:
         return ReadRaw<std::int16_t>();
-      case Scalar::kUint16:
+      case PlyScalar::kUint16:
         return ReadRaw<std::uint16_t>();
-      case Scalar::kInt32:
+      case PlyScalar::kInt32:
         return ReadRaw<std::int32_t>();
-      case Scalar::kUint32:
+      case PlyScalar::kUint32:
         return ReadRaw<std::uint32_t>();
-      case Scalar::kFloat:
+      case PlyScalar::kFloat:
         return ReadRaw<float>();
-      case Scalar::kDouble:
+      case PlyScalar::kDouble:
         return ReadRaw<double>();
-      case Scalar::kUnknown:
+      case PlyScalar::kUnknown:
         break;
     }
     ok_ = false;
@@ -105,7 +91,7 @@ class Body {
   }
 
   // A count, index or id: Ok() turns false where it is not a whole number from 0 to `largest`.
-  std::uint32_t ReadWhole(Scalar type, std::uint32_t largest) {
+  std::uint32_t ReadWhole(PlyScalar type, std::uint32_t largest) {
     const double value = Read(type);
     if (!(value >= 0 && value <= largest) || value != std::floor(value)) ok_ = false;
     return ok_ ? static_cast<std::uint32_t>(value) : 0;
@@ -140,91 +126,6 @@ class Body {
   bool ok_ = true;
 };
 
-struct Property {
-  std::string name;
-  Scalar type = Scalar::kUnknown;
-  Scalar count_type = Scalar::kUnknown;  // of a list
-  bool is_list = false;
-};
-
-struct Element {
-  std::string name;
-  std::size_t count = 0;
-  std::vector<Property> properties;
-};
-
-struct Header {
-  bool ascii = false;
-  std::vector<Element> elements;
-  std::vector<std::string> regions;
-  std::size_t body_at = 0;
-};
-
-Expected<Header> ParseHeader(const std::string& file, const std::string& bytes) {
-  Header header;
-  std::size_t at = 0;
-  bool first = true;
-  while (true) {
-    const std::size_t end = bytes.find('\n', at);
-    if (end == std::string::npos) return DataError("{}: not a PLY file: no end_header", file);
-    std::string line = bytes.substr(at, end - at);
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    at = end + 1;
-    std::istringstream words(line);
-    std::string word;
-    words >> word;
-    if (first) {
-      if (word != "ply") return DataError("{}: not a PLY file: it does not begin with 'ply'", file);
-      first = false;
-    } else if (word == "format") {
-      words >> word;
-      if (word != "ascii" && word != "binary_little_endian") {
-        return DataError("{}: PLY format '{}', expected ascii or binary_little_endian", file, word);
-      }
-      header.ascii = word == "ascii";
-    } else if (word == "comment") {
-      std::size_t index = 0;
-      std::string name;
-      if (words >> word && word == "region" && words >> index &&
-          std::getline(words >> std::ws, name)) {
-        if (index != header.regions.size()) {
-          return DataError("{}: region comments are not numbered 0, 1, ...", file);
-        }
-        TSDFPP_RETURN_IF_ERROR(CheckLabel(name, fmt::format("{}: region {}", file, index)));
-        header.regions.push_back(name);
-      }
-    } else if (word == "element") {
-      Element element;
-      if (!(words >> element.name >> element.count) || element.count > bytes.size()) {
-        return DataError("{}: PLY element line '{}' cannot be read", file, line);
-      }
-      TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::mesh_elements,
-                                        static_cast<std::int64_t>(element.count), file,
-                                        "elements of one kind"));
-      header.elements.push_back(element);
-    } else if (word == "property") {
-      Property property;
-      words >> word;
-      if (word == "list") {
-        property.is_list = true;
-        words >> word;
-        property.count_type = ScalarOf(word);
-        words >> word;
-      }
-      property.type = ScalarOf(word);
-      if (header.elements.empty() || !(words >> property.name) ||
-          property.type == Scalar::kUnknown ||
-          (property.is_list && property.count_type == Scalar::kUnknown)) {
-        return DataError("{}: PLY property line '{}' cannot be read", file, line);
-      }
-      header.elements.back().properties.push_back(property);
-    } else if (word == "end_header") {
-      header.body_at = at;
-      return header;
-    }
-  }
-}
-
 constexpr std::uint32_t kMostOfAList = std::numeric_limits<std::int32_t>::max();
 
 struct Parsed {
@@ -233,11 +134,11 @@ struct Parsed {
   std::vector<std::uint16_t> face_region;
 };
 
-void ReadVertex(const Element& element, Body& body, TriangleMesh& mesh) {
+void ReadVertex(const PlyElement& element, Body& body, TriangleMesh& mesh) {
   Eigen::Vector3f position = Eigen::Vector3f::Constant(NAN);
   Colour colour{};
   bool coloured = false;
-  for (const Property& property : element.properties) {
+  for (const PlyProperty& property : element.properties) {
     const std::uint32_t count =
         property.is_list ? body.ReadWhole(property.count_type, kMostOfAList) : 1;
     for (std::uint32_t i = 0; i < count && body.Ok(); ++i) {
@@ -249,7 +150,7 @@ void ReadVertex(const Element& element, Body& body, TriangleMesh& mesh) {
                            : property.name == "green" ? 1
                            : property.name == "blue"  ? 2
                                                       : -1;
-      if (channel >= 0 && property.type == Scalar::kUint8) {
+      if (channel >= 0 && property.type == PlyScalar::kUint8) {
         // Text may have any number here.
         constexpr double kMostColour = 255;
         const bool fits = value >= 0 && value <= kMostColour;
@@ -262,21 +163,21 @@ void ReadVertex(const Element& element, Body& body, TriangleMesh& mesh) {
   if (coloured) mesh.colours.push_back(colour);
 }
 
-void SkipElement(const Element& element, Body& body) {
-  for (const Property& property : element.properties) {
+void SkipElement(const PlyElement& element, Body& body) {
+  for (const PlyProperty& property : element.properties) {
     const std::uint32_t count =
         property.is_list ? body.ReadWhole(property.count_type, kMostOfAList) : 1;
     for (std::uint32_t i = 0; i < count && body.Ok(); ++i) body.Read(property.type);
   }
 }
 
-bool ReadFace(const Element& element, Body& body, Parsed& parsed) {
+bool ReadFace(const PlyElement& element, Body& body, Parsed& parsed) {
   constexpr std::uint32_t kMostOfAnId = std::numeric_limits<InstanceId>::max();
   std::vector<std::uint32_t> polygon;
   InstanceId id = 0;
   std::uint16_t region = 0;
   bool has_id = false;
-  for (const Property& property : element.properties) {
+  for (const PlyProperty& property : element.properties) {
     const std::uint32_t count =
         property.is_list ? body.ReadWhole(property.count_type, kMostOfAList) : 1;
     for (std::uint32_t i = 0; i < count && body.Ok(); ++i) {
@@ -309,11 +210,11 @@ bool ReadFace(const Element& element, Body& body, Parsed& parsed) {
 Expected<Parsed> Parse(const std::filesystem::path& path) {
   const std::string file = path.string();
   TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
-  TSDFPP_ASSIGN(const Header header, ParseHeader(file, bytes));
+  TSDFPP_ASSIGN(const PlyHeader header, ParsePlyHeader(file, bytes));
   Parsed parsed;
   parsed.regions = header.regions;
   Body body(std::string_view(bytes).substr(header.body_at), header.ascii);
-  for (const Element& element : header.elements) {
+  for (const PlyElement& element : header.elements) {
     // Without properties it takes no bytes, so its count is bounded by nothing.
     if (element.properties.empty() && element.count > 0) {
       return DataError("{}: {} elements {} have no property, expected one at least", file,

@@ -57,12 +57,30 @@ std::string SizeText(const Eigen::AlignedBox3f& box) {
   return fmt::format("{:.4g} x {:.4g} x {:.4g} m", size.x(), size.y(), size.z());
 }
 
-// Distances from these points to the other surface.
-std::vector<double> DistancesTo(const Side& to, std::span<const Eigen::Vector3f> points,
-                                const SurfaceIndex* triangles, const PointIndex* others) {
-  if (!to.HasTriangles()) return others->Distances_m(points);
-  const NearestSurface nearest = triangles->Nearest(points);
-  return {nearest.distance_m.begin(), nearest.distance_m.end()};
+// What tells how far points are from a surface.
+struct SideIndex {
+  std::unique_ptr<SurfaceIndex> triangles;
+  std::unique_ptr<PointIndex> points;  // where it has no triangles
+
+  std::vector<double> Distances_m(std::span<const Eigen::Vector3f> from) const {
+    if (!triangles) return points->Distances_m(from);
+    const NearestSurface nearest = triangles->Nearest(from);
+    return {nearest.distance_m.begin(), nearest.distance_m.end()};
+  }
+};
+
+Expected<SideIndex> MakeIndex(const Side& side, double farthest_m) {
+  SideIndex index;
+  if (!side.HasTriangles()) {
+    index.points = std::make_unique<PointIndex>(side.mesh.vertices);
+    return index;
+  }
+  index.triangles = std::make_unique<SurfaceIndex>(side.mesh, farthest_m);
+  if (index.triangles->indexed() == 0) {
+    return DataError("{}: has {} faces, all of them too thin to measure distances to", side.name,
+                     side.mesh.triangles.size());
+  }
+  return index;
 }
 
 DirectedDistances Summarise(std::vector<double> distances, const SurfaceComparisonConfig& config) {
@@ -88,6 +106,45 @@ DirectedDistances Summarise(std::vector<double> distances, const SurfaceComparis
     out.within.push_back(static_cast<double>(above - distances.begin()) / count);
   }
   return out;
+}
+
+// The vertices that faces use.
+std::vector<Eigen::Vector3f> CornersOf(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3f> corners;
+  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t v : triangle) {
+      if (used[v] == 0) corners.push_back(mesh.vertices[v]);
+      used[v] = 1;
+    }
+  }
+  return corners;
+}
+
+DirectedDistances Measure(const Side& from, const Side& to, const SideIndex& index,
+                          const SurfaceComparisonConfig& config) {
+  DirectedDistances out = Summarise(index.Distances_m(from.samples.points), config);
+  out.samples_per_cm2 = from.samples_per_cm2;
+  out.to_triangles = to.HasTriangles();
+  if (!from.HasTriangles()) return out;
+  const std::vector<double> of_corners = index.Distances_m(CornersOf(from.mesh));
+  out.largest_m = std::max(out.largest_m, *std::max_element(of_corners.begin(), of_corners.end()));
+  return out;
+}
+
+// The scores that both directions make together.
+void Combine(SurfaceComparison& out) {
+  for (std::size_t k = 0; k < out.accuracy.within.size(); ++k) {
+    const double precision = out.accuracy.within[k];
+    const double recall = out.completeness.within[k];
+    const double sum = precision + recall;
+    out.f_score.push_back(sum > 0 ? 2 * precision * recall / sum : 0);
+  }
+  out.chamfer_sum_m = out.accuracy.mean_m + out.completeness.mean_m;
+  out.chamfer_mean_m = 0.5 * out.chamfer_sum_m;
+  out.chamfer_squared_m2 =
+      out.accuracy.rmse_m * out.accuracy.rmse_m + out.completeness.rmse_m * out.completeness.rmse_m;
+  out.hausdorff_m = std::max(out.accuracy.largest_m, out.completeness.largest_m);
 }
 
 // What makes every share 0 is said, since a 0 does not tell it from a bad reconstruction.
@@ -156,6 +213,19 @@ Measured FacetsOf(const Side& side) {
                              : Measured::Undefined("points, not a mesh");
 }
 
+EstimatorFloors FloorsOf(const Side& reconstruction, const Side& truth,
+                         const SurfaceComparison& scores) {
+  EstimatorFloors floors;
+  floors.accuracy_m = FloorOf(truth);
+  floors.completeness_m = FloorOf(reconstruction);
+  floors.truth_facets_m = FacetsOf(truth);
+  floors.reconstruction_facets_m = FacetsOf(reconstruction);
+  floors.rounding_m = std::max(RoundingFloor_m(reconstruction.mesh), RoundingFloor_m(truth.mesh));
+  floors.precision_error = 0.5 / std::sqrt(static_cast<double>(scores.accuracy.samples));
+  floors.recall_error = 0.5 / std::sqrt(static_cast<double>(scores.completeness.samples));
+  return floors;
+}
+
 }  // namespace
 
 Expected<void> CheckUnits(const Eigen::AlignedBox3f& reconstruction,
@@ -189,67 +259,18 @@ Expected<SurfaceComparison> CompareSurfaces(const TriangleMesh& reconstruction_m
   // No query is farther from a surface than across both boxes.
   const double farthest_m =
       static_cast<double>(reconstruction.box.merged(truth.box).diagonal().norm());
-  std::unique_ptr<SurfaceIndex> triangles[2];
-  std::unique_ptr<PointIndex> points[2];
-  const Side* sides[2] = {&reconstruction, &truth};
-  for (std::size_t k = 0; k < 2; ++k) {
-    if (!sides[k]->HasTriangles()) {
-      points[k] = std::make_unique<PointIndex>(sides[k]->mesh.vertices);
-      continue;
-    }
-    triangles[k] = std::make_unique<SurfaceIndex>(sides[k]->mesh, farthest_m);
-    if (triangles[k]->indexed() == 0) {
-      return DataError("{}: has {} faces, all of them too thin to measure distances to",
-                       sides[k]->name, sides[k]->mesh.triangles.size());
-    }
-  }
+  TSDFPP_ASSIGN(const SideIndex to_reconstruction, MakeIndex(reconstruction, farthest_m));
+  TSDFPP_ASSIGN(const SideIndex to_truth, MakeIndex(truth, farthest_m));
 
   SurfaceComparison out;
   DirectedDistances* directed[2] = {&out.accuracy, &out.completeness};
-  for (std::size_t from = 0; from < 2; ++from) {
-    const std::size_t to = 1 - from;
-    const auto distances = [&](std::span<const Eigen::Vector3f> asked) {
-      return DistancesTo(*sides[to], asked, triangles[to].get(), points[to].get());
-    };
-    *directed[from] = Summarise(distances(sides[from]->samples.points), config);
-    directed[from]->samples_per_cm2 = sides[from]->samples_per_cm2;
-    directed[from]->to_triangles = sides[to]->HasTriangles();
-    if (!sides[from]->HasTriangles()) continue;
-    std::vector<Eigen::Vector3f> corners;
-    std::vector<std::uint8_t> used(sides[from]->mesh.vertices.size(), 0);
-    for (const auto& triangle : sides[from]->mesh.triangles) {
-      for (const std::uint32_t v : triangle) {
-        if (used[v] == 0) corners.push_back(sides[from]->mesh.vertices[v]);
-        used[v] = 1;
-      }
-    }
-    const std::vector<double> of_corners = distances(corners);
-    directed[from]->largest_m = std::max(directed[from]->largest_m,
-                                         *std::max_element(of_corners.begin(), of_corners.end()));
-  }
-
-  for (std::size_t k = 0; k < config.thresholds_m.size(); ++k) {
-    const double precision = out.accuracy.within[k];
-    const double recall = out.completeness.within[k];
-    const double sum = precision + recall;
-    out.f_score.push_back(sum > 0 ? 2 * precision * recall / sum : 0);
-  }
-  out.chamfer_sum_m = out.accuracy.mean_m + out.completeness.mean_m;
-  out.chamfer_mean_m = 0.5 * out.chamfer_sum_m;
-  out.chamfer_squared_m2 =
-      out.accuracy.rmse_m * out.accuracy.rmse_m + out.completeness.rmse_m * out.completeness.rmse_m;
-  out.hausdorff_m = std::max(out.accuracy.largest_m, out.completeness.largest_m);
-  ScoreFacing(reconstruction, triangles[0].get(), truth, triangles[1].get(), config, out);
+  *directed[0] = Measure(reconstruction, truth, to_truth, config);
+  *directed[1] = Measure(truth, reconstruction, to_reconstruction, config);
+  Combine(out);
+  ScoreFacing(reconstruction, to_reconstruction.triangles.get(), truth, to_truth.triangles.get(),
+              config, out);
   RemarkOnOverlap(reconstruction, truth, config.thresholds_m.back(), out);
-
-  out.floors.accuracy_m = FloorOf(truth);
-  out.floors.completeness_m = FloorOf(reconstruction);
-  out.floors.truth_facets_m = FacetsOf(truth);
-  out.floors.reconstruction_facets_m = FacetsOf(reconstruction);
-  out.floors.rounding_m =
-      std::max(RoundingFloor_m(reconstruction_mesh), RoundingFloor_m(truth_mesh));
-  out.floors.precision_error = 0.5 / std::sqrt(static_cast<double>(out.accuracy.samples));
-  out.floors.recall_error = 0.5 / std::sqrt(static_cast<double>(out.completeness.samples));
+  out.floors = FloorsOf(reconstruction, truth, out);
   return out;
 }
 

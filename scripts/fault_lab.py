@@ -3,11 +3,11 @@ import dataclasses
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import time
 
 import fault_commands
+import fault_disk
 import fault_process
 import fault_trees
 from fault_process import Surroundings
@@ -15,7 +15,6 @@ from fault_process import Surroundings
 SHIM = "tests/kill/shim.c"
 CLOCK = "tests/kill/clock_shim.c"
 LONGEST_S = 900.0  # of a run that nobody disturbs
-PAGE = 4096
 # Of what fails: usage, environment, data (docs/command-line.md).
 CODES_OF_READERS = (2, 3, 4)
 
@@ -42,18 +41,6 @@ class Learned:
     whole_bytes: int
     peak_bytes: int
     readers: list  # pairs: what each reads of the result before, and of the whole one
-
-
-def bytes_on_disk(folder):
-    total = 0
-    for base, folders, files in os.walk(folder):
-        for name in files:
-            total += -(-os.lstat(os.path.join(base, name)).st_size // PAGE) * PAGE
-    return total
-
-
-def count_on_disk(folder):
-    return sum(len(folders) + len(files) for _, folders, files in os.walk(folder))
 
 
 class Lab:
@@ -126,7 +113,7 @@ class Lab:
             with open(count, encoding="utf-8", errors="replace") as file:
                 changes = max((int(line.split()[0]) for line in file if line.split() and line.split()[0].isdigit()), default=0)
             os.remove(count)
-        whole_bytes = bytes_on_disk(trial)
+        whole_bytes = fault_disk.bytes_on_disk(trial)
         whole_read = [self.read(words, trial) for words in command.readers]
         if command.readers and all(ending.code or ending.signal for ending, _ in whole_read):
             raise RuntimeError(f"{command.name}: no reader reads the whole result: {whole_read[0][0].err.strip()}")
@@ -135,7 +122,7 @@ class Lab:
             self.restore(command, trial)
             peak = fault_process.peak_of(command.words, trial, self.at("said"))
         self.learned[command.name] = Learned(first.code, fault_trees.content_of(before), content,
-                                             fault_trees.stdout_content(first.out), first.seconds, changes, bytes_on_disk(before), whole_bytes,
+                                             fault_trees.stdout_content(first.out), first.seconds, changes, fault_disk.bytes_on_disk(before), whole_bytes,
                                              peak, list(zip(before_read, whole_read)))
         return self.learned[command.name]
 
@@ -366,46 +353,6 @@ class Lab:
     def may_replace(one, other):
         """A run that comes after another may take its place (docs/command-line.md)."""
         return bool(one.replaces and other.replaces)
-
-
-class OnADisk:
-    """A small disk of memory with the command's folder on it; needs root and a mount namespace of our own."""
-
-    def __init__(self, lab, command, free_share=None, files_share=None, read_only=False):
-        self.lab, self.command = lab, command
-        self.free_share, self.files_share, self.read_only = free_share, files_share, read_only
-        self.place = lab.at("disk")
-
-    def mount(self, *options):
-        subprocess.run(["mount", *options, self.place], check=True, stdout=subprocess.DEVNULL)
-
-    def __enter__(self):
-        os.makedirs(self.place, exist_ok=True)
-        self.mount("-t", "tmpfs", "-o", "size=1g", "none")
-        self.lab.restore(self.command, self.place)
-        learned = self.lab.learned[self.command.name]
-        if self.free_share is not None:
-            # An empty file system of size 0 would have no limit.
-            size = max(PAGE, learned.before_bytes + int(self.free_share * learned.whole_bytes) // PAGE * PAGE)
-            size = max(size, self.used())
-            self.mount("-o", f"remount,size={size}")
-        if self.files_share is not None:
-            # The root itself counts.
-            files = 1 + count_on_disk(self.place) + int(self.files_share * len(learned.whole))
-            self.mount("-o", f"remount,nr_inodes={files}")
-        if self.read_only:
-            self.mount("-o", "remount,ro")
-        return self
-
-    def used(self):
-        status = os.statvfs(self.place)
-        return (status.f_blocks - status.f_bfree) * status.f_frsize
-
-    def repair(self):
-        self.mount("-o", "remount,rw,size=1g,nr_inodes=100000")
-
-    def __exit__(self, *_):
-        subprocess.run(["umount", self.place], check=True)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ import sys
 
 sys.dont_write_bytecode = True
 import fault_commands  # noqa: E402
+import fault_disk  # noqa: E402
 import fault_lab  # noqa: E402
 import fault_process  # noqa: E402
 from fault_process import Surroundings  # noqa: E402
@@ -46,7 +47,7 @@ class Fault:
         self.result_stands, self.must_fail, self.quick, self.make = result_stands, must_fail, quick, around
 
     def place(self, lab, command):
-        return fault_lab.OnADisk(lab, command, **self.disk) if self.disk else contextlib.nullcontext()
+        return fault_disk.OnADisk(lab, command, **self.disk) if self.disk else contextlib.nullcontext()
 
     def around(self, lab, command, draw, trial):
         if self.make:

@@ -59,6 +59,29 @@ struct PipeEnds {
   }
 };
 
+// What runs between us, the supervisor and its program. The program says, the supervisor reports,
+// and it ends all once we let go of its control.
+struct Lines {
+  OpenEnd input;
+  PipeEnds said;
+  PipeEnds reported;
+  PipeEnds control;
+
+  // False where it cannot be had, as errno says.
+  bool Open() {
+    input.Reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+    return input.get() >= 0 && said.Make() && reported.Make() && control.Make() &&
+           fcntl(said.out.get(), F_SETFL, O_NONBLOCK) == 0;
+  }
+
+  // After the fork: what is the supervisor's to hold.
+  void CloseTheirs() {
+    said.in.Close();
+    reported.in.Close();
+    control.out.Close();
+  }
+};
+
 std::int64_t OwnResidentBytes() {
   std::ifstream statm("/proc/self/statm");
   std::int64_t size = 0;
@@ -113,8 +136,7 @@ void KeepAwake(pid_t supervisor, bool is_late) {
 }
 
 // Takes the program's words into the log and looks at its disk until the supervisor reports.
-Attendance Attend(pid_t supervisor, const PipeEnds& said, const PipeEnds& reported,
-                  OpenEnd& control, const fs::path& folder, const ChildLimits& limits,
+Attendance Attend(pid_t supervisor, Lines& lines, const fs::path& folder, const ChildLimits& limits,
                   const ControlGroup* group, CappedLog& log) {
   constexpr double kToReport_s = 30;  // to end all that was started, on a busy machine
   constexpr int kWait_ms = 100;
@@ -125,23 +147,23 @@ Attendance Attend(pid_t supervisor, const PipeEnds& said, const PipeEnds& report
   auto next_look = Clock::now() + kDiskLook;
   const auto begin = Clock::now();
   while (true) {
-    std::array<pollfd, 2> ends{pollfd{reported.out.get(), POLLIN, 0},
-                               pollfd{said_all ? -1 : said.out.get(), POLLIN, 0}};
+    std::array<pollfd, 2> ends{pollfd{lines.reported.out.get(), POLLIN, 0},
+                               pollfd{said_all ? -1 : lines.said.out.get(), POLLIN, 0}};
     poll(ends.data(), ends.size(), kWait_ms);
-    if (ends[1].revents != 0) said_all = !Drain(said.out.get(), log, kReads);
+    if (ends[1].revents != 0) said_all = !Drain(lines.said.out.get(), log, kReads);
     if (ends[0].revents != 0) {
       SupervisorReport report;
-      const ssize_t told = read(reported.out.get(), &report, sizeof report);
+      const ssize_t told = read(lines.reported.out.get(), &report, sizeof report);
       if (told < 0 && errno == EINTR) continue;
       if (told == sizeof report) attendance.report = report;
       // More than a pipe holds can only come from a process that could not be ended.
-      if (!said_all) Drain(said.out.get(), log, kReads);
+      if (!said_all) Drain(lines.said.out.get(), log, kReads);
       return attendance;
     }
     // In doubles: a limit may be more than the clock can count.
     const std::chrono::duration<double> passed = Clock::now() - begin;
     KeepAwake(supervisor, passed.count() > limits.time_s + kToReport_s);
-    if (control.get() < 0 || Clock::now() < next_look) continue;
+    if (lines.control.in.get() < 0 || Clock::now() < next_look) continue;
     const std::int64_t disk = DiskBytes(folder);
     next_look = Clock::now() + kDiskLook;
     if (disk > limits.disk_bytes) {
@@ -152,7 +174,7 @@ Attendance Attend(pid_t supervisor, const PipeEnds& said, const PipeEnds& report
       attendance.ended_for = fmt::format("took more memory than its limit of {:.0f} MB",
                                          static_cast<double>(limits.memory_bytes) / kMega);
     }
-    if (!attendance.ended_for.empty()) control.Close();
+    if (!attendance.ended_for.empty()) lines.control.in.Close();
   }
 }
 
@@ -190,6 +212,95 @@ std::string HowItEnded(const SupervisorReport& report, const ChildLimits& limits
   return "";
 }
 
+// How the program ended where that is a failure, else "".
+std::string HowItEnded(const Attendance& attendance, const ChildLimits& limits,
+                       const ControlGroup* group) {
+  if (!attendance.report) {
+    return "ended the process that watches it; what it started may still run";
+  }
+  if (!attendance.ended_for.empty()) return attendance.ended_for + ", and was ended";
+  if (group != nullptr && group->RanOutOfMemory()) {
+    return fmt::format("took more memory than its limit of {:.0f} MB, and was ended",
+                       static_cast<double>(limits.memory_bytes) / kMega);
+  }
+  return HowItEnded(*attendance.report, limits);
+}
+
+// What it used, as far as the supervisor saw.
+void TakeFigures(const SupervisorReport& report, std::int64_t at_fork_bytes,
+                 ChildOutcome& outcome) {
+  outcome.wall_s = report.wall_s;
+  outcome.cpu_s = report.cpu_s;
+  outcome.most_processes = report.most_processes;
+  outcome.peak_bytes = report.peak_bytes;
+  // The kernel's own figure counts what we had at the fork as the program's.
+  constexpr std::int64_t kMargin = 16'000'000;
+  if (report.peak_bytes == 0 || report.most_bytes > at_fork_bytes + kMargin) {
+    outcome.peak_bytes = std::max(report.peak_bytes, report.most_bytes);
+  }
+}
+
+// What the program said last, as the end of a sentence.
+std::string LastWords(const CappedLog& log, const std::string& shown_log) {
+  const std::string last = log.LastLine();
+  if (last.empty()) return fmt::format(" (it said nothing in {})", shown_log);
+  return fmt::format("; {} ends with: {}", shown_log, last);
+}
+
+std::optional<ControlGroup> MakeGroup(const ChildLimits& limits) {
+  constexpr std::int64_t kThreadsAProcess = 64;
+  const auto parent = limits.control_group ? WritableControlGroup() : std::nullopt;
+  if (!parent) return std::nullopt;
+  return ControlGroup::Make(*parent, limits.memory_bytes, kThreadsAProcess * limits.processes);
+}
+
+// The words of a command as exec takes them.
+class Words {
+ public:
+  explicit Words(std::vector<std::string> words) : words_(std::move(words)) {
+    for (std::string& word : words_) argv_.push_back(word.data());
+    argv_.push_back(nullptr);
+  }
+  Words(const Words&) = delete;
+  Words& operator=(const Words&) = delete;
+  char** argv() { return argv_.data(); }
+
+ private:
+  std::vector<std::string> words_;
+  std::vector<char*> argv_;
+};
+
+// What the supervisor is told, but for the command and its folder.
+SupervisedProgram ProgramUnder(const ChildLimits& limits, const Lines& lines,
+                               const std::optional<ControlGroup>& group) {
+  SupervisedProgram program;
+  program.input = lines.input.get();
+  program.output = lines.said.in.get();
+  program.control = lines.control.out.get();
+  program.report = lines.reported.in.get();
+  if (group) {
+    program.enter_group = group->enter();
+    program.end_group = group->end_all();
+    program.group = group->path().c_str();
+  }
+  program.time_s = limits.time_s;
+  program.memory_bytes = limits.memory_bytes;
+  program.processes = limits.processes;
+  program.file_bytes = limits.disk_bytes;
+  return program;
+}
+
+void WaitFor(pid_t child) {
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+}
+
+void EndAll(const ControlGroup& group) {
+  if (group.end_all() < 0) return;
+  [[maybe_unused]] const ssize_t told = write(group.end_all(), "1", 1);
+}
+
 }  // namespace
 
 ChildOutcome RunChildProcess(const std::string& name, const std::vector<std::string>& words,
@@ -201,96 +312,46 @@ ChildOutcome RunChildProcess(const std::string& name, const std::vector<std::str
                             fmt::format("{}: '{}' cannot be run ({})", name, words[0], why)};
     return outcome;
   };
-  std::vector<std::string> copies = words;
-  std::vector<char*> argv;
-  for (std::string& word : copies) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  const std::string folder = at.string();
-
   auto log = CappedLog::Open(log_path, limits.log_bytes);
   if (!log) return cannot(log.error().message);
-  const OpenEnd input(open("/dev/null", O_RDONLY | O_CLOEXEC));
-  PipeEnds said;
-  PipeEnds reported;
-  PipeEnds control;
-  if (input.get() < 0 || !said.Make() || !reported.Make() || !control.Make() ||
-      fcntl(said.out.get(), F_SETFL, O_NONBLOCK) != 0) {
-    return cannot(std::strerror(errno));
-  }
-  constexpr std::int64_t kThreadsAProcess = 64;
-  const auto parent_group = limits.control_group ? WritableControlGroup() : std::nullopt;
-  std::optional<ControlGroup> group = parent_group
-                                          ? ControlGroup::Make(*parent_group, limits.memory_bytes,
-                                                               kThreadsAProcess * limits.processes)
-                                          : std::nullopt;
-  SupervisedProgram program;
-  program.words = argv.data();
+  Lines lines;
+  if (!lines.Open()) return cannot(std::strerror(errno));
+  const std::optional<ControlGroup> group = MakeGroup(limits);
+  Words arguments(words);
+  const std::string folder = at.string();
+  SupervisedProgram program = ProgramUnder(limits, lines, group);
+  program.words = arguments.argv();
   program.at = folder.c_str();
-  program.input = input.get();
-  program.output = said.in.get();
-  program.control = control.out.get();
-  program.report = reported.in.get();
-  if (group) {
-    program.enter_group = group->enter();
-    program.end_group = group->end_all();
-    program.group = group->path().c_str();
-  }
-  program.time_s = limits.time_s;
-  program.memory_bytes = limits.memory_bytes;
-  program.processes = limits.processes;
-  program.file_bytes = limits.disk_bytes;
+
   ProcessTree tree;  // before the fork, after which nothing may be allocated
   const std::int64_t at_fork_bytes = OwnResidentBytes();
   const pid_t parent = getpid();
   const pid_t supervisor = fork();
   if (supervisor == 0) Supervise(program, parent, tree);
   if (supervisor < 0) return cannot(std::strerror(errno));
-  said.in.Close();
-  reported.in.Close();
-  control.out.Close();
+  lines.CloseTheirs();
   const Attendance attendance =
-      Attend(supervisor, said, reported, control.in, at, limits, group ? &*group : nullptr, *log);
-  control.in.Close();
-  int supervisor_status = 0;
-  while (waitpid(supervisor, &supervisor_status, 0) < 0 && errno == EINTR) {
-  }
+      Attend(supervisor, lines, at, limits, group ? &*group : nullptr, *log);
+  lines.control.in.Close();
+  WaitFor(supervisor);
+
   const auto logged = log->Finish();
   outcome.log_bytes = log->bytes();
-  std::string how = attendance.ended_for.empty() ? "" : attendance.ended_for + ", and was ended";
-  if (!attendance.report) {
-    if (group && group->end_all() >= 0) {
-      [[maybe_unused]] const ssize_t told = write(group->end_all(), "1", 1);
+  if (attendance.report) {
+    if (const int failure = attendance.report->exec_failure; failure != 0) {
+      return cannot(std::strerror(failure));
     }
-    how = "ended the process that watches it; what it started may still run";
-  } else {
-    const SupervisorReport& report = *attendance.report;
-    if (report.exec_failure != 0) return cannot(std::strerror(report.exec_failure));
-    outcome.wall_s = report.wall_s;
-    outcome.cpu_s = report.cpu_s;
-    outcome.most_processes = report.most_processes;
-    outcome.peak_bytes = report.peak_bytes;
-    // The kernel's own figure counts what we had at the fork as the program's.
-    constexpr std::int64_t kMargin = 16'000'000;
-    if (report.peak_bytes == 0 || report.most_bytes > at_fork_bytes + kMargin) {
-      outcome.peak_bytes = std::max(report.peak_bytes, report.most_bytes);
-    }
-    if (how.empty() && group && group->RanOutOfMemory()) {
-      how = fmt::format("took more memory than its limit of {:.0f} MB, and was ended",
-                        static_cast<double>(limits.memory_bytes) / kMega);
-    }
-    if (how.empty()) how = HowItEnded(report, limits);
+    TakeFigures(*attendance.report, at_fork_bytes, outcome);
+  } else if (group) {
+    EndAll(*group);
   }
-  if (how.empty()) {
-    if (!logged) outcome.failure = logged.error();
-    return outcome;
+  const std::string how = HowItEnded(attendance, limits, group ? &*group : nullptr);
+  if (!how.empty()) {
+    const std::string shown = (shown_log.empty() ? log_path : shown_log).string();
+    outcome.failure = Error{ErrorKind::kData, name + ": " + how + LastWords(*log, shown)};
+  } else if (!logged) {
+    outcome.failure = logged.error();
   }
-  const std::string said_last = log->LastLine();
-  const std::string shown = (shown_log.empty() ? log_path : shown_log).string();
-  outcome.failure =
-      Error{ErrorKind::kData,
-            fmt::format("{}: {}{}", name, how,
-                        said_last.empty() ? fmt::format(" (it said nothing in {})", shown)
-                                          : fmt::format("; {} ends with: {}", shown, said_last))};
   return outcome;
 }
 

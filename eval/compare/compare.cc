@@ -9,9 +9,8 @@
 #include <set>
 
 #include "core/files.h"
-#include "core/folders.h"
 #include "core/guard.h"
-#include "core/one_line.h"
+#include "eval/compare/compare_adapters.h"
 #include "eval/compare/compare_report.h"
 #include "eval/compare/pictures.h"
 #include "eval/compare/report_record.h"
@@ -22,6 +21,12 @@
 
 namespace tsdfpp {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 std::int64_t ResidentBytes() {
   std::ifstream statm("/proc/self/statm");
@@ -65,81 +70,6 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   return runs;
 }
 
-// What an adapter left beside its own folder would become files of the run, or stand in their way.
-void RemoveStrays(AdapterRun& run, const std::filesystem::path& out,
-                  const std::vector<std::filesystem::path>& before) {
-  for (const std::filesystem::path& entry : EntriesOf(out)) {
-    if (entry == out / run.config.name || std::binary_search(before.begin(), before.end(), entry)) {
-      continue;
-    }
-    std::error_code ignored;
-    std::filesystem::remove_all(entry, ignored);
-    run.remarks.push_back(fmt::format("{}: left {} beside its own folder, which is removed",
-                                      run.config.name, Quoted(entry.filename().string())));
-  }
-}
-
-// Folders nested so deep that no path leads to what is in them would be the comparison's end.
-void RemoveWhatCannotBeListed(AdapterRun& run) {
-  const auto files = ListFilesBelow(run.folder);
-  if (files) return;
-  std::error_code ignored;
-  std::filesystem::remove_all(run.folder, ignored);
-  std::filesystem::create_directory(run.folder, ignored);
-  run.failure = Error{ErrorKind::kData,
-                      WithShownFolder(run, fmt::format("{}: what it left is removed: {}",
-                                                       run.config.name, files.error().message))};
-}
-
-// Runs the adapters, one after the other, on the frames as they are given to a mapper.
-Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const RunFolder& folder,
-                           CompareResult& result) {
-  const std::filesystem::path& out = folder.path();
-  std::map<DatasetFormat, std::filesystem::path> sequences;
-  Expected<void> done;
-  for (const AdapterConfig& adapter : result.config.adapters) {
-    const DatasetFormat layout = adapter.layout;
-    std::filesystem::path& sequence = sequences[layout];
-    if (sequence.empty()) {
-      sequence = out / fmt::format(".sequence-{}", DatasetFormatName(layout));
-      std::error_code ignored;
-      std::filesystem::remove_all(sequence, ignored);
-      done = WriteForAdapters(source, layout, result.last_frame, sequence);
-    }
-    if (!done) break;
-    AdapterTask task = given;
-    task.sequence = sequence;
-    AdapterRun& run = *result.adapters.emplace_back(std::make_unique<AdapterRun>(adapter));
-    const std::vector<std::filesystem::path> before = EntriesOf(out);
-    done = RunAdapter(run, task, out / adapter.name, folder.out() / adapter.name);
-    if (!done) break;
-    RemoveStrays(run, out, before);
-    RemoveWhatCannotBeListed(run);
-  }
-  for (const auto& [layout, sequence] : sequences) {
-    std::error_code ignored;
-    std::filesystem::remove_all(sequence, ignored);
-  }
-  return done;
-}
-
-// Scores what an adapter wrote of its trajectories, if anything.
-void ScoreTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
-                       const SceneTruth& truth, const Trajectory& camera) {
-  const std::filesystem::path folder = run.folder / "trajectories";
-  std::error_code ignored;
-  if (run.failure || run.matches.empty() || !std::filesystem::exists(folder, ignored)) return;
-  auto scores =
-      EvaluateTrajectories(folder, names, run.matches.back(), truth.trajectories(), camera);
-  if (scores) {
-    run.trajectories = std::move(*scores);
-  } else {
-    run.failure =
-        Error{scores.error().kind,
-              WithShownFolder(run, fmt::format("{}: {}", run.config.name, scores.error().message))};
-  }
-}
-
 // A frame as the sensor gave it and, where that differs, as it was.
 struct SeenFrames {
   Frame given;
@@ -165,32 +95,6 @@ void DropMeshes(Evaluation& evaluation) {
   evaluation.scene = {};
   evaluation.revealed = {};
   evaluation.table_reconstructed = {};
-}
-
-// Evaluates a map at a frame and writes what is to be seen of it.
-Expected<void> EvaluateRun(CompareRun& run, const Frame& frame,
-                           const std::vector<ObjectInfo>& names, const std::filesystem::path& out,
-                           const CompareResult& result, PictureMaker& pictures,
-                           std::optional<ReportRecorder>& recorder) {
-  const int index = frame.index;
-  SceneMeshes meshes = MeshesOf(run.pipeline.map(), result.movers);
-  if (result.config.keep_meshes) {
-    TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run.FolderName() / "frames", index));
-  }
-  run.evaluations.push_back(EvaluateMeshes(std::move(meshes), *result.truth, names, result.movers,
-                                           run.config.map.voxel_m, run.last_seen));
-  Evaluation& evaluation = run.evaluations.back();
-  run.times.mesh_s.push_back(evaluation.mesh_s);
-  TSDFPP_RETURN_IF_ERROR(pictures.Take(&run, evaluation, frame));
-  if (recorder) TSDFPP_RETURN_IF_ERROR(recorder->Take(run, evaluation, frame));
-  const bool examined = index == result.reveal_frame.value_or(result.last_frame);
-  if (examined) {
-    auto copy = run.pipeline.map().Clone();
-    for (const InstanceId id : result.movers) copy->Remove(id);
-    TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, result.info, out / run.FolderName()));
-  }
-  DropMeshes(evaluation);
-  return {};
 }
 
 // Where no map and no adapter is left.
@@ -248,13 +152,11 @@ bool IsEvaluated(const CompareResult& result, int frame) {
          frame == result.last_frame || frame == result.reveal_frame;
 }
 
-Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
-                                   const std::filesystem::path& out_folder,
-                                   const std::string& command, const CompareProgress& progress) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto since = [](std::chrono::steady_clock::time_point t) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
-  };
+namespace {
+
+// What the config and the sequence say of the comparison, before anything is written.
+Expected<CompareResult> Planned(const FrameSource& source, const CompareConfig& config,
+                                const std::filesystem::path& out_folder) {
   CompareResult result;
   result.info = source.info();
   result.config = config;
@@ -263,111 +165,186 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
   if (IsOurSequence(out_folder)) {
     return UsageError("--out '{}' is a sequence, expected another folder", out_folder.string());
   }
-  TSDFPP_ASSIGN(RunFolder folder_of_run, RunFolder::Begin(out_folder, command));
-  const std::filesystem::path& out = folder_of_run.path();
-  result.run = folder_of_run.id();
-  TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source, config.truth));
+  return result;
+}
+
+// The true surfaces, what is removed and when, and the maps.
+Expected<void> SetUp(FrameSource& source, CompareResult& result) {
+  TSDFPP_ASSIGN(SceneTruth truth, SceneTruth::Create(source, result.config.truth));
   result.truth = std::make_unique<SceneTruth>(std::move(truth));
-  std::vector<ObjectInfo> names;
-  for (std::size_t i = 0; i < result.truth->trackers().size(); ++i) {
-    names.push_back(result.truth->surface(i).model().info);
-  }
   if (result.info.reveal) {
     result.movers = {result.info.reveal->removed.begin(), result.info.reveal->removed.end()};
     if (result.info.reveal->frame <= result.last_frame) {
       result.reveal_frame = result.info.reveal->frame;
     }
   }
-  TSDFPP_ASSIGN(result.runs, MakeRuns(config, result.info, *result.truth));
-  TSDFPP_RETURN_IF_ERROR(CheckPlaces(result, folder_of_run));
+  TSDFPP_ASSIGN(result.runs, MakeRuns(result.config, result.info, *result.truth));
+  return {};
+}
 
-  const int first = result.info.first_index;
-  const int total = result.last_frame - first + 1;
-  AdapterTask task{{}, first, result.last_frame, {}, result.movers, config.map.voxel_m, 0};
-  for (int index = first; index <= result.last_frame; ++index) {
-    if (IsEvaluated(result, index)) task.frames.push_back(index);
-  }
-  MapConfig settings = config.map;
-  if (!config.profiles.empty()) {
-    TSDFPP_RETURN_IF_ERROR(settings.SetProfile(config.profiles.front()));
-  }
-  task.truncation_m = settings.voxel_m * settings.trunc_front_voxels;
-  task.truncation_back_m = settings.voxel_m * settings.trunc_back_voxels;
-  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, folder_of_run, result));
-  Trajectory camera;
-  PictureMaker pictures(result, out);
-  std::optional<ReportRecorder> recorder;
-  if (config.record) recorder.emplace(result, out);
-  const int planned = result.last_frame;
-  for (int index = first; index <= planned; ++index) {
-    const auto read_start = std::chrono::steady_clock::now();
-    auto frames = Guarded([&] { return SeeFrame(source, index, *result.truth); });
-    result.read_s += since(read_start);
-    if (!frames) {
-      result.stopped = std::move(frames.error());
-      break;
+// The frames one after the other: the truth and the maps see each, and what is evaluated is drawn
+// and recorded.
+class FrameWalk {
+ public:
+  // All must outlive it; `result` has its runs and what the adapters did.
+  FrameWalk(FrameSource& source, const AdapterTask& task, const std::filesystem::path& out,
+            CompareResult& result)
+      : source_(source), task_(task), out_(out), result_(result), pictures_(result, out) {
+    if (result.config.record) recorder_.emplace(result, out);
+    for (std::size_t i = 0; i < result.truth->trackers().size(); ++i) {
+      names_.push_back(result.truth->surface(i).model().info);
     }
-    const Frame& frame = frames->given;
-    const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
-    camera[index] = true_frame.T_WC;
-    const bool evaluate = IsEvaluated(result, index);
-    if (recorder) recorder->SeeFrame(true_frame);
-    for (std::size_t r = 0; r < result.runs.size();) {
-      CompareRun& run = *result.runs[r];
+  }
+
+  // Goes through the planned frames, as far as they can be had. Errors: as of RunCompare, where
+  // nothing is left to show.
+  Expected<void> Go(const CompareProgress& progress) {
+    const int first = result_.info.first_index;
+    for (int index = first; index <= result_.last_frame; ++index) {
+      const auto read_start = Clock::now();
+      auto frames = Guarded([&] { return SeeFrame(source_, index, *result_.truth); });
+      result_.read_s += SecondsSince(read_start);
+      if (!frames) {
+        result_.stopped = std::move(frames.error());
+        return EndAtLastEvaluated();
+      }
+      const Frame& frame = frames->given;
+      const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
+      camera_[index] = true_frame.T_WC;
+      if (recorder_) recorder_->SeeFrame(true_frame);
+      MapFrame(frame);
+      if (IsEvaluated(result_, index)) EvaluateAdapters(frame);
+      if (progress) progress(index - first + 1, result_.last_frame - first + 1);
+      if (IsNothingLeft()) return tl::unexpected(NothingLeft(result_));
+    }
+    return {};
+  }
+
+  // Scores the adapters' trajectories and writes figures and recording.
+  Expected<void> Finish() {
+    for (const auto& run : result_.adapters) {
+      ScoreAdapterTrajectories(*run, names_, *result_.truth, camera_);
+    }
+    // Figures and the recording are of all frames that were planned, or not at all.
+    if (result_.stopped) return {};
+    TSDFPP_RETURN_IF_ERROR(Guarded([&] { return pictures_.Finish(); }));
+    if (recorder_) TSDFPP_RETURN_IF_ERROR(Guarded([&] { return recorder_->Write(); }));
+    return {};
+  }
+
+  const std::vector<PictureFile>& pictures() const { return pictures_.files(); }
+
+ private:
+  // Gives the frame to each map; one that fails is left out from then on.
+  void MapFrame(const Frame& frame) {
+    for (std::size_t r = 0; r < result_.runs.size();) {
+      CompareRun& run = *result_.runs[r];
       const auto mapped = Guarded([&]() -> Expected<void> {
         const std::int64_t before = ResidentBytes();
         TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
         run.times.Add(step);
         run.process_growth_bytes += ResidentBytes() - before;
-        if (recorder) recorder->SeeMap(run);
-        if (!evaluate) return {};
-        return EvaluateRun(run, frame, names, out, result, pictures, recorder);
+        if (recorder_) recorder_->SeeMap(run);
+        if (!IsEvaluated(result_, frame.index)) return {};
+        return EvaluateRun(run, frame);
       });
       if (mapped) {
         ++r;
         continue;
       }
-      result.failed.push_back({run.Title(), run.FolderName(), index, mapped.error()});
-      if (recorder) recorder->Forget(run);
-      result.runs.erase(result.runs.begin() + static_cast<std::ptrdiff_t>(r));
+      result_.failed.push_back({run.Title(), run.FolderName(), frame.index, mapped.error()});
+      if (recorder_) recorder_->Forget(run);
+      result_.runs.erase(result_.runs.begin() + static_cast<std::ptrdiff_t>(r));
     }
-    for (const auto& run : result.adapters) {
-      if (!evaluate) continue;
+  }
+
+  // Evaluates a map and writes what is to be seen of it.
+  Expected<void> EvaluateRun(CompareRun& run, const Frame& frame) {
+    const int index = frame.index;
+    SceneMeshes meshes = MeshesOf(run.pipeline.map(), result_.movers);
+    if (result_.config.keep_meshes) {
+      TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out_ / run.FolderName() / "frames", index));
+    }
+    run.evaluations.push_back(EvaluateMeshes(std::move(meshes), *result_.truth, names_,
+                                             result_.movers, run.config.map.voxel_m,
+                                             run.last_seen));
+    Evaluation& evaluation = run.evaluations.back();
+    run.times.mesh_s.push_back(evaluation.mesh_s);
+    TSDFPP_RETURN_IF_ERROR(pictures_.Take(&run, evaluation, frame));
+    if (recorder_) TSDFPP_RETURN_IF_ERROR(recorder_->Take(run, evaluation, frame));
+    const bool examined = index == result_.reveal_frame.value_or(result_.last_frame);
+    if (examined) {
+      auto copy = run.pipeline.map().Clone();
+      for (const InstanceId id : result_.movers) copy->Remove(id);
+      TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, result_.info, out_ / run.FolderName()));
+    }
+    DropMeshes(evaluation);
+    return {};
+  }
+
+  void EvaluateAdapters(const Frame& frame) {
+    for (const auto& run : result_.adapters) {
       const auto scored = Guarded([&]() -> Expected<void> {
-        EvaluateAdapter(*run, *result.truth, names, task);
+        EvaluateAdapter(*run, *result_.truth, names_, task_);
         if (run->failure) return {};
         Evaluation& evaluation = run->evaluations.back();
-        TSDFPP_RETURN_IF_ERROR(pictures.Take(run.get(), evaluation, frame));
+        TSDFPP_RETURN_IF_ERROR(pictures_.Take(run.get(), evaluation, frame));
         DropMeshes(evaluation);
         return {};
       });
       if (!scored)
         run->failure = Error{scored.error().kind, run->config.name + ": " + scored.error().message};
     }
-    if (progress) progress(index - first + 1, total);
-    const bool any_adapter = std::any_of(result.adapters.begin(), result.adapters.end(),
+  }
+
+  bool IsNothingLeft() const {
+    const bool any_adapter = std::any_of(result_.adapters.begin(), result_.adapters.end(),
                                          [](const auto& run) { return !run->failure.has_value(); });
-    if (result.runs.empty() && !any_adapter && !result.failed.empty()) {
-      return tl::unexpected(NothingLeft(result));
-    }
+    return result_.runs.empty() && !any_adapter && !result_.failed.empty();
   }
-  if (result.stopped) {
-    const int seen = LastEvaluated(result);
-    if (seen < first) return tl::unexpected(*result.stopped);
-    result.last_frame = seen;
-    if (result.reveal_frame && *result.reveal_frame > seen) result.reveal_frame.reset();
+
+  // The results are those until the last frame at which all that is left was evaluated.
+  Expected<void> EndAtLastEvaluated() {
+    const int seen = LastEvaluated(result_);
+    if (seen < result_.info.first_index) return tl::unexpected(*result_.stopped);
+    result_.last_frame = seen;
+    if (result_.reveal_frame && *result_.reveal_frame > seen) result_.reveal_frame.reset();
+    return {};
   }
-  for (const auto& run : result.adapters) ScoreTrajectories(*run, names, *result.truth, camera);
-  // Figures and the recording are of all frames that were planned, or not at all.
-  if (!result.stopped) {
-    TSDFPP_RETURN_IF_ERROR(Guarded([&] { return pictures.Finish(); }));
-    if (recorder) TSDFPP_RETURN_IF_ERROR(Guarded([&] { return recorder->Write(); }));
-  }
-  result.total_s = since(start);
-  TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, out));
-  TSDFPP_RETURN_IF_ERROR(WriteReport(result, pictures.files(), command, out));
+
+  FrameSource& source_;
+  const AdapterTask& task_;
+  const std::filesystem::path& out_;
+  CompareResult& result_;
+  PictureMaker pictures_;
+  std::optional<ReportRecorder> recorder_;
+  std::vector<ObjectInfo> names_;
+  Trajectory camera_;
+};
+
+}  // namespace
+
+Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& config,
+                                   const std::filesystem::path& out_folder,
+                                   const std::string& command, const CompareProgress& progress) {
+  const auto start = Clock::now();
+  TSDFPP_ASSIGN(CompareResult result, Planned(source, config, out_folder));
+  TSDFPP_ASSIGN(RunFolder folder, RunFolder::Begin(out_folder, command));
+  result.run = folder.id();
+  TSDFPP_RETURN_IF_ERROR(SetUp(source, result));
+  TSDFPP_RETURN_IF_ERROR(CheckPlaces(result, folder));
+
+  TSDFPP_ASSIGN(const AdapterTask task, TaskForAdapters(result));
+  TSDFPP_RETURN_IF_ERROR(RunAdapters(source, task, folder, result));
+  FrameWalk walk(source, task, folder.path(), result);
+  TSDFPP_RETURN_IF_ERROR(walk.Go(progress));
+  TSDFPP_RETURN_IF_ERROR(walk.Finish());
+
+  result.total_s = SecondsSince(start);
+  TSDFPP_RETURN_IF_ERROR(WriteSummary(result, command, folder.path()));
+  TSDFPP_RETURN_IF_ERROR(WriteReport(result, walk.pictures(), command, folder.path()));
   // `tsdfpp report` writes another page in its place.
-  TSDFPP_RETURN_IF_ERROR(folder_of_run.Commit({kPageFile}));
+  TSDFPP_RETURN_IF_ERROR(folder.Commit({kPageFile}));
   for (const auto& run : result.adapters) run->folder = run->shown;
   return result;
 }

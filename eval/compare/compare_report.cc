@@ -239,9 +239,10 @@ Expected<void> WriteSummary(const CompareResult& result, const std::string& comm
                    FrontTable(result) + "\n" + SummaryTable(result, Times::kLeftOut));
 }
 
-Expected<void> WriteReport(const CompareResult& result, const std::vector<PictureFile>& pictures,
-                           const std::string& command, const std::filesystem::path& out) {
-  std::string html = fmt::format(
+namespace {
+
+std::string PageHead(const CompareResult& result) {
+  return fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>tsdfpp: "
       "{0}</title>\n"
       "<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 "
@@ -258,7 +259,11 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       "mesh.</p>\n<ul>\n{5}</ul>\n",
       Escaped(result.info.name), result.info.first_index, result.last_frame, result.config.every,
       result.movers.size(), Headline(result));
-  html += "<div class=\"scroll\"><table>\n";
+}
+
+// The front table and what its columns mean.
+std::string PageTable(const CompareResult& result) {
+  std::string html = "<div class=\"scroll\"><table>\n";
   const auto rows = TableRows(result, Times::kShown);
   for (std::size_t r = 0; r < rows.size(); ++r) {
     html += "<tr>";
@@ -281,6 +286,11 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
       "depth and id the visible scene "
       "shows, over "
       "all and of the worst object. Times are medians a frame on this machine.</p>\n";
+  return html;
+}
+
+std::string PageNotes(const CompareResult& result) {
+  std::string html;
   if (!result.config.truth_note.empty()) {
     html += fmt::format("<p>{}</p>\n", Escaped(result.config.truth_note));
   }
@@ -290,6 +300,12 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
   for (const std::string& line : AdapterLines(result)) {
     html += fmt::format("<p>{}</p>\n", Escaped(line));
   }
+  return html;
+}
+
+Expected<std::string> PagePictures(const std::vector<PictureFile>& pictures,
+                                   const std::filesystem::path& out) {
+  std::string html;
   for (const PictureFile& picture : pictures) {
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(out / picture.file));
     html += fmt::format(
@@ -297,6 +313,15 @@ Expected<void> WriteReport(const CompareResult& result, const std::vector<Pictur
         "</figure>\n",
         Escaped(picture.caption), Base64(bytes));
   }
+  return html;
+}
+
+}  // namespace
+
+Expected<void> WriteReport(const CompareResult& result, const std::vector<PictureFile>& pictures,
+                           const std::string& command, const std::filesystem::path& out) {
+  TSDFPP_ASSIGN(const std::string shown, PagePictures(pictures, out));
+  std::string html = PageHead(result) + PageTable(result) + PageNotes(result) + shown;
   html += fmt::format(
       "<p>Made by <code>{}</code>, tsdfpp {}. All figures: <code>summary.json</code>, "
       "<code>frames.csv</code>.</p>\n</body></html>\n",

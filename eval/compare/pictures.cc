@@ -65,6 +65,16 @@ cv::Mat Grid(const std::vector<std::string>& columns, const std::vector<std::str
   return grid;
 }
 
+// The methods, and the adapters that did not fail.
+std::vector<std::string> TitlesOf(const CompareResult& result) {
+  std::vector<std::string> titles;
+  for (const Method method : result.config.methods) titles.emplace_back(MethodName(method));
+  for (const auto& run : result.adapters) {
+    if (!run->failure) titles.push_back(run->config.name);
+  }
+  return titles;
+}
+
 }  // namespace
 
 PictureMaker::PictureMaker(const CompareResult& result, std::filesystem::path out)
@@ -114,61 +124,66 @@ Expected<void> PictureMaker::Take(const void* run, const Evaluation& evaluation,
   return {};
 }
 
+std::vector<PictureMaker::Row> PictureMaker::RowsOf(const std::string& profile,
+                                                    PoseSource poses) const {
+  std::vector<Row> rows;
+  for (const Method method : result_.config.methods) {
+    const auto run = std::find_if(result_.runs.begin(), result_.runs.end(),
+                                  [&](const std::unique_ptr<CompareRun>& each) {
+                                    return each->config.method == method &&
+                                           each->profile == profile && each->config.poses == poses;
+                                  });
+    rows.push_back({std::string(MethodName(method)),
+                    run == result_.runs.end() ? nullptr : static_cast<const void*>(run->get())});
+  }
+  // An adapter has no profile; it stands beside each.
+  for (const auto& run : result_.adapters) {
+    if (!run->failure) rows.push_back({run->config.name, run.get()});
+  }
+  return rows;
+}
+
+cv::Mat PictureMaker::Figure(const std::vector<Row>& runs) const {
+  std::vector<std::string> titles;
+  std::vector<cv::Mat> camera_row;
+  for (const int frame : Columns()) {
+    titles.push_back(fmt::format("frame {}", frame));
+    camera_row.push_back(camera_.at(frame));
+  }
+  titles.emplace_back("after the removal");
+  std::vector<std::string> rows{"camera"};
+  std::vector<std::vector<cv::Mat>> cells{camera_row};
+  for (const auto& [title, run] : runs) {
+    if (run == nullptr) continue;
+    std::vector<cv::Mat> row;
+    for (const int frame : Columns()) row.push_back(cells_.at(run).at(frame));
+    row.push_back(after_removal_.at(run));
+    rows.push_back(title);
+    cells.push_back(row);
+  }
+  return Grid(titles, rows, cells);
+}
+
 Expected<void> PictureMaker::Finish() {
   if (cells_.empty()) return {};  // every adapter failed, and there was nothing else
   for (const PoseSource poses : result_.config.poses) {
     std::vector<std::string> table_rows;
     std::vector<std::vector<cv::Mat>> table_cells;
-    std::vector<std::string> table_columns;
-    for (const Method method : result_.config.methods)
-      table_columns.emplace_back(MethodName(method));
-    for (const auto& run : result_.adapters) {
-      if (!run->failure) table_columns.push_back(run->config.name);
-    }
     for (const std::string& profile : result_.config.profiles) {
-      std::vector<std::string> titles;
-      std::vector<cv::Mat> camera_row;
-      for (const int frame : Columns()) {
-        titles.push_back(fmt::format("frame {}", frame));
-        camera_row.push_back(camera_.at(frame));
-      }
-      titles.emplace_back("after the removal");
-      std::vector<std::string> rows{"camera"};
-      std::vector<std::vector<cv::Mat>> cells{camera_row};
+      const std::vector<Row> rows = RowsOf(profile, poses);
       table_rows.push_back("profile " + profile);
       table_cells.emplace_back();
-      const auto add = [&](const void* run, const std::string& title) {
-        std::vector<cv::Mat> row;
-        for (const int frame : Columns()) row.push_back(cells_.at(run).at(frame));
-        row.push_back(after_removal_.at(run));
-        rows.push_back(title);
-        cells.push_back(row);
-        table_cells.back().push_back(tables_.at(run));
-      };
-      for (const Method method : result_.config.methods) {
-        const auto run = std::find_if(
-            result_.runs.begin(), result_.runs.end(), [&](const std::unique_ptr<CompareRun>& each) {
-              return each->config.method == method && each->profile == profile &&
-                     each->config.poses == poses;
-            });
-        if (run != result_.runs.end()) {
-          add(run->get(), std::string(MethodName(method)));
-        } else {  // it failed
-          table_cells.back().emplace_back();
-        }
-      }
-      // An adapter has no profile; it stands beside each.
-      for (const auto& run : result_.adapters) {
-        if (!run->failure) add(run.get(), run->config.name);
+      for (const Row& row : rows) {
+        table_cells.back().push_back(row.run == nullptr ? cv::Mat() : tables_.at(row.run));
       }
       const std::string file = fmt::format("figure-{}-{}.png", profile, PoseSourceName(poses));
-      TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Grid(titles, rows, cells)));
+      TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Figure(rows)));
       files_.push_back(
           {file, fmt::format("Reconstructions over time and after the removal, profile {}, {}",
                              profile, poses == PoseSource::kGiven ? "given object poses" : "ICP")});
     }
     const std::string file = fmt::format("table-{}.png", PoseSourceName(poses));
-    TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Grid(table_columns, table_rows, table_cells)));
+    TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Grid(TitlesOf(result_), table_rows, table_cells)));
     files_.push_back({file,
                       "The table from above after the removal: hidden and kept (blue), hidden and "
                       "missing (red), visible (light), visible and missing (orange), never seen "

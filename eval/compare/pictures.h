@@ -32,6 +32,15 @@ class PictureMaker {
   const std::vector<PictureFile>& files() const { return files_; }
 
  private:
+  struct Row {
+    std::string title;
+    const void* run = nullptr;  // none where it failed
+  };
+
+  // The runs of the methods with these settings, and the adapters that did not fail.
+  std::vector<Row> RowsOf(const std::string& profile, PoseSource poses) const;
+  // Rows of the camera and of each run; columns of frames and after the removal.
+  cv::Mat Figure(const std::vector<Row>& runs) const;
   // The frames shown as columns: at most four, evenly spread, the last one the examined frame.
   std::vector<int> Columns() const;
   int ExaminedFrame() const;

@@ -6,6 +6,7 @@
 
 #include "core/files.h"
 #include "core/json_text.h"
+#include "eval/compare/record_meshes.h"
 #include "eval/picture/draw_scene.h"
 #include "eval/picture/record_images.h"
 #include "metrics/mesh_tools.h"
@@ -16,8 +17,7 @@ namespace {
 
 constexpr std::size_t kKeyFrames = 10;
 constexpr std::size_t kTrianglesAKeyFrame = 25000;
-constexpr double kFarShare = 0.2;      // of them for what is far from the table
-constexpr float kNearTable_m = 0.15F;  // around the table's box counts as near
+constexpr double kFarShare = 0.2;  // of them for what is far from the table
 constexpr std::size_t kMoverTriangles = 4000;
 constexpr std::size_t kLayerTriangles = 6000;
 constexpr std::size_t kTruthTriangles = 8000;  // an object
@@ -42,60 +42,15 @@ nlohmann::json GridJson(const PositionGrid& grid) {
 // To so many parts of one: the text is short, which a step's multiple in binary is not.
 double Rounded(double value, double parts) { return std::round(value * parts) / parts; }
 
-// Faces whose first corner lies in `box`, and the others.
-std::pair<TriangleMesh, TriangleMesh> SplitByBox(const TriangleMesh& mesh,
-                                                 const Eigen::AlignedBox3f& box) {
-  TriangleMesh inside{mesh.vertices, {}, mesh.colours, {}};
-  TriangleMesh outside = inside;
-  for (const auto& triangle : mesh.triangles) {
-    (box.contains(mesh.vertices[triangle[0]]) ? inside : outside).triangles.push_back(triangle);
-  }
-  return {std::move(inside), std::move(outside)};
+nlohmann::json Milliseconds(const std::vector<double>& seconds) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const double s : seconds) list.push_back(Rounded(1e3 * s, 1000));
+  return list;
 }
 
-// The true table's box with a margin; empty where the scene names none.
-Eigen::AlignedBox3f TableBox(const SceneTruth& truth) {
-  Eigen::AlignedBox3f box;
-  const TrueModel& room = truth.surface(0).model();
-  for (std::size_t t = 0; t < room.mesh_O.triangles.size(); ++t) {
-    if (room.regions[room.face_region[t]] != kTableRegion) continue;
-    for (int corner = 0; corner < 3; ++corner) box.extend(Corner(room.mesh_O, t, corner));
-  }
-  if (box.isEmpty()) return box;
-  const auto margin = Eigen::Vector3f::Constant(kNearTable_m);
-  return {box.min() - margin, box.max() + margin};
-}
-
-// What the table's hole is counted by (hole_area_cm2), as squares a little larger than the samples'
-// shares, for samples are jittered in their cells, and a millimetre in front of the true surface.
-TriangleMesh HoleMesh(const SceneTruth& truth, const Selection& reconstructed) {
-  constexpr float kHalfSide = 0.65F;  // of a sample's share
-  constexpr float kInFront_m = 0.001F;
-  const SeenTracker& tracker = truth.trackers().front();
-  const SampleSet& samples = tracker.samples_O();
-  const std::vector<std::string>& regions = truth.surface(0).model().regions;
-  const bool has_table = std::find(regions.begin(), regions.end(), kTableRegion) != regions.end();
-  TriangleMesh mesh;
-  for (std::size_t i = 0; i < reconstructed.size(); ++i) {
-    if (reconstructed[i] != 0 || !tracker.Seen(i) ||
-        tracker.status()[i] != SampleStatus::kBehindOther ||
-        (has_table && regions[samples.region[i]] != kTableRegion)) {
-      continue;
-    }
-    const Eigen::Vector3f& n = samples.normals[i];
-    const Eigen::Vector3f right = n.unitOrthogonal() * kHalfSide * std::sqrt(samples.area_m2[i]);
-    const Eigen::Vector3f up = n.cross(right);
-    const Eigen::Vector3f middle = samples.points[i] + kInFront_m * n;
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-    for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}) {
-      const Eigen::Vector3f corner =
-          middle + static_cast<float>(x) * right + static_cast<float>(y) * up;
-      mesh.vertices.push_back((truth.T_WO(0) * corner.cast<double>()).cast<float>());
-    }
-    mesh.triangles.push_back({first, first + 1, first + 2});
-    mesh.triangles.push_back({first, first + 2, first + 3});
-  }
-  return mesh;
+nlohmann::json IntrinsicsJson(const Intrinsics& k) {
+  return {{"width", k.width}, {"height", k.height}, {"fx", k.fx},
+          {"fy", k.fy},       {"cx", k.cx},         {"cy", k.cy}};
 }
 
 std::vector<InstanceId> IdsOf(const TriangleMesh& mesh) {
@@ -338,33 +293,23 @@ nlohmann::json ReportRecorder::TruthJson() {
   return truth;
 }
 
-Expected<void> ReportRecorder::Write() {
-  if (failure_) return tl::unexpected(*failure_);
-  const auto milliseconds = [](const std::vector<double>& seconds) {
-    nlohmann::json list = nlohmann::json::array();
-    for (const double s : seconds) list.push_back(Rounded(1e3 * s, 1000));
-    return list;
-  };
-  for (std::size_t r = 0; r < runs_.size(); ++r) {
-    const CompareRun& run = *result_.runs[r];
-    runs_[r]["track_ms"] = milliseconds(run.times.track_s);
-    runs_[r]["update_poses_ms"] = milliseconds(run.times.update_poses_s);
-    runs_[r]["fuse_ms"] = milliseconds(run.times.fuse_s);
-    for (const InstanceId id : result_.truth->moved()) {
-      const auto ours = run.pipeline.trajectories().find(id);
-      const auto truth = result_.truth->trajectories().find(id);
-      if (ours == run.pipeline.trajectories().end() ||
-          truth == result_.truth->trajectories().end()) {
-        continue;
-      }
-      const PosePairs pairs = AnchoredAtFirst(PairByFrame(ours->second, truth->second));
-      const std::vector<double> errors_m = TranslationErrors_m(pairs);
-      nlohmann::json& list = runs_[r]["position_error_mm"][std::to_string(id)];
-      for (std::size_t k = 0; k < errors_m.size(); ++k) {
-        list.push_back({pairs.frames[k], Rounded(1e3 * errors_m[k], 1000)});
-      }
+void ReportRecorder::AddErrors(const CompareRun& run, nlohmann::json& json) const {
+  for (const InstanceId id : result_.truth->moved()) {
+    const auto ours = run.pipeline.trajectories().find(id);
+    const auto truth = result_.truth->trajectories().find(id);
+    if (ours == run.pipeline.trajectories().end() || truth == result_.truth->trajectories().end()) {
+      continue;
+    }
+    const PosePairs pairs = AnchoredAtFirst(PairByFrame(ours->second, truth->second));
+    const std::vector<double> errors_m = TranslationErrors_m(pairs);
+    nlohmann::json& list = json["position_error_mm"][std::to_string(id)];
+    for (std::size_t k = 0; k < errors_m.size(); ++k) {
+      list.push_back({pairs.frames[k], Rounded(1e3 * errors_m[k], 1000)});
     }
   }
+}
+
+nlohmann::json ReportRecorder::ObjectsJson() const {
   nlohmann::json objects = nlohmann::json::array();
   for (std::size_t i = 0; i < result_.truth->trackers().size(); ++i) {
     const ObjectInfo& info = result_.truth->surface(i).model().info;
@@ -376,23 +321,28 @@ Expected<void> ReportRecorder::Write() {
                        {"moved", result_.truth->moved().contains(info.id)},
                        {"removed", result_.movers.contains(info.id)}});
   }
-  const Intrinsics& k = result_.info.intrinsics;
+  return objects;
+}
+
+Expected<void> ReportRecorder::Write() {
+  if (failure_) return tl::unexpected(*failure_);
+  for (std::size_t r = 0; r < runs_.size(); ++r) {
+    const CompareRun& run = *result_.runs[r];
+    runs_[r]["track_ms"] = Milliseconds(run.times.track_s);
+    runs_[r]["update_poses_ms"] = Milliseconds(run.times.update_poses_s);
+    runs_[r]["fuse_ms"] = Milliseconds(run.times.fuse_s);
+    AddErrors(run, runs_[r]);
+  }
   const double frames = result_.last_frame - result_.info.first_index + 1;
   nlohmann::json record{{"schema", 1},
                         {"sequence", result_.info.name},
                         {"rate_hz", result_.info.rate_hz},
-                        {"intrinsics",
-                         {{"width", k.width},
-                          {"height", k.height},
-                          {"fx", k.fx},
-                          {"fy", k.fy},
-                          {"cx", k.cx},
-                          {"cy", k.cy}}},
+                        {"intrinsics", IntrinsicsJson(result_.info.intrinsics)},
                         {"grid", GridJson(grid_)},
                         {"error_step_m", kErrorStep_m},
                         {"age_step_frames", frames / kAgeSteps},
                         {"depth_range_m", {Rounded(nearest_m_, 1000), Rounded(farthest_m_, 1000)}},
-                        {"objects", std::move(objects)},
+                        {"objects", ObjectsJson()},
                         {"frames", std::move(frames_)},
                         {"truth", TruthJson()},
                         {"key_frames", std::move(keys_)},

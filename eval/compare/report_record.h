@@ -54,6 +54,9 @@ class ReportRecorder {
                  nlohmann::json& chunks);
   void AddKeyFrame(const Frame& frame);
   nlohmann::json TruthJson();
+  nlohmann::json ObjectsJson() const;
+  // How far the run's poses of what moved are from the true ones, by frame.
+  void AddErrors(const CompareRun& run, nlohmann::json& json) const;
   std::size_t IndexOf(const CompareRun& run) const;
 
   const CompareResult& result_;

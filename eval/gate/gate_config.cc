@@ -33,34 +33,6 @@ void ReadWhy(TomlReader& reader, std::string& why) {
   if (why.empty()) reader.Fault("why", "is empty, expected the reason for the bounds");
 }
 
-Expected<AxisChoice> ReadChoice(const toml::table& table, const std::string& where,
-                                const std::string& path) {
-  TomlReader reader(table, where, path);
-  AxisChoice choice;
-  for (const Axis& axis : Axes()) {
-    const toml::node* node = table.get(axis.name);
-    if (node == nullptr) continue;
-    AxisValue value;
-    if (node->is_string()) {
-      std::string text;
-      reader.Get(axis.name, text);
-      value = text;
-    } else {
-      double number = 0;
-      reader.Get(axis.name, number);
-      value = number;
-    }
-    CellSettings probe;
-    if (auto set = axis.set(probe, value); !set) {
-      reader.Fault(axis.name, set.error().message);
-    } else {
-      choice[axis.name] = axis.get(probe);
-    }
-  }
-  TSDFPP_RETURN_IF_ERROR(reader.Finish());
-  return choice;
-}
-
 void ReadBounds(TomlReader& reader, const toml::table& table, Bounds& bounds) {
   double low = 0;
   double high = 0;
@@ -221,7 +193,7 @@ void CheckCells(TomlReader& reader, const GateExperiment& experiment, const Gate
 Expected<AxisChoice> ReadSubChoice(TomlReader& reader, const std::string& key) {
   const toml::table* table = reader.Table(key);
   if (table == nullptr) return AxisChoice{};
-  return ReadChoice(*table, reader.where(), reader.PathOf(key));
+  return ReadAxisChoice(*table, reader.where(), reader.PathOf(key));
 }
 
 Expected<Gate> ReadGate(const toml::table& table, const std::string& where,
@@ -307,51 +279,6 @@ Expected<GateSabotage> ReadSabotage(const toml::table& table, const std::string&
 }  // namespace
 
 Bounds RangeOf(const SweepMetric& metric) { return {0, MostOf(metric)}; }
-
-std::string ChoiceText(const AxisChoice& choice) {
-  std::string text;
-  for (const auto& [axis, value] : choice) {
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", axis, AxisText(value));
-  }
-  return text;
-}
-
-Expected<std::map<std::string, CellSettings>> ChosenCells(const ExperimentConfig& config,
-                                                          AxisChoice choice,
-                                                          const AxisChoice& changed) {
-  for (const auto& [axis, value] : changed) choice[axis] = value;
-  std::map<std::string, CellSettings> chosen;
-  std::map<std::string, std::string> rest;  // by replicate: the other axes
-  std::optional<AxisChoice> first;
-  for (const PlannedCell& cell : CellsOf(config)) {
-    std::string replicate;
-    AxisChoice others;
-    bool fits = true;
-    for (const Axis& axis : Axes()) {
-      const AxisValue value = axis.get(cell.settings);
-      const auto wanted = choice.find(axis.name);
-      fits = fits && (wanted == choice.end() || wanted->second == value);
-      if (std::find(config.replicates.begin(), config.replicates.end(), axis.name) !=
-          config.replicates.end()) {
-        replicate += fmt::format("{}={};", axis.name, AxisText(value));
-      } else {
-        others[axis.name] = value;
-      }
-    }
-    if (!fits) continue;
-    if (!first) first = others;
-    for (const auto& [axis, value] : others) {
-      if (first->at(axis) == value) continue;
-      return UsageError("leaves cells that differ in {} ({} and {}): expected one value of it",
-                        axis, AxisText(first->at(axis)), AxisText(value));
-    }
-    chosen.emplace(replicate, cell.settings);
-  }
-  if (chosen.empty()) {
-    return UsageError("({}) leaves no cell of experiment '{}'", ChoiceText(choice), config.name);
-  }
-  return chosen;
-}
 
 Expected<GatesConfig> GatesConfig::Load(const std::filesystem::path& file) {
   auto text = ReadFile(file, &Limits::text_bytes);

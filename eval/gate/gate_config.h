@@ -8,14 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "eval/gate/axis_choice.h"
 #include "eval/gate/gate_verdict.h"
 #include "eval/sweep/experiment.h"
 #include "eval/sweep/sweep_metrics.h"
 
 namespace tsdfpp {
-
-// Names of values of axes, such as {"method": "tsdf++", "profile": "close"}.
-using AxisChoice = std::map<std::string, AxisValue>;
 
 struct GateExperiment {
   std::string name;  // in the gates' file
@@ -80,15 +78,6 @@ struct GatesConfig {
   const Gate* FindGate(std::string_view name) const;
   bool IsIn(const std::string& experiment, const std::string& profile) const;
 };
-
-// Of the experiment's cells those with these values, by replicate ("seed=2;"), in their order.
-// `changed` is laid over the choice. Errors: kUsage, a clause without the gate's name.
-Expected<std::map<std::string, CellSettings>> ChosenCells(const ExperimentConfig& config,
-                                                          AxisChoice choice,
-                                                          const AxisChoice& changed);
-
-// "method tsdf++, profile close".
-std::string ChoiceText(const AxisChoice& choice);
 
 // Numbers that the metric can have.
 Bounds RangeOf(const SweepMetric& metric);

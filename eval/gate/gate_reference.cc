@@ -66,6 +66,12 @@ std::string MachineName() {
   return "unknown";
 }
 
+double MeanValue(const GateReference& reference) {
+  double sum = 0;
+  for (const auto& [replicate, value] : reference.values) sum += value;
+  return sum / static_cast<double>(reference.values.size());
+}
+
 std::string QuestionOf(const Gate& gate) {
   return fmt::format("{}: {} of {}", gate.experiment, gate.metric, ChoiceText(gate.where));
 }

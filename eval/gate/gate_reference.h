@@ -40,6 +40,9 @@ struct GateReference {
   bool operator==(const GateReference&) const = default;
 };
 
+// The mean of its values, of which there is one at least.
+double MeanValue(const GateReference& reference);
+
 // What a reference is of: experiment, metric and cells. A reference of another question is none.
 std::string QuestionOf(const Gate& gate);
 

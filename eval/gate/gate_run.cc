@@ -63,12 +63,26 @@ class Needs {
   std::map<std::string, std::vector<CellSettings>> cells_;
 };
 
-using PlannedGate = std::map<std::string, PlannedPair>;
+using PlannedCells = std::map<std::string, PlannedPair>;  // by replicate
 
-bool IsOfTimes(const Gate& gate) { return FindMetric(gate.metric)->unit == "ms"; }
+struct PlannedGate {
+  const Gate* gate;
+  PlannedCells cells;
+};
 
-PlannedGate PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
-                     const std::vector<std::uint64_t>& seeds) {
+struct PlannedSabotage {
+  Sabotage sabotage = Sabotage::kNone;
+  std::vector<PlannedGate> gates;  // that are to notice it; none where all are of other profiles
+};
+
+struct GatePlan {
+  Needs needs;
+  std::vector<PlannedGate> gates;
+  std::vector<PlannedSabotage> sabotages;
+};
+
+PlannedCells CellsOfGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
+                         const std::vector<std::uint64_t>& seeds) {
   ExperimentConfig experiment = config.FindExperiment(gate.experiment)->config;
   if (!seeds.empty()) {
     for (ExperimentGrid& grid : experiment.grids) {
@@ -77,7 +91,7 @@ PlannedGate PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabot
       for (const std::uint64_t seed : seeds) values.emplace_back(static_cast<double>(seed));
     }
   }
-  PlannedGate plan;
+  PlannedCells plan;
   // Both choices were checked with the file.
   const auto ours = ChosenCells(experiment, gate.where, {});
   for (const auto& [replicate, settings] : *ours) {
@@ -94,12 +108,58 @@ PlannedGate PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabot
   return plan;
 }
 
-void AddNeeds(const Gate& gate, const PlannedGate& plan, Needs& needs) {
-  for (const auto& [replicate, pair] : plan) {
+// Plans the gate and adds what it needs.
+PlannedGate PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
+                     const std::vector<std::uint64_t>& seeds, Needs& needs) {
+  PlannedGate planned{&gate, CellsOfGate(config, gate, sabotage, seeds)};
+  for (const auto& [replicate, pair] : planned.cells) {
     needs.Add(gate.experiment, pair.ours);
     if (pair.theirs) needs.Add(gate.experiment, *pair.theirs);
     if (IsOfTimes(gate)) needs.AddTimedTogether(gate.experiment, pair);
   }
+  return planned;
+}
+
+// A method's cells of a control, by replicate; they were checked with the file.
+std::map<std::string, CellSettings> CellsOfControl(const GatesConfig& config,
+                                                   const GateControl& control,
+                                                   const std::string& method) {
+  return *ChosenCells(config.FindExperiment(control.experiment)->config, control.where,
+                      {{"method", AxisValue(method)}});
+}
+
+// The controls, gates and sabotages of the profile. Errors: kUsage, it has no gate.
+Expected<GatePlan> PlanRun(const GatesConfig& config, const GateOptions& options) {
+  GatePlan plan;
+  const auto in_profile = [&](const std::string& experiment) {
+    return config.IsIn(experiment, options.profile);
+  };
+  for (const GateControl& control : config.controls) {
+    if (!in_profile(control.experiment)) continue;
+    for (const std::string& method : control.methods) {
+      for (const auto& [replicate, settings] : CellsOfControl(config, control, method)) {
+        plan.needs.Add(control.experiment, settings);
+      }
+    }
+  }
+  for (const Gate& gate : config.gates) {
+    if (!options.only.empty() ? gate.name != options.only : !in_profile(gate.experiment)) continue;
+    plan.gates.push_back(PlanGate(config, gate, options.sabotage, options.seeds, plan.needs));
+  }
+  if (plan.gates.empty()) {
+    return UsageError("{}: no gate is in profile '{}'", config.file.string(), options.profile);
+  }
+  if (!options.sabotages) return plan;
+  for (const GateSabotage& sabotage : config.sabotages) {
+    PlannedSabotage& planned =
+        plan.sabotages.emplace_back(PlannedSabotage{*SabotageFromName(sabotage.name), {}});
+    for (const std::string& name : sabotage.caught_by) {
+      const Gate* gate = config.FindGate(name);
+      if (!in_profile(gate->experiment)) continue;
+      planned.gates.push_back(PlanGate(config, *gate, planned.sabotage, {}, plan.needs));
+    }
+  }
+  return plan;
 }
 
 std::string CompareBytes(const GateData& data, const GateReference& reference,
@@ -119,24 +179,26 @@ std::string CompareBytes(const GateData& data, const GateReference& reference,
   return any ? "same" : "not compared: no seed of the reference";
 }
 
-GateOutcome Decide(const GatesConfig& config, const Gate& gate, const PlannedGate& plan,
-                   const GateCells& cells, const References& references,
-                   const GateEnvironment& environment) {
+GateOutcome Decide(const PlannedGate& planned, const References& references, const GateRun& run) {
+  const Gate& gate = *planned.gate;
   GateOutcome outcome;
   outcome.gate = gate;
-  for (const auto& [replicate, pair] : plan) {
-    outcome.data[replicate] = {cells.Find(gate.experiment, pair.ours),
-                               pair.theirs ? cells.Find(gate.experiment, *pair.theirs) : nullptr};
+  for (const auto& [replicate, pair] : planned.cells) {
+    outcome.data[replicate] = {
+        run.cells->Find(gate.experiment, pair.ours),
+        pair.theirs ? run.cells->Find(gate.experiment, *pair.theirs) : nullptr};
   }
   const auto found = references.find(gate.name);
   const GateReference* reference = found == references.end() ? nullptr : &found->second;
   outcome.judgement = JudgeGate(gate, outcome.data, reference,
-                                config.FindExperiment(gate.experiment)->config.statistics);
+                                run.config.FindExperiment(gate.experiment)->config.statistics);
   if (gate.kind == Gate::Kind::kReference && reference != nullptr && !reference->values.empty()) {
-    double sum = 0;
-    for (const auto& [replicate, value] : reference->values) sum += value;
-    outcome.reference_mean = sum / static_cast<double>(reference->values.size());
-    outcome.bytes = CompareBytes(outcome.data, *reference, environment);
+    outcome.reference_mean = MeanValue(*reference);
+    outcome.bytes = CompareBytes(outcome.data, *reference, run.environment);
+  }
+  if (!run.controls_hold()) {
+    outcome.judgement.verdict = Verdict::kInvalid;
+    outcome.judgement.why = "a control failed";
   }
   return outcome;
 }
@@ -147,9 +209,7 @@ ControlOutcome DecideControl(const GatesConfig& config, const GateControl& contr
   const std::size_t metric = MetricIndex(control.metric);
   std::map<std::string, std::vector<double>> by_replicate;
   for (const std::string& method : control.methods) {
-    const auto chosen = ChosenCells(config.FindExperiment(control.experiment)->config,
-                                    control.where, {{"method", AxisValue(method)}});
-    for (const auto& [replicate, settings] : *chosen) {
+    for (const auto& [replicate, settings] : CellsOfControl(config, control, method)) {
       const CellResult* cell = cells.Find(control.experiment, settings);
       const Measured value =
           cell == nullptr ? Measured::Undefined("was not run") : cell->examined[metric];
@@ -218,73 +278,6 @@ Expected<void> RunNeeds(const GatesConfig& config, const Needs& needs, const Swe
 
 }  // namespace
 
-Judgement JudgeGate(const Gate& gate, const GateData& data, const GateReference* reference,
-                    const BootstrapConfig& statistics) {
-  const std::size_t metric = MetricIndex(gate.metric);
-  double reference_mean = 0;
-  if (gate.kind == Gate::Kind::kReference) {
-    if (reference == nullptr || reference->values.empty()) {
-      return Invalid("there is no reference: make one with --update --reason TEXT");
-    }
-    if (reference->question != QuestionOf(gate)) {
-      return Invalid(fmt::format("the reference is of another question ({}): --update it",
-                                 reference->question));
-    }
-    for (const auto& [replicate, value] : reference->values) reference_mean += value;
-    reference_mean /= static_cast<double>(reference->values.size());
-  }
-  std::vector<double> values;
-  int timed = 0;
-  for (const auto& [replicate, pair] : data) {
-    if (pair.ours == nullptr) return Invalid(fmt::format("{} was not run", replicate));
-    if (IsOfTimes(gate)) {
-      if (pair.theirs == nullptr) return Invalid(fmt::format("{} has no pair", replicate));
-      timed += static_cast<int>(FrameTimeRatios(*pair.ours, *pair.theirs).size());
-      if (!WereTimedTogether(*pair.ours, *pair.theirs)) {
-        return Invalid(fmt::format("{}: the two were not timed in one run", replicate));
-      }
-      if (gate.metric == kFrameTimeMetric) {
-        const Measured ratio = TimeRatio(*pair.ours, *pair.theirs);
-        if (!ratio.value) return Invalid(fmt::format("{}: {}", replicate, ratio.why_not));
-        values.push_back(*ratio.value);
-        continue;
-      }
-    }
-    const Measured& ours = pair.ours->examined[metric];
-    if (!ours.value) {
-      return Invalid(
-          fmt::format("{} is undefined at {}: {}", gate.metric, replicate, ours.why_not));
-    }
-    if (gate.kind == Gate::Kind::kAbsolute) {
-      values.push_back(*ours.value);
-      continue;
-    }
-    double other = 0;
-    if (gate.kind == Gate::Kind::kReference) {
-      const auto stored = reference->values.find(replicate);
-      other = stored == reference->values.end() ? reference_mean : stored->second;
-    } else {
-      if (pair.theirs == nullptr) return Invalid(fmt::format("{} has no pair", replicate));
-      const Measured& theirs = pair.theirs->examined[metric];
-      if (!theirs.value) {
-        return Invalid(fmt::format("{} of {} is undefined at {}: {}", gate.metric,
-                                   ChoiceText(gate.against), replicate, theirs.why_not));
-      }
-      other = *theirs.value;
-    }
-    if (gate.ratio && !(other > 0)) {
-      return Invalid(fmt::format("a ratio to {} at {} says nothing", other, replicate));
-    }
-    values.push_back(gate.ratio ? *ours.value / other : *ours.value - other);
-  }
-  Judgement judgement = Judge(values, gate.bounds, gate.confidence, statistics);
-  if (IsOfTimes(gate) && timed < kLeastTimedFrames) {
-    judgement.verdict = Verdict::kInconclusive;
-    judgement.why = fmt::format("{} frames were timed, {} are needed", timed, kLeastTimedFrames);
-  }
-  return judgement;
-}
-
 void GateCells::Add(const std::string& experiment, const CellSettings& settings,
                     CellResult result) {
   cells_.emplace(KeyOf(experiment, settings), std::move(result));
@@ -324,71 +317,25 @@ int GateRun::exit_code() const {
 
 Expected<GateRun> RunGates(const GatesConfig& config, const References& references,
                            const GateOptions& options) {
+  TSDFPP_ASSIGN(const GatePlan plan, PlanRun(config, options));
   GateRun run;
   run.config = config;
   run.options = options;
-  struct Planned {
-    const Gate* gate;
-    PlannedGate cells;
-  };
-  Needs needs;
-  const auto in_profile = [&](const std::string& experiment) {
-    return config.IsIn(experiment, options.profile);
-  };
-  for (const GateControl& control : config.controls) {
-    if (!in_profile(control.experiment)) continue;
-    for (const std::string& method : control.methods) {
-      const auto chosen = ChosenCells(config.FindExperiment(control.experiment)->config,
-                                      control.where, {{"method", AxisValue(method)}});
-      for (const auto& [replicate, settings] : *chosen) {
-        needs.Add(control.experiment, settings);
-      }
-    }
-  }
-  std::vector<Planned> planned;
-  for (const Gate& gate : config.gates) {
-    if (!options.only.empty() ? gate.name != options.only : !in_profile(gate.experiment)) continue;
-    planned.push_back({&gate, PlanGate(config, gate, options.sabotage, options.seeds)});
-    AddNeeds(gate, planned.back().cells, needs);
-  }
-  if (planned.empty()) {
-    return UsageError("{}: no gate is in profile '{}'", config.file.string(), options.profile);
-  }
-  std::vector<std::pair<Sabotage, std::vector<Planned>>> suite;
-  for (const GateSabotage& sabotage : config.sabotages) {
-    if (!options.sabotages) break;
-    suite.emplace_back(*SabotageFromName(sabotage.name), std::vector<Planned>{});
-    for (const std::string& name : sabotage.caught_by) {
-      const Gate* gate = config.FindGate(name);
-      if (!in_profile(gate->experiment)) continue;
-      suite.back().second.push_back({gate, PlanGate(config, *gate, suite.back().first, {})});
-      AddNeeds(*gate, suite.back().second.back().cells, needs);
-    }
-  }
-
   auto cells = std::make_shared<GateCells>();
-  TSDFPP_RETURN_IF_ERROR(RunNeeds(config, needs, options.sweep, *cells, run.environment));
+  TSDFPP_RETURN_IF_ERROR(RunNeeds(config, plan.needs, options.sweep, *cells, run.environment));
   run.cells = cells;
   for (const GateControl& control : config.controls) {
-    if (in_profile(control.experiment)) {
-      run.controls.push_back(DecideControl(config, control, *cells));
-    }
+    if (!config.IsIn(control.experiment, options.profile)) continue;
+    run.controls.push_back(DecideControl(config, control, *cells));
   }
-  const auto decide = [&](const Planned& gate) {
-    GateOutcome outcome =
-        Decide(config, *gate.gate, gate.cells, *cells, references, run.environment);
-    if (!run.controls_hold()) {
-      outcome.judgement.verdict = Verdict::kInvalid;
-      outcome.judgement.why = "a control failed";
-    }
-    return outcome;
-  };
-  for (const Planned& gate : planned) run.gates.push_back(decide(gate));
-  for (const auto& [sabotage, gates] : suite) {
-    if (gates.empty()) continue;  // of another profile
+  for (const PlannedGate& gate : plan.gates) run.gates.push_back(Decide(gate, references, run));
+  for (const PlannedSabotage& planned : plan.sabotages) {
+    if (planned.gates.empty()) continue;  // of another profile
     SabotageOutcome outcome;
-    outcome.sabotage = sabotage;
-    for (const Planned& gate : gates) outcome.gates.push_back(decide(gate));
+    outcome.sabotage = planned.sabotage;
+    for (const PlannedGate& gate : planned.gates) {
+      outcome.gates.push_back(Decide(gate, references, run));
+    }
     run.sabotages.push_back(std::move(outcome));
   }
   return run;

@@ -255,7 +255,10 @@ std::vector<int> SpreadFrames(int first, int count, double share) {
   return frames;
 }
 
-Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& options) {
+namespace {
+
+// What a sequence of ours says of itself. Errors: kUsage and kData, it is none.
+Expected<SequenceRecord> ReadRecord(const fs::path& folder) {
   std::error_code code;
   if (!fs::is_directory(folder, code)) {
     if (!fs::exists(folder, code)) {
@@ -269,13 +272,37 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
                      folder.string(), cofusion::kSequence);
   }
   TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(folder));
-  TSDFPP_ASSIGN(const SequenceRecord record, ReadSequenceJson(folder / cofusion::kSequence));
+  TSDFPP_ASSIGN(SequenceRecord record, ReadSequenceJson(folder / cofusion::kSequence));
   // Each frame has three images; where far more are claimed there is nothing to look at one by one.
   if (static_cast<std::size_t>(record.info.frame_count) > record.hashes.size()) {
     return DataError("{}: frame_count is {}, but only {} files are listed",
                      (folder / cofusion::kSequence).string(), record.info.frame_count,
                      record.hashes.size());
   }
+  return record;
+}
+
+// Adds up what was found of the frames, in their order.
+void Gather(const std::vector<FrameResult>& frames, CertifyResult& result) {
+  ResidualMeter model(kModelLimit_m);
+  ResidualMeter ray_depth(kRayLimit_m);
+  for (const FrameResult& frame : frames) {
+    model.Merge(frame.report.model);
+    ray_depth.Merge(frame.rays);
+    result.certificate.wrong_ids += frame.wrong_ids;
+    result.certificate.frames += frame.done ? 1 : 0;
+    result.findings.insert(result.findings.end(), frame.report.findings.begin(),
+                           frame.report.findings.end());
+  }
+  result.certificate.ray_frames = static_cast<int>(result.ray_frames.size());
+  result.certificate.model = model.Result();
+  result.certificate.ray_depth = ray_depth.Result();
+}
+
+}  // namespace
+
+Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& options) {
+  TSDFPP_ASSIGN(const SequenceRecord record, ReadRecord(folder));
   CertifyResult result;
   result.sequence = record.info.name;
   result.findings = CheckFiles(folder, record);
@@ -303,22 +330,7 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
   CheckScene(folder, *models, result);
   Certifier certifier(options, **source, std::move(*models), std::move(lines), has_visibility,
                       std::move(rays));
-  const std::vector<FrameResult> frames =
-      certifier.CheckFrames(std::set<int>(result.ray_frames.begin(), result.ray_frames.end()));
-
-  ResidualMeter model(kModelLimit_m);
-  ResidualMeter ray_depth(kRayLimit_m);
-  for (const FrameResult& frame : frames) {
-    model.Merge(frame.report.model);
-    ray_depth.Merge(frame.rays);
-    result.certificate.wrong_ids += frame.wrong_ids;
-    result.certificate.frames += frame.done ? 1 : 0;
-    result.findings.insert(result.findings.end(), frame.report.findings.begin(),
-                           frame.report.findings.end());
-  }
-  result.certificate.ray_frames = static_cast<int>(result.ray_frames.size());
-  result.certificate.model = model.Result();
-  result.certificate.ray_depth = ray_depth.Result();
+  Gather(certifier.CheckFrames({result.ray_frames.begin(), result.ray_frames.end()}), result);
   return result;
 }
 

@@ -11,6 +11,8 @@
 namespace tsdfpp {
 namespace {
 
+using Surfaces = std::map<InstanceId, std::unique_ptr<TruthSurface>>;
+
 // Depth that is this factor off throughout is in another unit (or scaled).
 constexpr double kUnitTolerance = 0.01;
 
@@ -50,8 +52,7 @@ bool IsBesideStep(const cv::Mat& depth, const cv::Point& at) {
 }
 
 // All objects that have a pose, in the camera's frame.
-TriangleMesh PlaceAll(const std::map<InstanceId, std::unique_ptr<TruthSurface>>& surfaces,
-                      const Frame& frame) {
+TriangleMesh PlaceAll(const Surfaces& surfaces, const Frame& frame) {
   TriangleMesh all;
   const Pose T_CW = frame.T_WC.inverse();
   for (const auto& [id, surface] : surfaces) {
@@ -78,6 +79,213 @@ double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+Finding About(const Frame& frame, const char* check, std::string subject, std::string sentence) {
+  return {check, std::move(subject), frame.index, std::move(sentence)};
+}
+
+// Pixels of one id whose points do not lie on its model where their rays meet it.
+struct Doubtful {
+  std::vector<Eigen::Vector3f> points_C;
+  std::vector<cv::Point> pixels;
+  std::vector<InstanceId> lies_on;  // what the ray hits first, if the point lies there
+};
+
+// What the models along the pixels' rays say.
+struct RayCheck {
+  std::map<InstanceId, Doubtful> doubtful;
+  std::vector<double> ratios;  // of depths to the model's, where they disagree
+  std::int64_t holes = 0;      // no depth though a model is there
+  std::int64_t pixels = 0;     // with depth
+};
+
+// Measures each pixel's point against the triangle that its ray hits first, and leaves as doubtful
+// what does not lie on its own object there.
+RayCheck FollowRays(const Surfaces& surfaces, const Frame& frame, ResidualMeter& model) {
+  const Intrinsics& k = frame.intrinsics;
+  const TriangleMesh all_C = PlaceAll(surfaces, frame);
+  const Raster raster = Rasterise(all_C, k, Pose::Identity());
+  RayCheck rays;
+  for (int v = 0; v < k.height; ++v) {
+    const auto* depth = frame.depth.ptr<float>(v);
+    const auto* ids = frame.mask.ptr<InstanceId>(v);
+    const auto* face = raster.face.ptr<int>(v);
+    for (int u = 0; u < k.width; ++u) {
+      const float z = depth[u];
+      if (!IsValidDepth(z)) {
+        rays.holes += face[u] >= 0 ? 1 : 0;
+        continue;
+      }
+      ++rays.pixels;
+      const Eigen::Vector3f p_C(static_cast<float>(z * (u - k.cx) / k.fx),
+                                static_cast<float>(z * (v - k.cy) / k.fy), z);
+      InstanceId lies_on = kNoInstance;
+      if (face[u] >= 0) {
+        const auto t = static_cast<std::size_t>(face[u]);
+        const double distance = PointTriangleDistance(p_C, Corner(all_C, t, 0), Corner(all_C, t, 1),
+                                                      Corner(all_C, t, 2));
+        if (distance <= kModelLimit_m) {
+          lies_on = all_C.face_ids[t];
+          if (lies_on == ids[u]) {
+            model.Add(distance);
+            continue;
+          }
+        }
+        rays.ratios.push_back(static_cast<double>(z) / raster.depth.at<float>(v, u));
+      }
+      Doubtful& entry = rays.doubtful[ids[u]];
+      entry.points_C.push_back(p_C);
+      entry.pixels.emplace_back(u, v);
+      entry.lies_on.push_back(lies_on);
+    }
+  }
+  return rays;
+}
+
+// A pixel whose point is off the model of its mask's object.
+struct OffPixel {
+  InstanceId id = kNoInstance;
+  double distance_m = 0;
+  InstanceId lies_on = kNoInstance;  // another object's model
+};
+
+struct OffPixels {
+  std::vector<OffPixel> plain;
+  std::vector<OffPixel> by_edges;  // which may be the renderer's grid
+};
+
+// May the renderer's grid have put this point off its model: a little, and where an edge runs
+// through its pixel or its ray grazes the surface?
+bool IsByEdge(const Frame& frame, const cv::Point& pixel, float z, double distance_m,
+              float incidence_cosine) {
+  static const auto kLeastCosine =
+      static_cast<float>(std::cos(kMaxIncidence_deg * std::numbers::pi / 180));
+  const double pixel_m = z / frame.intrinsics.fx;
+  return distance_m <= std::max(kEdgeReach_m, kEdgeReach_px * pixel_m) &&
+         (incidence_cosine < kLeastCosine || IsBesideAnother(frame.mask, pixel) ||
+          IsBesideStep(frame.depth, pixel));
+}
+
+// Measures the doubtful points against the nearest triangle of their mask's own object, which
+// decides. An id without model or pose is a finding.
+OffPixels MeasureDoubtful(const Surfaces& surfaces, const Frame& frame, const RayCheck& rays,
+                          FrameReport& report) {
+  OffPixels off;
+  for (const auto& [id, entry] : rays.doubtful) {
+    const auto surface = surfaces.find(id);
+    const auto pose = frame.T_WO.find(id);
+    if (surface == surfaces.end() || (id != kBackground && pose == frame.T_WO.end())) {
+      report.findings.push_back(
+          About(frame, "mask", cofusion::MaskFile(frame.index),
+                fmt::format("{} pixels show id {}, which has no {}", entry.points_C.size(), id,
+                            surface == surfaces.end() ? "model" : "pose in this frame")));
+      continue;
+    }
+    const Pose T_OC = id == kBackground ? frame.T_WC : Pose(pose->second.inverse() * frame.T_WC);
+    std::vector<Eigen::Vector3f> points_O;
+    points_O.reserve(entry.points_C.size());
+    for (const Eigen::Vector3f& p : entry.points_C) {
+      points_O.emplace_back((T_OC * p.cast<double>()).cast<float>());
+    }
+    const NearestSurface nearest = surface->second->index_O().Nearest(points_O);
+    for (std::size_t i = 0; i < points_O.size(); ++i) {
+      const double distance = nearest.distance_m[i];
+      if (distance <= kModelLimit_m) {
+        report.model.Add(distance);
+        continue;
+      }
+      const Eigen::Vector3f ray_O =
+          (T_OC.linear() * entry.points_C[i].cast<double>().normalized()).cast<float>();
+      const bool by_edge = IsByEdge(frame, entry.pixels[i], entry.points_C[i].z(), distance,
+                                    std::abs(nearest.normal[i].dot(ray_O)));
+      (by_edge ? off.by_edges : off.plain).push_back({id, distance, entry.lies_on[i]});
+    }
+  }
+  return off;
+}
+
+// Leaves out the pixels beside edges, and counts them; where they are too many for the renderer's
+// grid they are plainly off.
+void ExcuseEdges(OffPixels& off, std::int64_t pixels, ResidualMeter& model) {
+  if (static_cast<double>(off.by_edges.size()) <=
+      static_cast<double>(kFewPixels) + kEdgeShare * static_cast<double>(pixels)) {
+    model.Exclude(static_cast<std::int64_t>(off.by_edges.size()));
+  } else {
+    off.plain.insert(off.plain.end(), off.by_edges.begin(), off.by_edges.end());
+  }
+}
+
+// What is wrong with the pixels of some objects.
+struct OffTotal {
+  std::int64_t count = 0;
+  double worst_m = 0;
+  std::map<InstanceId, std::int64_t> lies_on;  // another object's model
+  std::int64_t on_another = 0;                 // their sum
+
+  void Add(const OffPixel& pixel) {
+    ++count;
+    worst_m = std::max(worst_m, pixel.distance_m);
+    if (pixel.lies_on == kNoInstance) return;
+    ++lies_on[pixel.lies_on];
+    ++on_another;
+  }
+};
+
+std::string Millimetres(double m) { return fmt::format("{:.3g} mm", 1e3 * m); }
+
+// All points of one object and no others are off.
+Finding OneObjectIsOff(const Frame& frame, const ObjectInfo& object, const OffTotal& off) {
+  return About(
+      frame, "pose", cofusion::TrajectoryFile(object),
+      fmt::format(
+          "{} pixels of '{}' lie up to {} off its model (limit {}) and no others: {}", off.count,
+          object.name, Millimetres(off.worst_m), Millimetres(kModelLimit_m),
+          off.count <= kFewPixels ? "the depth there is wrong" : "its pose is not this frame's"));
+}
+
+// Puts what is off down to the masks, the depth's unit, one object's pose, or else the camera's.
+void Explain(const std::vector<OffPixel>& off_pixels, const RayCheck& rays,
+             const Surfaces& surfaces, const Frame& frame, std::vector<Finding>& findings) {
+  std::map<InstanceId, OffTotal> off;
+  OffTotal all;
+  for (const OffPixel& pixel : off_pixels) {
+    off[pixel.id].Add(pixel);
+    all.Add(pixel);
+  }
+  if (2 * all.on_another > all.count) {
+    for (const auto& [id, of_id] : off) {
+      for (const auto& [other, count] : of_id.lies_on) {
+        findings.push_back(
+            About(frame, "mask", cofusion::MaskFile(frame.index),
+                  fmt::format("{} pixels show id {} but their points lie on the model of {}", count,
+                              id, other)));
+      }
+    }
+    return;
+  }
+  const bool most_are_off = 2 * all.count > rays.pixels && !rays.ratios.empty();
+  const double ratio = most_are_off ? Median(rays.ratios) : 1.0;
+  if (std::abs(ratio - 1) > kUnitTolerance) {
+    findings.push_back(
+        About(frame, "depth", cofusion::DepthFile(frame.index),
+              fmt::format(
+                  "the depths are {:.4g} times those of the models: another unit, expected metres",
+                  ratio)));
+    return;
+  }
+  if (off.size() == 1 && !off.contains(kBackground)) {
+    const auto& [id, of_id] = *off.begin();
+    findings.push_back(OneObjectIsOff(frame, surfaces.at(id)->model().info, of_id));
+    return;
+  }
+  findings.push_back(
+      About(frame, "pose", cofusion::kCameraTrajectory,
+            fmt::format(
+                "{} pixels of {} objects lie up to {} off their models (limit {}): this pose or {} "
+                "is not this frame's",
+                all.count, off.size(), Millimetres(all.worst_m), Millimetres(kModelLimit_m),
+                cofusion::DepthFile(frame.index))));
 }
 
 }  // namespace
@@ -118,13 +326,6 @@ Residual ResidualMeter::Result() const {
   return result;
 }
 
-// What is wrong with the pixels of one object.
-struct FrameCheck::OffPixels {
-  std::int64_t count = 0;
-  double worst_m = 0;
-  std::map<InstanceId, std::int64_t> lies_on;  // another object's model
-};
-
 FrameCheck::FrameCheck(std::vector<TrueModel> models) {
   for (TrueModel& model : models) {
     const InstanceId id = model.info.id;
@@ -133,163 +334,17 @@ FrameCheck::FrameCheck(std::vector<TrueModel> models) {
 }
 
 FrameReport FrameCheck::Check(const Frame& frame) const {
-  const Intrinsics& k = frame.intrinsics;
-  const TriangleMesh all_C = PlaceAll(surfaces_, frame);
-  const Raster raster = Rasterise(all_C, k, Pose::Identity());
-
   FrameReport report;
-  struct Doubtful {
-    std::vector<Eigen::Vector3f> points_C;
-    std::vector<cv::Point> pixels;
-    std::vector<InstanceId> lies_on;  // what the ray hits first, if the point lies there
-  };
-  std::map<InstanceId, Doubtful> doubtful;
-  struct OffPixel {
-    InstanceId id = kNoInstance;
-    double distance_m = 0;
-    InstanceId lies_on = kNoInstance;
-  };
-  std::vector<OffPixel> off_pixels;
-  std::vector<OffPixel> by_edges;
-  std::vector<double> ratios;  // of depths to the model's, where they disagree
-  std::int64_t holes = 0;
-  std::int64_t pixels = 0;
-  for (int v = 0; v < k.height; ++v) {
-    const auto* depth = frame.depth.ptr<float>(v);
-    const auto* ids = frame.mask.ptr<InstanceId>(v);
-    const auto* face = raster.face.ptr<int>(v);
-    for (int u = 0; u < k.width; ++u) {
-      const float z = depth[u];
-      if (!IsValidDepth(z)) {
-        holes += face[u] >= 0 ? 1 : 0;
-        continue;
-      }
-      ++pixels;
-      const Eigen::Vector3f p_C(static_cast<float>(z * (u - k.cx) / k.fx),
-                                static_cast<float>(z * (v - k.cy) / k.fy), z);
-      InstanceId lies_on = kNoInstance;
-      if (face[u] >= 0) {
-        const auto t = static_cast<std::size_t>(face[u]);
-        const double distance = PointTriangleDistance(p_C, Corner(all_C, t, 0), Corner(all_C, t, 1),
-                                                      Corner(all_C, t, 2));
-        if (distance <= kModelLimit_m) {
-          lies_on = all_C.face_ids[t];
-          if (lies_on == ids[u]) {
-            report.model.Add(distance);
-            continue;
-          }
-        }
-        ratios.push_back(static_cast<double>(z) / raster.depth.at<float>(v, u));
-      }
-      Doubtful& entry = doubtful[ids[u]];
-      entry.points_C.push_back(p_C);
-      entry.pixels.emplace_back(u, v);
-      entry.lies_on.push_back(lies_on);
-    }
+  const RayCheck rays = FollowRays(surfaces_, frame, report.model);
+  if (rays.holes > 0) {
+    report.findings.push_back(
+        About(frame, "depth", cofusion::DepthFile(frame.index),
+              fmt::format("{} pixels have no depth though a model is there", rays.holes)));
   }
-  const auto add = [&](const char* check, std::string subject, std::string sentence) {
-    report.findings.push_back({check, std::move(subject), frame.index, std::move(sentence)});
-  };
-  if (holes > 0) {
-    add("depth", cofusion::DepthFile(frame.index),
-        fmt::format("{} pixels have no depth though a model is there", holes));
-  }
-  // The nearest triangle of the mask's own object decides.
-  const auto least_cosine =
-      static_cast<float>(std::cos(kMaxIncidence_deg * std::numbers::pi / 180));
-  for (const auto& [id, entry] : doubtful) {
-    const auto surface = surfaces_.find(id);
-    const auto pose = frame.T_WO.find(id);
-    const auto count = static_cast<std::int64_t>(entry.points_C.size());
-    if (surface == surfaces_.end() || (id != kBackground && pose == frame.T_WO.end())) {
-      add("mask", cofusion::MaskFile(frame.index),
-          fmt::format("{} pixels show id {}, which has no {}", count, id,
-                      surface == surfaces_.end() ? "model" : "pose in this frame"));
-      continue;
-    }
-    const Pose T_OC = id == kBackground ? frame.T_WC : Pose(pose->second.inverse() * frame.T_WC);
-    std::vector<Eigen::Vector3f> points_O;
-    points_O.reserve(entry.points_C.size());
-    for (const Eigen::Vector3f& p : entry.points_C) {
-      points_O.emplace_back((T_OC * p.cast<double>()).cast<float>());
-    }
-    const NearestSurface nearest = surface->second->index_O().Nearest(points_O);
-    for (std::size_t i = 0; i < points_O.size(); ++i) {
-      const double distance = nearest.distance_m[i];
-      const OffPixel pixel{id, distance, entry.lies_on[i]};
-      if (distance <= kModelLimit_m) {
-        report.model.Add(distance);
-        continue;
-      }
-      const Eigen::Vector3f ray_O =
-          (T_OC.linear() * entry.points_C[i].cast<double>().normalized()).cast<float>();
-      const bool grazing = std::abs(nearest.normal[i].dot(ray_O)) < least_cosine;
-      const double pixel_m = entry.points_C[i].z() / k.fx;
-      const bool by_edge = distance <= std::max(kEdgeReach_m, kEdgeReach_px * pixel_m) &&
-                           (grazing || IsBesideAnother(frame.mask, entry.pixels[i]) ||
-                            IsBesideStep(frame.depth, entry.pixels[i]));
-      (by_edge ? by_edges : off_pixels).push_back(pixel);
-    }
-  }
-  if (static_cast<double>(by_edges.size()) <=
-      static_cast<double>(kFewPixels) + kEdgeShare * static_cast<double>(pixels)) {
-    report.model.Exclude(static_cast<std::int64_t>(by_edges.size()));
-  } else {
-    off_pixels.insert(off_pixels.end(), by_edges.begin(), by_edges.end());
-  }
-  std::map<InstanceId, OffPixels> off;
-  for (const OffPixel& pixel : off_pixels) {
-    report.model.Add(pixel.distance_m);
-    OffPixels& o = off[pixel.id];
-    ++o.count;
-    o.worst_m = std::max(o.worst_m, pixel.distance_m);
-    if (pixel.lies_on != kNoInstance) ++o.lies_on[pixel.lies_on];
-  }
-  if (off.empty()) return report;
-
-  std::int64_t all_off = 0;
-  std::int64_t on_another = 0;
-  double worst = 0;
-  for (const auto& [id, o] : off) {
-    all_off += o.count;
-    worst = std::max(worst, o.worst_m);
-    for (const auto& [other, count] : o.lies_on) on_another += count;
-  }
-  const auto millimetres = [](double m) { return fmt::format("{:.3g} mm", 1e3 * m); };
-  if (2 * on_another > all_off) {
-    for (const auto& [id, o] : off) {
-      for (const auto& [other, count] : o.lies_on) {
-        add("mask", cofusion::MaskFile(frame.index),
-            fmt::format("{} pixels show id {} but their points lie on the model of {}", count, id,
-                        other));
-      }
-    }
-    return report;
-  }
-  if (const double ratio = 2 * all_off > pixels && !ratios.empty() ? Median(ratios) : 1.0;
-      std::abs(ratio - 1) > kUnitTolerance) {
-    add("depth", cofusion::DepthFile(frame.index),
-        fmt::format("the depths are {:.4g} times those of the models: another unit, expected "
-                    "metres",
-                    ratio));
-    return report;
-  }
-  if (off.size() == 1 && !off.contains(kBackground)) {
-    const auto& [id, o] = *off.begin();
-    const ObjectInfo& object = surfaces_.at(id)->model().info;
-    add("pose", cofusion::TrajectoryFile(object),
-        fmt::format(
-            "{} pixels of '{}' lie up to {} off its model (limit {}) and no others: {}", o.count,
-            object.name, millimetres(o.worst_m), millimetres(kModelLimit_m),
-            o.count <= kFewPixels ? "the depth there is wrong" : "its pose is not this frame's"));
-    return report;
-  }
-  add("pose", cofusion::kCameraTrajectory,
-      fmt::format(
-          "{} pixels of {} objects lie up to {} off their models (limit {}): this pose or {} "
-          "is not this frame's",
-          all_off, off.size(), millimetres(worst), millimetres(kModelLimit_m),
-          cofusion::DepthFile(frame.index)));
+  OffPixels off = MeasureDoubtful(surfaces_, frame, rays, report);
+  ExcuseEdges(off, rays.pixels, report.model);
+  for (const OffPixel& pixel : off.plain) report.model.Add(pixel.distance_m);
+  if (!off.plain.empty()) Explain(off.plain, rays, surfaces_, frame, report.findings);
   return report;
 }
 

@@ -63,7 +63,6 @@ class FrameCheck {
   FrameReport Check(const Frame& frame) const;
 
  private:
-  struct OffPixels;
   std::map<InstanceId, std::unique_ptr<TruthSurface>> surfaces_;
 };
 

@@ -29,6 +29,7 @@ constexpr int kCellWidth = 416;
 constexpr int kGap = 8;
 constexpr int kTitle = 26;
 constexpr int kColumns = 3;
+constexpr std::size_t kTextPlace = 2;    // the free place after the panels of the camera
 constexpr int kFade = 8;                 // output frames from one still to the next, at most
 constexpr double kBody_s = 12;           // the growing maps, at least this long
 constexpr int kMostHold = 45;            // output frames a still
@@ -67,8 +68,8 @@ class Film {
 
   cv::Size size() const { return size_; }
 
-  // An image a panel; an empty one leaves its place free.
-  cv::Mat Compose(const std::vector<cv::Mat>& images) const {
+  // An image a panel; an empty one leaves its place free, for the lines of text.
+  cv::Mat Compose(const std::vector<cv::Mat>& images, const std::vector<std::string>& lines) const {
     cv::Mat page(size_, CV_8UC3, kPaper);
     for (std::size_t i = 0; i < panels_.size(); ++i) {
       const cv::Point corner = CornerOf(i);
@@ -78,16 +79,12 @@ class Film {
       cv::resize(images[i], small, cell_, 0, 0, cv::INTER_AREA);
       small.copyTo(page(cv::Rect(corner + cv::Point(0, kTitle), cell_)));
     }
-    return page;
-  }
-
-  // Lines of text in the free place after the panels of the camera.
-  void Say(cv::Mat& page, std::size_t place, const std::vector<std::string>& lines) const {
-    cv::Point at = CornerOf(place) + cv::Point(12, kTitle + 34);
+    cv::Point at = CornerOf(kTextPlace) + cv::Point(12, kTitle + 34);
     for (std::size_t i = 0; i < lines.size(); ++i) {
       Write(page, lines[i], at, i == 0 ? 0.8 : 0.55, i == 0 ? 2 : 1);
       at.y += i == 0 ? 38 : 26;
     }
+    return page;
   }
 
  private:
@@ -106,35 +103,12 @@ Expected<cv::Mat> ReadStill(const std::filesystem::path& path) {
   return ReadImageFile(path, DecodeAs::kColour);
 }
 
+std::string FrameLine(int frame) { return fmt::format("frame {}", frame); }
+
 cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
   cv::Mat mixed;
   cv::addWeighted(from, 1 - share, to, share, 0, mixed);
   return mixed;
-}
-
-// The maps after the removal, as the recording's last key frame that has them shows them.
-Expected<std::vector<cv::Mat>> AfterRemoval(const Recording& recording,
-                                            const std::vector<cv::Mat>& last) {
-  std::vector<cv::Mat> images = last;
-  const nlohmann::json& runs = recording.json["runs"];
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    const nlohmann::json& keys = runs[r]["key_frames"];
-    if (keys.empty() || !keys.back().contains("picture_after")) continue;
-    const nlohmann::json& place = keys.back()["picture_after"];
-    // ReadRecording has made sure of the place.
-    const std::string_view encoded =
-        std::string_view(recording.bytes)
-            .substr(place[0].get<std::size_t>(), place[1].get<std::size_t>());
-    TSDFPP_ASSIGN(images[kColumns + r],
-                  DecodeImage(encoded, "a picture after the removal", DecodeAs::kColour));
-  }
-  return images;
-}
-
-std::string TitleOf(const nlohmann::json& run) {
-  std::string title = run["folder"].get<std::string>();
-  std::replace(title.begin(), title.end(), '_', ' ');
-  return title;
 }
 
 }  // namespace
@@ -169,13 +143,16 @@ namespace {
 // A file in memory that a library can open by a name: it says nothing where it could not write.
 class MemoryFile {
  public:
-  MemoryFile() : descriptor_(memfd_create("tsdfpp-film", MFD_CLOEXEC)) {}
+  MemoryFile()
+      : descriptor_(memfd_create("tsdfpp-film", MFD_CLOEXEC)),
+        failure_(descriptor_ < 0 ? errno : 0) {}
   ~MemoryFile() {
     if (descriptor_ >= 0) close(descriptor_);
   }
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
   bool is_open() const { return descriptor_ >= 0; }
+  int failure() const { return failure_; }  // as errno
   Expected<std::string> Read() const {
     std::string bytes;
     std::array<char, 65536> block{};
@@ -192,6 +169,7 @@ class MemoryFile {
 
  private:
   int descriptor_;
+  int failure_;
 };
 
 std::string HiddenName(const std::filesystem::path& file) {
@@ -216,6 +194,60 @@ void RemoveDeadLinks(const std::filesystem::path& file) {
   for (const std::filesystem::path& link : dead) std::filesystem::remove(link, failure);
 }
 
+// The film while it is written. OpenCV does not say whether what it wrote got anywhere, so it
+// writes to memory. It knows the format by the name's end, so a link there has one.
+class FilmFile {
+ public:
+  explicit FilmFile(const std::filesystem::path& file)
+      : file_(file),
+        link_{file.parent_path() / fmt::format("{}{}.mp4", HiddenName(file), getpid())} {}
+
+  // Errors: kEnvironment, the folder refuses or there is no encoder.
+  Expected<void> Open(cv::Size size) {
+    if (file_.has_parent_path()) TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(file_.parent_path()));
+    if (!memory_.is_open()) return Cannot(std::strerror(memory_.failure()));
+    RemoveDeadLinks(file_);
+    std::error_code failure;
+    std::filesystem::create_symlink(memory_.path(), link_.path, failure);
+    if (failure) return Cannot(failure.message());
+    const QuietStderr quiet;  // the encoder prints what it chose
+    writer_.open(link_.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
+                 kRate_hz, size);
+    if (writer_.isOpened()) return {};
+    return EnvironmentError(
+        "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",
+        file_.string());
+  }
+
+  void Show(const cv::Mat& page) {
+    writer_.write(page);
+    ++frames_;
+  }
+
+  int frames() const { return frames_; }
+
+  // Errors: kEnvironment, the film is not whole or cannot be written.
+  Expected<void> Finish() {
+    writer_.release();
+    TSDFPP_ASSIGN(const std::string bytes, memory_.Read());
+    if (!IsWholeVideo(bytes)) {
+      return Cannot(fmt::format("the video is cut off after {} bytes", bytes.size()));
+    }
+    return WriteFile(file_, bytes);
+  }
+
+ private:
+  tl::unexpected<Error> Cannot(const std::string& why) const {
+    return EnvironmentError("cannot write '{}': {}", file_.string(), why);
+  }
+
+  std::filesystem::path file_;
+  MemoryFile memory_;
+  Temporary link_;
+  cv::VideoWriter writer_;
+  int frames_ = 0;
+};
+
 // Errors: kData, saying what to do, where the recording is of another run than the summary.
 Expected<void> CheckRecordedRun(const std::filesystem::path& run) {
   const auto read = ReadJsonObject(run / kSummaryFile);
@@ -223,34 +255,23 @@ Expected<void> CheckRecordedRun(const std::filesystem::path& run) {
   return CheckOneRun(run, RunOfSummary(summary), {"record/record.json", "record/record.bin"});
 }
 
-}  // namespace
+std::string TitleOf(const nlohmann::json& run) {
+  std::string title = run["folder"].get<std::string>();
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
 
-Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
-                                       const std::filesystem::path& file) {
-  TSDFPP_RETURN_IF_ERROR(CheckRecordedRun(run));
-  TSDFPP_ASSIGN(const std::optional<Recording> recording, ReadRecording(run));
-  if (!recording || !recording->json.contains("stills") || !recording->json["stills"].is_array() ||
-      recording->json["stills"].empty()) {
-    return DataError("'{}' has no recording to film, expected what tsdfpp compare --record writes",
-                     run.string());
-  }
+// What is filmed: a recording, the frames that it has stills of, and what the film shows of each.
+struct Footage {
+  std::filesystem::path run;
+  Recording recording;
   std::vector<int> stills;
-  for (const nlohmann::json& still : recording->json["stills"]) {
-    const auto frame = WholeIn(still, 0, std::numeric_limits<int>::max());
-    if (!frame || (!stills.empty() && *frame <= stills.back())) {
-      return DataError("'{}': a still is {}, expected frames' numbers, each greater than the last",
-                       run.string(), JsonShown(still));
-    }
-    stills.push_back(static_cast<int>(*frame));
-  }
-  std::vector<Panel> panels{{"camera", "colour"}, {"objects", "mask"}, {"", ""}};
-  for (const nlohmann::json& each : recording->json["runs"]) {
-    panels.push_back({TitleOf(each), each["folder"].get<std::string>()});
-    // Part of the stills' file names.
-    TSDFPP_RETURN_IF_ERROR(
-        CheckPlainName(panels.back().still, fmt::format("'{}': a map's folder", run.string())));
-  }
-  const auto read = [&](int frame) -> Expected<std::vector<cv::Mat>> {
+  std::vector<Panel> panels;  // the camera's, then a map's each
+
+  std::string Sequence() const { return recording.json.value("sequence", ""); }
+
+  // An image a panel; an empty one for the free place.
+  Expected<std::vector<cv::Mat>> ImagesAt(int frame) const {
     std::vector<cv::Mat> images;
     for (const Panel& panel : panels) {
       images.emplace_back();
@@ -259,76 +280,117 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
                     ReadStill(run / "record" / "stills" / StillName(panel.still, frame)));
     }
     return images;
-  };
-  TSDFPP_ASSIGN(std::vector<cv::Mat> images, read(stills.front()));
-  const Film film(panels, {kCellWidth, std::max(1, kCellWidth * images[0].rows / images[0].cols)});
+  }
 
-  // OpenCV does not say whether what it wrote got anywhere, so it writes to memory. It knows the
-  // format by the name's end, so a link there has one.
-  if (file.has_parent_path()) TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(file.parent_path()));
-  const MemoryFile memory;
-  if (!memory.is_open()) {
-    return EnvironmentError("cannot write '{}': {}", file.string(), std::strerror(errno));
-  }
-  RemoveDeadLinks(file);
-  const Temporary part{file.parent_path() / fmt::format("{}{}.mp4", HiddenName(file), getpid())};
-  std::error_code failure;
-  std::filesystem::create_symlink(memory.path(), part.path, failure);
-  if (failure) {
-    return EnvironmentError("cannot write '{}': {}", file.string(), failure.message());
-  }
-  cv::VideoWriter writer;
-  {
-    const QuietStderr quiet;  // the encoder prints what it chose
-    writer.open(part.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
-                kRate_hz, film.size());
-  }
-  if (!writer.isOpened()) {
-    return EnvironmentError(
-        "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",
-        file.string());
-  }
-  ReportVideo video{0, film.size().width, film.size().height, 0};
-  const auto show = [&](const cv::Mat& page) {
-    writer.write(page);
-    ++video.frames;
-  };
-  const std::string sequence = recording->json.value("sequence", "");
-  const int hold = std::clamp(
-      static_cast<int>(kBody_s * kRate_hz / static_cast<double>(stills.size())), 2, kMostHold);
-  const int fade = std::min(kFade, hold / 2);
-  cv::Mat before;
-  for (const int frame : stills) {
-    TSDFPP_ASSIGN(images, read(frame));
-    cv::Mat page = film.Compose(images);
-    film.Say(page, 2, {sequence, fmt::format("frame {}", frame)});
-    for (int i = 0; i < hold; ++i) {
-      show(!before.empty() && i < fade ? Between(before, page, (i + 1.0) / fade) : page);
+  // The names of what is removed, between commas.
+  std::string Removed() const {
+    std::string removed;
+    for (const nlohmann::json& object : recording.json["objects"]) {
+      if (!object.value("removed", false)) continue;
+      removed += (removed.empty() ? "" : ", ") + object.value("name", "");
     }
-    before = page;
+    return removed;
   }
-  std::string removed;
-  for (const nlohmann::json& object : recording->json["objects"]) {
-    if (!object.value("removed", false)) continue;
-    removed += (removed.empty() ? "" : ", ") + object.value("name", "");
+
+  // The last images with the maps after the removal, as the recording's last key frame that has
+  // them shows them.
+  Expected<std::vector<cv::Mat>> AfterRemoval(const std::vector<cv::Mat>& last) const {
+    std::vector<cv::Mat> images = last;
+    const nlohmann::json& runs = recording.json["runs"];
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+      const nlohmann::json& keys = runs[r]["key_frames"];
+      if (keys.empty() || !keys.back().contains("picture_after")) continue;
+      const nlohmann::json& place = keys.back()["picture_after"];
+      // ReadRecording has made sure of the place.
+      const std::string_view encoded =
+          std::string_view(recording.bytes)
+              .substr(place[0].get<std::size_t>(), place[1].get<std::size_t>());
+      TSDFPP_ASSIGN(images[kColumns + r],
+                    DecodeImage(encoded, "a picture after the removal", DecodeAs::kColour));
+    }
+    return images;
   }
-  if (!removed.empty()) {
-    TSDFPP_ASSIGN(const std::vector<cv::Mat> after, AfterRemoval(*recording, images));
-    cv::Mat page = film.Compose(after);
-    film.Say(page, 2,
-             {sequence, fmt::format("frame {}", stills.back()), "taken out of the maps:", removed});
-    for (int i = 0; i < kReveal; ++i) show(Between(before, page, (i + 1.0) / kReveal));
-    for (int i = 0; i < kLast; ++i) show(page);
+};
+
+// Errors: kData, the run has no recording with stills, or it is broken.
+Expected<Footage> ReadFootage(const std::filesystem::path& run) {
+  TSDFPP_RETURN_IF_ERROR(CheckRecordedRun(run));
+  TSDFPP_ASSIGN(std::optional<Recording> recording, ReadRecording(run));
+  if (!recording || !recording->json.contains("stills") || !recording->json["stills"].is_array() ||
+      recording->json["stills"].empty()) {
+    return DataError("'{}' has no recording to film, expected what tsdfpp compare --record writes",
+                     run.string());
   }
-  writer.release();
-  TSDFPP_ASSIGN(const std::string bytes, memory.Read());
-  if (!IsWholeVideo(bytes)) {
-    return EnvironmentError("cannot write '{}': the video is cut off after {} bytes", file.string(),
-                            bytes.size());
+  Footage footage{run, std::move(*recording), {}, {{"camera", "colour"}, {"objects", "mask"}, {}}};
+  for (const nlohmann::json& still : footage.recording.json["stills"]) {
+    const auto frame = WholeIn(still, 0, std::numeric_limits<int>::max());
+    if (!frame || (!footage.stills.empty() && *frame <= footage.stills.back())) {
+      return DataError("'{}': a still is {}, expected frames' numbers, each greater than the last",
+                       run.string(), JsonShown(still));
+    }
+    footage.stills.push_back(static_cast<int>(*frame));
   }
-  TSDFPP_RETURN_IF_ERROR(WriteFile(file, bytes));
-  video.seconds = static_cast<double>(video.frames) / kRate_hz;
-  return video;
+  for (const nlohmann::json& each : footage.recording.json["runs"]) {
+    footage.panels.push_back({TitleOf(each), each["folder"].get<std::string>()});
+    // Part of the stills' file names.
+    TSDFPP_RETURN_IF_ERROR(CheckPlainName(footage.panels.back().still,
+                                          fmt::format("'{}': a map's folder", run.string())));
+  }
+  return footage;
+}
+
+// The page that the growing maps end with, and its images.
+struct LastPage {
+  std::vector<cv::Mat> images;
+  cv::Mat page;
+};
+
+// The maps as they grow, a still after the other.
+Expected<LastPage> ShowGrowth(const Footage& footage, const Film& film, FilmFile& out) {
+  const int hold =
+      std::clamp(static_cast<int>(kBody_s * kRate_hz / static_cast<double>(footage.stills.size())),
+                 2, kMostHold);
+  const int fade = std::min(kFade, hold / 2);
+  LastPage last;
+  for (const int frame : footage.stills) {
+    TSDFPP_ASSIGN(last.images, footage.ImagesAt(frame));
+    const cv::Mat page = film.Compose(last.images, {footage.Sequence(), FrameLine(frame)});
+    for (int i = 0; i < hold; ++i) {
+      out.Show(!last.page.empty() && i < fade ? Between(last.page, page, (i + 1.0) / fade) : page);
+    }
+    last.page = page;
+  }
+  return last;
+}
+
+// What the removal leaves of them, where something is removed.
+Expected<void> ShowRemoval(const Footage& footage, const Film& film, const LastPage& before,
+                           FilmFile& out) {
+  const std::string removed = footage.Removed();
+  if (removed.empty()) return {};
+  TSDFPP_ASSIGN(const std::vector<cv::Mat> after, footage.AfterRemoval(before.images));
+  const cv::Mat page = film.Compose(after, {footage.Sequence(), FrameLine(footage.stills.back()),
+                                            "taken out of the maps:", removed});
+  for (int i = 0; i < kReveal; ++i) out.Show(Between(before.page, page, (i + 1.0) / kReveal));
+  for (int i = 0; i < kLast; ++i) out.Show(page);
+  return {};
+}
+
+}  // namespace
+
+Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
+                                       const std::filesystem::path& file) {
+  TSDFPP_ASSIGN(const Footage footage, ReadFootage(run));
+  TSDFPP_ASSIGN(const std::vector<cv::Mat> first, footage.ImagesAt(footage.stills.front()));
+  const Film film(footage.panels,
+                  {kCellWidth, std::max(1, kCellWidth * first[0].rows / first[0].cols)});
+  FilmFile out(file);
+  TSDFPP_RETURN_IF_ERROR(out.Open(film.size()));
+  TSDFPP_ASSIGN(const LastPage grown, ShowGrowth(footage, film, out));
+  TSDFPP_RETURN_IF_ERROR(ShowRemoval(footage, film, grown, out));
+  TSDFPP_RETURN_IF_ERROR(out.Finish());
+  return ReportVideo{out.frames(), film.size().width, film.size().height,
+                     static_cast<double>(out.frames()) / kRate_hz};
 }
 
 }  // namespace tsdfpp

@@ -166,6 +166,22 @@ void ScoreRevealedGhosts(const TriangleMesh* revealed, const SceneTruth& truth,
   result.revealed_unseen_error_m2 = Measured::Of(unseen.standard_error_m2);
 }
 
+// What is scored of the scene as a whole: surfaces in free space, what the camera sees, seams.
+void ScoreScene(const SceneMeshes& meshes, const SceneTruth& truth,
+                const std::set<InstanceId>& movers, double voxel_m, Evaluation& result) {
+  const TriangleMesh& revealed = meshes.Without(movers);
+  const GhostScores ghosts =
+      ScoreGhosts(meshes.scene, truth.PlacedWithout({}), {}, voxel_m, truth.free_space());
+  result.ghost_area_m2 = ghosts.ghosts.area_m2;
+  result.ghost_error_m2 = ghosts.ghosts.standard_error_m2;
+  result.ghost_share = ghosts.share_of_mesh;
+  ScoreRevealedGhosts(meshes.labelled ? &revealed : nullptr, truth, movers, voxel_m, result);
+  const Frame& now = truth.recent().back();
+  const Raster raster = Rasterise(meshes.scene, now.intrinsics, now.T_WC);
+  result.sanity = ScoreSanity(meshes.scene, raster, truth.recent(), voxel_m);
+  result.seams = ScoreSeams(raster.depth, truth.recent(), voxel_m);
+}
+
 }  // namespace
 
 LastSeenStores MakeLastSeenStores(const SceneTruth& truth) {
@@ -255,18 +271,7 @@ Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
     result.visible_completion = visible_area > 0 ? Measured::Of(visible_present / visible_area)
                                                  : Measured::Undefined("nothing seen is visible");
   };
-  const auto score_scene = [&] {
-    const GhostScores ghosts =
-        ScoreGhosts(meshes.scene, truth.PlacedWithout({}), {}, voxel_m, truth.free_space());
-    result.ghost_area_m2 = ghosts.ghosts.area_m2;
-    result.ghost_error_m2 = ghosts.ghosts.standard_error_m2;
-    result.ghost_share = ghosts.share_of_mesh;
-    ScoreRevealedGhosts(meshes.labelled ? &revealed : nullptr, truth, movers, voxel_m, result);
-    const Frame& now = truth.recent().back();
-    const Raster raster = Rasterise(meshes.scene, now.intrinsics, now.T_WC);
-    result.sanity = ScoreSanity(meshes.scene, raster, truth.recent(), voxel_m);
-    result.seams = ScoreSeams(raster.depth, truth.recent(), voxel_m);
-  };
+  const auto score_scene = [&] { ScoreScene(meshes, truth, movers, voxel_m, result); };
   // Each writes its own part of the result.
   tbb::parallel_invoke(score_objects, score_scene);
   result.evaluate_s = Since(start);

@@ -45,6 +45,7 @@ std::string ColumnText(const EvaluationColumn& column, const Movers& movers,
   return fmt::format("{} ±{:.{}f}", text, *error.value, column.decimals + (*error.value < 10));
 }
 
+// Longer than a page: it is a table, a row a metric.
 const std::vector<EvaluationColumn>& EvaluationColumns() {
   static const std::vector<EvaluationColumn> columns{
       {"kept", "table_preservation_behind_other", "hidden table kept", "", Better::kHigher, 3,

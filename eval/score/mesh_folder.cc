@@ -153,12 +153,30 @@ ScenePart PartOfName(const std::string& stem) {
   return part;
 }
 
-Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alone, double scale) {
-  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(given));
-  TSDFPP_ASSIGN(const fs::path folder, FolderOf(given, frame, alone));
-  std::vector<fs::path> scenes;
-  std::vector<fs::path> others;
+namespace {
+
+// The surface files of a folder.
+struct FoundFiles {
+  std::vector<fs::path> scenes;  // named so
+  std::vector<fs::path> others;  // sorted
   std::map<std::set<InstanceId>, fs::path> removals;
+};
+
+Expected<void> AddRemoval(const fs::path& path, FoundFiles& found) {
+  const std::string stem = path.stem().string();
+  const auto ids = IdsOf(std::string_view(stem).substr(std::string_view(kWithout).size()));
+  if (!ids) {
+    return DataError("{}: expected ids between dashes behind '{}', as in scene-without-1-2.ply",
+                     path.string(), kWithout);
+  }
+  if (!found.removals.emplace(*ids, path).second) {
+    return DataError("{}: a second scene without the same objects", path.string());
+  }
+  return {};
+}
+
+Expected<FoundFiles> FindFiles(const fs::path& folder, int frame) {
+  FoundFiles found;
   std::error_code failure;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
        entry.increment(failure)) {
@@ -166,30 +184,34 @@ Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alon
     if (!IsSurfaceFile(path) || IsFolder(path)) continue;
     const std::string stem = path.stem().string();
     if (stem == kScene) {
-      scenes.push_back(path);
+      found.scenes.push_back(path);
     } else if (stem.starts_with(kWithout)) {
-      const auto ids = IdsOf(std::string_view(stem).substr(std::string_view(kWithout).size()));
-      if (!ids) {
-        return DataError("{}: expected ids between dashes behind '{}', as in scene-without-1-2.ply",
-                         path.string(), kWithout);
-      }
-      if (!removals.emplace(*ids, path).second) {
-        return DataError("{}: a second scene without the same objects", path.string());
-      }
+      TSDFPP_RETURN_IF_ERROR(AddRemoval(path, found));
     } else {
-      others.push_back(path);
+      found.others.push_back(path);
     }
   }
   if (failure) return DataError("{}: cannot be read as a folder", folder.string());
-  std::sort(others.begin(), others.end());
-  if (scenes.size() > 1) {
+  std::sort(found.others.begin(), found.others.end());
+  if (found.scenes.size() > 1) {
     return DataError("{}: holds {} and {}, expected one scene", folder.string(),
-                     scenes[0].filename().string(), scenes[1].filename().string());
+                     found.scenes[0].filename().string(), found.scenes[1].filename().string());
   }
-  if (scenes.empty() && others.empty()) {
+  if (found.scenes.empty() && found.others.empty()) {
     return DataError("{}: holds no mesh of frame {} (.ply, .obj, .stl, .glb)", folder.string(),
                      frame);
   }
+  return found;
+}
+
+}  // namespace
+
+Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alone, double scale) {
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(given));
+  TSDFPP_ASSIGN(const fs::path folder, FolderOf(given, frame, alone));
+  TSDFPP_ASSIGN(const FoundFiles found, FindFiles(folder, frame));
+  const std::vector<fs::path>& scenes = found.scenes;
+  const std::vector<fs::path>& others = found.others;
 
   FrameMeshes out;
   if (!scenes.empty()) {
@@ -210,7 +232,7 @@ Expected<FrameMeshes> ReadMeshFolder(const fs::path& given, int frame, bool alon
     }
   }
   TSDFPP_RETURN_IF_ERROR(CheckArea(out.scene));
-  for (const auto& [ids, path] : removals) {
+  for (const auto& [ids, path] : found.removals) {
     LoadedScene& without = out.without[ids];
     without.source = path.string();
     // Nothing may be left after a removal.

@@ -4,16 +4,12 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "eval/sweep/sweep.h"
 
 namespace tsdfpp {
-
-inline constexpr int kBenchResultSchema = 1;
 
 struct BenchSequence {
   std::string name;
@@ -49,31 +45,5 @@ Expected<void> CheckFrozen(const BenchSet& set);
 // The set as an experiment of these methods.
 Expected<ExperimentConfig> ExperimentOf(const BenchSet& set,
                                         const std::vector<std::string>& methods);
-
-// One method's result (docs/results-schema.md), of an experiment that ExperimentOf made.
-// `commit` is the method's; hardware is this machine's.
-nlohmann::json BenchResultJson(const BenchSet& set, const SweepResult& result,
-                               const std::string& method, const std::string& commit);
-
-// A result as a leaderboard reads it.
-struct BenchResult {
-  std::string file;
-  std::string method;
-  std::string version;
-  std::string commit;
-  std::string hardware;
-  // By sequence and metric.
-  std::map<std::string, std::map<std::string, Measured>> scores;
-};
-
-// Errors: kData, in one sentence with file and field: not JSON, another schema, set or hash, a
-// sequence or metric that is missing or unknown, a value that is neither a number nor an undefined
-// one with its reason.
-Expected<BenchResult> ReadBenchResult(const BenchSet& set, const std::filesystem::path& file);
-
-// A page in Markdown: the set, a row a result with the mean over the sequences and its bootstrap
-// interval, best first by the set's first metric, and every figure. Errors: those of
-// ReadBenchResult for any *.json of `folder`; kUsage where there is none.
-Expected<std::string> Leaderboard(const BenchSet& set, const std::filesystem::path& folder);
 
 }  // namespace tsdfpp

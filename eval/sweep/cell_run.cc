@@ -54,6 +54,61 @@ RunCosts CellMapper::costs() const {
   return {times_, frame_s_, pipeline_->map().Memory().bytes};
 }
 
+namespace {
+
+// A cell while its frames go by.
+struct CellRun {
+  Sabotage sabotage;
+  CellMapper mapper;
+  LastSeenStores last_seen;
+  CellResult result;
+};
+
+// The truth that cells are evaluated against at the frame that it has seen last.
+struct TruthNow {
+  const SequenceVariant& variant;
+  VariantSource& source;
+  const SceneTruth& truth;
+  std::vector<ObjectInfo> names;
+  std::set<InstanceId> movers;
+};
+
+Expected<void> EvaluateCell(CellRun& run, int index, const TruthNow& now) {
+  SceneMeshes meshes = run.mapper.Meshes(now.movers);
+  SabotageMeshes(run.sabotage, meshes);
+  std::optional<SceneTruth> visible;
+  if (run.sabotage == Sabotage::kVisibleOnly) {
+    TSDFPP_ASSIGN(visible, TruthOfRecentFrames(now.source.source(), now.truth.recent()));
+  }
+  CellFrame frame{index, index == now.variant.examined, {}, MeshDigest(meshes.scene)};
+  const Evaluation evaluation =
+      EvaluateMeshes(std::move(meshes), visible ? *visible : now.truth, now.names, now.movers,
+                     run.mapper.voxel_m(), run.last_seen);
+  std::vector<Measured> values = MeasureAll(evaluation, now.movers, run.mapper.costs());
+  if (frame.examined) {
+    run.result.examined = values;
+    run.result.evaluation = ToJson(evaluation);
+    run.result.removed = {now.movers.begin(), now.movers.end()};
+  }
+  values.resize(EvaluationMetricCount());
+  frame.values = std::move(values);
+  run.result.frames.push_back(std::move(frame));
+  return {};
+}
+
+// What is known of a cell once all frames went by.
+CellResult Finished(CellRun& run, const std::map<int, std::string>& image_digests,
+                    const std::string& timed_in) {
+  const RunCosts costs = run.mapper.costs();
+  run.result.times = costs.times ? costs.times->ToJson() : nlohmann::json(nullptr);
+  for (const double seconds : costs.frame_s) run.result.frame_ms.push_back(1e3 * seconds);
+  run.result.timed_in = timed_in;
+  run.result.image_digests = image_digests;
+  return std::move(run.result);
+}
+
+}  // namespace
+
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
                                            const std::function<void()>& progress) {
@@ -61,17 +116,11 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
   TSDFPP_ASSIGN(SceneTruth truth,
                 SabotagedTruth(variant.sabotage, source.source(), variant.voxel_m));
-  std::vector<ObjectInfo> names;
+  TruthNow now{variant, source, truth, {}, {}};
   for (std::size_t i = 0; i < truth.trackers().size(); ++i) {
-    names.push_back(truth.surface(i).model().info);
+    now.names.push_back(truth.surface(i).model().info);
   }
-  struct Run {
-    Sabotage sabotage;
-    CellMapper mapper;
-    LastSeenStores last_seen;
-    CellResult result;
-  };
-  std::vector<Run> runs;
+  std::vector<CellRun> runs;
   for (const Cell* cell : cells) {
     runs.push_back({cell->settings.sabotage,
                     {cell->settings, source.info().objects},
@@ -85,41 +134,15 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
     TSDFPP_RETURN_IF_ERROR(truth.Observe(both.truth));
     const bool evaluated =
         std::binary_search(variant.evaluated.begin(), variant.evaluated.end(), index);
-    const std::set<InstanceId> movers = MoversNow(source.info(), truth);
-    for (Run& run : runs) {
+    now.movers = MoversNow(source.info(), truth);
+    for (CellRun& run : runs) {
       TSDFPP_RETURN_IF_ERROR(run.mapper.Process(both.frame));
-      if (!evaluated) continue;
-      SceneMeshes meshes = run.mapper.Meshes(movers);
-      SabotageMeshes(run.sabotage, meshes);
-      std::optional<SceneTruth> visible;
-      if (run.sabotage == Sabotage::kVisibleOnly) {
-        TSDFPP_ASSIGN(visible, TruthOfRecentFrames(source.source(), truth.recent()));
-      }
-      CellFrame frame{index, index == variant.examined, {}, MeshDigest(meshes.scene)};
-      const Evaluation evaluation =
-          EvaluateMeshes(std::move(meshes), visible ? *visible : truth, names, movers,
-                         run.mapper.voxel_m(), run.last_seen);
-      std::vector<Measured> values = MeasureAll(evaluation, movers, run.mapper.costs());
-      if (frame.examined) {
-        run.result.examined = values;
-        run.result.evaluation = ToJson(evaluation);
-        run.result.removed = {movers.begin(), movers.end()};
-      }
-      values.resize(EvaluationMetricCount());
-      frame.values = std::move(values);
-      run.result.frames.push_back(std::move(frame));
+      if (evaluated) TSDFPP_RETURN_IF_ERROR(EvaluateCell(run, index, now));
     }
     if (progress) progress();
   }
   std::vector<CellResult> results;
-  for (Run& run : runs) {
-    const RunCosts costs = run.mapper.costs();
-    run.result.times = costs.times ? costs.times->ToJson() : nlohmann::json(nullptr);
-    for (const double seconds : costs.frame_s) run.result.frame_ms.push_back(1e3 * seconds);
-    run.result.timed_in = timed_in;
-    run.result.image_digests = digests;
-    results.push_back(std::move(run.result));
-  }
+  for (CellRun& run : runs) results.push_back(Finished(run, digests, timed_in));
   return results;
 }
 

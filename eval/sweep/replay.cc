@@ -191,73 +191,101 @@ Expected<void> WriteSlice(const MapSlice& slice, const fs::path& out) {
   return WriteImage(slice.id, out / "slice-id.png");
 }
 
-}  // namespace
+// The cell's frames up to the one that is asked for.
+Expected<std::vector<int>> FramesUpTo(int frame, const Recorded& recorded) {
+  const std::vector<int>& frames = recorded.variant.frames;
+  const auto last = std::find(frames.begin(), frames.end(), frame);
+  if (last != frames.end()) return std::vector<int>(frames.begin(), last + 1);
+  const std::string step =
+      frames.size() < 2 ? "" : fmt::format(" of every {}-th", frames[1] - frames[0]);
+  return UsageError("cell {}: frame {} is not among the {} that it used, {} to {}{}", recorded.id,
+                    frame, frames.size(), frames.front(), frames.back(), step);
+}
 
-Expected<ReplayResult> Replay(const ReplayOptions& options) {
-  TSDFPP_ASSIGN(const Recorded recorded, Load(options));
-  const SequenceVariant& variant = recorded.variant;
-  const auto last = std::find(variant.frames.begin(), variant.frames.end(), options.frame);
-  if (last == variant.frames.end()) {
-    const std::string step =
-        variant.frames.size() < 2
-            ? ""
-            : fmt::format(" of every {}-th", variant.frames[1] - variant.frames[0]);
-    return UsageError("cell {}: frame {} is not among the {} that it used, {} to {}{}", recorded.id,
-                      options.frame, variant.frames.size(), variant.frames.front(),
-                      variant.frames.back(), step);
-  }
-  TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
-  CellMapper mapper(recorded.settings, source.info().objects);
-  ReplayResult result{recorded.settings, recorded.id, 0, std::nullopt, {}, {}, {}};
-  const int total = static_cast<int>(last - variant.frames.begin()) + 1;
-  const auto later =
-      std::upper_bound(variant.evaluated.begin(), variant.evaluated.end(), options.frame);
-  if (later != variant.evaluated.begin()) result.compared_map_frame = *std::prev(later);
+// The last of the evaluated frames that is mapped again.
+std::optional<int> LastEvaluated(const std::vector<int>& evaluated, int frame) {
+  const auto later = std::upper_bound(evaluated.begin(), evaluated.end(), frame);
+  if (later == evaluated.begin()) return std::nullopt;
+  return *std::prev(later);
+}
+
+// The frame that is asked for, and the map's visible surfaces then.
+struct Remade {
   VariantFrame both;
   TriangleMesh scene;
-  for (int i = 0; i < total; ++i) {
-    const int index = variant.frames[static_cast<std::size_t>(i)];
-    TSDFPP_ASSIGN(both, source.Read(index));
-    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
+};
+
+// Maps the frames again and compares what the original run noted: the map at the last evaluated
+// frame, and the images of the last one. Counts and digests go into `result`.
+Expected<Remade> MapAgain(const Recorded& recorded, const std::vector<int>& frames,
+                          VariantSource& source, CellMapper& mapper, const ReplayOptions& options,
+                          ReplayResult& result) {
+  Remade remade;
+  for (const int index : frames) {
+    TSDFPP_ASSIGN(remade.both, source.Read(index));
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(remade.both.frame));
     ++result.frames;
     if (index == result.compared_map_frame || index == options.frame) {
-      scene = mapper.Meshes({}).scene;
-      result.map_digest = MeshDigest(scene);
+      remade.scene = mapper.Meshes({}).scene;
+      result.map_digest = MeshDigest(remade.scene);
     }
     if (index == result.compared_map_frame) {
       TSDFPP_RETURN_IF_ERROR(CheckSame(recorded, "the map's surfaces", index, result.map_digest,
                                        Noted(recorded.maps, index), source.source()));
     }
-    if (options.progress) options.progress(i + 1, total);
+    if (options.progress) options.progress(result.frames, static_cast<int>(frames.size()));
   }
-  result.image_digest = ImageDigest(both.frame);
+  result.image_digest = ImageDigest(remade.both.frame);
   TSDFPP_RETURN_IF_ERROR(CheckSame(recorded, "images and poses", options.frame, result.image_digest,
                                    Noted(recorded.images, options.frame), source.source()));
+  return remade;
+}
+
+Expected<void> WriteNote(const Recorded& recorded, int frame, const ReplayResult& result,
+                         const fs::path& file) {
+  const json note{{"cell", recorded.id},
+                  {"frame", frame},
+                  {"settings", SettingsJson(recorded.settings)},
+                  {"program", ProgramIdentity()},
+                  {"image_digest", result.image_digest},
+                  {"map_digest", result.map_digest}};
+  return WriteFile(file, JsonText(note, 1) + "\n");
+}
+
+// The files below a folder, as seen from it, sorted.
+Expected<std::vector<std::string>> NamesBelow(const fs::path& folder) {
+  TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFilesBelow(folder));
+  std::vector<std::string> names;
+  for (const fs::path& file : files) names.push_back(file.lexically_relative(folder).string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace
+
+Expected<ReplayResult> Replay(const ReplayOptions& options) {
+  TSDFPP_ASSIGN(const Recorded recorded, Load(options));
+  TSDFPP_ASSIGN(const std::vector<int> frames, FramesUpTo(options.frame, recorded));
+  TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(recorded.variant));
+  CellMapper mapper(recorded.settings, source.info().objects);
+  ReplayResult result{recorded.settings, recorded.id, 0, std::nullopt, {}, {}, {}};
+  result.compared_map_frame = LastEvaluated(recorded.variant.evaluated, options.frame);
+  TSDFPP_ASSIGN(const Remade remade, MapAgain(recorded, frames, source, mapper, options, result));
 
   const std::string command =
       fmt::format("tsdfpp replay {} --cell {} --frame {} --out {}", options.result.string(),
                   options.cell, options.frame, options.out.string());
   TSDFPP_ASSIGN(RunFolder run, RunFolder::Begin(options.out, command));
   const fs::path& out = run.path();
-  TSDFPP_RETURN_IF_ERROR(WriteCamera(both.frame, out / "camera"));
-  TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", scene));
+  TSDFPP_RETURN_IF_ERROR(WriteCamera(remade.both.frame, out / "camera"));
+  TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", remade.scene));
   if (const MapRepresentation* map = mapper.map()) {
     TSDFPP_RETURN_IF_ERROR(
-        WriteViews(*map, source.info().intrinsics, both.frame.T_WC, 2, out / "views"));
-    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, recorded.removed)), out));
+        WriteViews(*map, source.info().intrinsics, remade.both.frame.T_WC, 2, out / "views"));
+    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(remade.both, recorded.removed)), out));
   }
-  const json note{{"cell", recorded.id},
-                  {"frame", options.frame},
-                  {"settings", SettingsJson(recorded.settings)},
-                  {"program", ProgramIdentity()},
-                  {"image_digest", result.image_digest},
-                  {"map_digest", result.map_digest}};
-  TSDFPP_RETURN_IF_ERROR(WriteFile(out / "replay.json", JsonText(note, 1) + "\n"));
-  TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(out));
-  for (const fs::path& file : written) {
-    result.files.push_back(file.lexically_relative(out).string());
-  }
-  std::sort(result.files.begin(), result.files.end());
+  TSDFPP_RETURN_IF_ERROR(WriteNote(recorded, options.frame, result, out / "replay.json"));
+  TSDFPP_ASSIGN(result.files, NamesBelow(out));
   TSDFPP_RETURN_IF_ERROR(run.Commit());
   return result;
 }

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
+#include <vector>
 
 namespace tsdfpp {
 namespace {
@@ -46,6 +48,106 @@ Eigen::Vector3d OntoSurface(const BlobField& field, const Eigen::Vector3d& start
 }
 
 constexpr std::uint32_t kNone = 0xFFFFFFFF;
+
+// A field at the nodes of a grid.
+struct SampledField {
+  Grid grid;
+  std::vector<double> value;
+
+  double At(const Eigen::Vector3i& node) const { return value[grid.Node(node)]; }
+  bool IsInside(const Eigen::Vector3i& node) const { return At(node) < 0; }
+};
+
+SampledField Sample(const BlobField& field, const Eigen::AlignedBox3d& box, double cell) {
+  SampledField samples;
+  Grid& grid = samples.grid;
+  grid = {box.min() - Eigen::Vector3d::Constant(1.5 * cell), cell, {}};
+  grid.nodes = ((box.sizes() / cell).array().ceil().cast<int>() + 4).matrix();
+  samples.value.resize(static_cast<std::size_t>(grid.nodes.prod()));
+  for (int z = 0; z < grid.nodes.z(); ++z) {
+    for (int y = 0; y < grid.nodes.y(); ++y) {
+      for (int x = 0; x < grid.nodes.x(); ++x) {
+        samples.value[grid.Node({x, y, z})] = field(grid.Place({x, y, z}));
+      }
+    }
+  }
+  return samples;
+}
+
+// The mean of the points where the surface crosses the edges of the cell above `low`; nothing where
+// it crosses none.
+std::optional<Eigen::Vector3d> MeanCrossing(const SampledField& samples,
+                                            const Eigen::Vector3i& low) {
+  const Grid& grid = samples.grid;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int crossings = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 4; ++side) {
+      Eigen::Vector3i a = low;
+      a[(axis + 1) % 3] += side & 1;
+      a[(axis + 2) % 3] += side >> 1;
+      const Eigen::Vector3i b = a + Eigen::Vector3i::Unit(axis);
+      const double va = samples.At(a);
+      const double vb = samples.At(b);
+      if ((va < 0) == (vb < 0)) continue;
+      sum += grid.Place(a) + va / (va - vb) * (grid.Place(b) - grid.Place(a));
+      ++crossings;
+    }
+  }
+  if (crossings == 0) return std::nullopt;
+  return sum / crossings;
+}
+
+// A vertex in each cell that the surface crosses. Returns its index at the cell's lowest node.
+std::vector<std::uint32_t> PlaceVertices(const BlobField& field, const SampledField& samples,
+                                         Shape& shape) {
+  const Grid& grid = samples.grid;
+  std::vector<std::uint32_t> vertex(samples.value.size(), kNone);
+  for (int z = 0; z + 1 < grid.nodes.z(); ++z) {
+    for (int y = 0; y + 1 < grid.nodes.y(); ++y) {
+      for (int x = 0; x + 1 < grid.nodes.x(); ++x) {
+        const auto mean = MeanCrossing(samples, {x, y, z});
+        if (!mean) continue;
+        vertex[grid.Node({x, y, z})] = static_cast<std::uint32_t>(shape.vertices.size());
+        shape.vertices.push_back(OntoSurface(field, *mean, grid.cell));
+      }
+    }
+  }
+  return vertex;
+}
+
+// A quad as two triangles, cut along its shorter diagonal.
+void AddQuad(const std::array<std::uint32_t, 4>& quad, Shape& shape) {
+  const auto& p = shape.vertices;
+  const bool first = (p[quad[0]] - p[quad[2]]).norm() < (p[quad[1]] - p[quad[3]]).norm();
+  const std::size_t s = first ? 0 : 1;
+  shape.triangles.push_back({quad[s], quad[s + 1], quad[s + 2]});
+  shape.triangles.push_back({quad[s], quad[s + 2], quad[(s + 3) % 4]});
+}
+
+// Each grid edge that the surface crosses gives a face between the four cells around it.
+void JoinVertices(const SampledField& samples, const std::vector<std::uint32_t>& vertex,
+                  Shape& shape) {
+  const Grid& grid = samples.grid;
+  for (int z = 1; z + 1 < grid.nodes.z(); ++z) {
+    for (int y = 1; y + 1 < grid.nodes.y(); ++y) {
+      for (int x = 1; x + 1 < grid.nodes.x(); ++x) {
+        const Eigen::Vector3i at(x, y, z);
+        for (int axis = 0; axis < 3; ++axis) {
+          const bool here = samples.IsInside(at);
+          if (here == samples.IsInside(at + Eigen::Vector3i::Unit(axis))) continue;
+          const Eigen::Vector3i u = Eigen::Vector3i::Unit((axis + 1) % 3);
+          const Eigen::Vector3i v = Eigen::Vector3i::Unit((axis + 2) % 3);
+          std::array<std::uint32_t, 4> quad{vertex[grid.Node(at - u - v)],
+                                            vertex[grid.Node(at - v)], vertex[grid.Node(at)],
+                                            vertex[grid.Node(at - u)]};
+          if (!here) std::swap(quad[1], quad[3]);
+          AddQuad(quad, shape);
+        }
+      }
+    }
+  }
+}
 
 }  // namespace
 
@@ -95,67 +197,10 @@ BlobField Swollen(BlobField field, double distance) {
 }
 
 Shape MakeBlob(const BlobField& field, const Eigen::AlignedBox3d& box, double cell) {
-  Grid grid{box.min() - Eigen::Vector3d::Constant(1.5 * cell), cell, {}};
-  grid.nodes = ((box.sizes() / cell).array().ceil().cast<int>() + 4).matrix();
-  std::vector<double> value(static_cast<std::size_t>(grid.nodes.prod()));
-  for (int z = 0; z < grid.nodes.z(); ++z) {
-    for (int y = 0; y < grid.nodes.y(); ++y) {
-      for (int x = 0; x < grid.nodes.x(); ++x) {
-        value[grid.Node({x, y, z})] = field(grid.Place({x, y, z}));
-      }
-    }
-  }
-  const auto inside = [&](const Eigen::Vector3i& at) { return value[grid.Node(at)] < 0; };
-
+  const SampledField samples = Sample(field, box, cell);
   Shape shape;
-  std::vector<std::uint32_t> vertex(value.size(), kNone);  // of the cell above each node
-  for (int z = 0; z + 1 < grid.nodes.z(); ++z) {
-    for (int y = 0; y + 1 < grid.nodes.y(); ++y) {
-      for (int x = 0; x + 1 < grid.nodes.x(); ++x) {
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        int crossings = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-          for (int side = 0; side < 4; ++side) {
-            Eigen::Vector3i a(x, y, z);
-            a[(axis + 1) % 3] += side & 1;
-            a[(axis + 2) % 3] += side >> 1;
-            const Eigen::Vector3i b = a + Eigen::Vector3i::Unit(axis);
-            const double va = value[grid.Node(a)];
-            const double vb = value[grid.Node(b)];
-            if ((va < 0) == (vb < 0)) continue;
-            sum += grid.Place(a) + va / (va - vb) * (grid.Place(b) - grid.Place(a));
-            ++crossings;
-          }
-        }
-        if (crossings == 0) continue;
-        vertex[grid.Node({x, y, z})] = static_cast<std::uint32_t>(shape.vertices.size());
-        shape.vertices.push_back(OntoSurface(field, sum / crossings, cell));
-      }
-    }
-  }
-  // Each grid edge that the surface crosses gives a face between the four cells around it.
-  for (int z = 1; z + 1 < grid.nodes.z(); ++z) {
-    for (int y = 1; y + 1 < grid.nodes.y(); ++y) {
-      for (int x = 1; x + 1 < grid.nodes.x(); ++x) {
-        const Eigen::Vector3i at(x, y, z);
-        for (int axis = 0; axis < 3; ++axis) {
-          const bool here = inside(at);
-          if (here == inside(at + Eigen::Vector3i::Unit(axis))) continue;
-          const Eigen::Vector3i u = Eigen::Vector3i::Unit((axis + 1) % 3);
-          const Eigen::Vector3i v = Eigen::Vector3i::Unit((axis + 2) % 3);
-          std::array<std::uint32_t, 4> quad{vertex[grid.Node(at - u - v)],
-                                            vertex[grid.Node(at - v)], vertex[grid.Node(at)],
-                                            vertex[grid.Node(at - u)]};
-          if (!here) std::swap(quad[1], quad[3]);
-          const auto& p = shape.vertices;
-          const bool first = (p[quad[0]] - p[quad[2]]).norm() < (p[quad[1]] - p[quad[3]]).norm();
-          const std::size_t s = first ? 0 : 1;
-          shape.triangles.push_back({quad[s], quad[s + 1], quad[s + 2]});
-          shape.triangles.push_back({quad[s], quad[s + 2], quad[(s + 3) % 4]});
-        }
-      }
-    }
-  }
+  const std::vector<std::uint32_t> vertex = PlaceVertices(field, samples, shape);
+  JoinVertices(samples, vertex, shape);
   return shape;
 }
 

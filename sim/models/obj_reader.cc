@@ -1,13 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <string>
 
-#include "core/data_folder.h"
-#include "core/files.h"
-#include "core/one_line.h"
 #include "sim/models/mesh_files.h"
+#include "sim/models/obj_materials.h"
 #include "sim/models/profile_shapes.h"
 #include "sim/models/text_scanner.h"
 
@@ -22,29 +19,10 @@ constexpr std::size_t kMostConcaveWork =
 // Pictures repeat, but not that often.
 constexpr double kMostTexcoord = 1e4;
 
-Colour ToColour(const Eigen::Vector3d& rgb, double full) {
-  Colour colour{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double share = std::clamp(rgb[static_cast<Eigen::Index>(k)] / full, 0.0, 1.0);
-    colour[k] = static_cast<std::uint8_t>(255 * share + 0.5);
-  }
-  return colour;
-}
-
-// The rest of a line after its first word: a name, which may hold blanks.
-std::string RestOf(std::string_view line, std::string_view first_word) {
-  const char* rest = first_word.data() + first_word.size();
-  std::string name(rest, static_cast<std::size_t>(line.data() + line.size() - rest));
-  const auto blank = [](unsigned char c) { return std::isspace(c) != 0; };
-  name.erase(name.begin(), std::find_if_not(name.begin(), name.end(), blank));
-  name.erase(std::find_if_not(name.rbegin(), name.rend(), blank).base(), name.end());
-  return name;
-}
-
 class ObjReader {
  public:
   ObjReader(const std::filesystem::path& path, Materials materials)
-      : path_(path), file_(path.string()), wanted_(materials), above_(path.parent_path() / "..") {}
+      : file_(path.string()), materials_(path, materials, mesh_) {}
 
   Expected<RawMesh> Read(std::string_view text);
 
@@ -63,24 +41,16 @@ class ObjReader {
   Expected<double> ReadNumber(std::string_view word);
   Expected<void> CutFace(const std::vector<Corner>& corners);
   Expected<void> AddTriangle(const Corner& a, const Corner& b, const Corner& c);
-  Companion Find(const std::filesystem::path& from, const std::string& name) const;
-  void ReadLibrary(const std::string& name);
   void AddRemarks();
-  int MaterialNamed(const std::string& name);
 
-  std::filesystem::path path_;
   std::string file_;
-  Materials wanted_;
-  DataFolder above_;                           // of the mesh's folder
-  std::set<std::filesystem::path> libraries_;  // read, or found to be unreadable
   int line_ = 0;
   RawMesh mesh_;
   std::vector<std::optional<Eigen::Vector3d>> colours_;  // as written, per vertex
+  ObjMaterials materials_;
   int material_ = kNoMaterial;
-  std::map<std::string, int> materials_;
   std::size_t not_faces_ = 0;
   std::size_t concave_work_ = 0;
-  std::int64_t library_bytes_ = 0;
 };
 
 Expected<double> ObjReader::ReadNumber(std::string_view word) {
@@ -224,102 +194,6 @@ Expected<void> ObjReader::ReadFace(const std::vector<std::string_view>& words) {
   return CutFace(corners);
 }
 
-int ObjReader::MaterialNamed(const std::string& name) {
-  const auto [entry, is_new] =
-      materials_.try_emplace(name, static_cast<int>(mesh_.materials.size()));
-  if (is_new) mesh_.materials.push_back({name, std::nullopt, {}});
-  return entry->second;
-}
-
-// Stands for the name of the mesh's folder in a path from the folder above it.
-constexpr const char* kMeshFolder = "\x01";
-
-// Where a path is that a file in the folder `from` (as seen from the folder above the mesh's) says.
-Companion ObjReader::Find(const std::filesystem::path& from, const std::string& name) const {
-  const std::filesystem::path seen = (from / name).lexically_normal();
-  const std::filesystem::path folder = path_.parent_path();
-  if (seen.is_absolute() || seen.begin() == seen.end() || *seen.begin() == "..") {
-    return {name, folder / name, false};
-  }
-  const bool beside = *seen.begin() == kMeshFolder;
-  const std::filesystem::path path =
-      beside ? folder / seen.lexically_relative(kMeshFolder) : folder / ".." / seen;
-  return {name, path, above_.CheckLinks(path).has_value()};
-}
-
-void ObjReader::ReadLibrary(const std::string& name) {
-  if (wanted_ == Materials::kSkip) return;
-  std::string plain = name;
-  std::replace(plain.begin(), plain.end(), '\\', '/');
-  const Companion library = Find(kMeshFolder, plain);
-  const std::filesystem::path path = library.path;
-  // One library has many names: "a.mtl", "./a.mtl".
-  std::error_code code;
-  const std::filesystem::path place = std::filesystem::weakly_canonical(path, code);
-  if (!libraries_.insert(code ? path : place).second) return;
-  const std::filesystem::path from =
-      (std::filesystem::path(kMeshFolder) / plain).lexically_normal().parent_path();
-  mesh_.companions.push_back(library);
-  const auto bytes =
-      library.inside
-          ? ReadFile(path, &Limits::text_bytes)
-          : DataError("{}: expected a relative path inside the folder above the mesh's", plain);
-  if (!bytes) {
-    mesh_.remarks.push_back(
-        fmt::format("{}: its material library cannot be read ({}), so its "
-                    "colours are not known",
-                    file_, bytes.error().message));
-    return;
-  }
-  library_bytes_ += static_cast<std::int64_t>(bytes->size());
-  if (library_bytes_ > CurrentLimits().text_bytes) {
-    mesh_.remarks.push_back(
-        fmt::format("{}: is left out, its material libraries are larger together than one may be",
-                    path.string()));
-    return;
-  }
-  RawMaterial* material = nullptr;
-  std::string_view text = *bytes;
-  while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    const auto words = WordsOf(line);
-    if (words.size() < 2) continue;
-    if (words[0] == "newmtl") {
-      const int index = MaterialNamed(RestOf(line, words[0]));
-      material = &mesh_.materials[static_cast<std::size_t>(index)];
-    } else if (words[0] == "Kd" && material != nullptr && words.size() >= 4) {
-      Eigen::Vector3d rgb = Eigen::Vector3d::Constant(-1);
-      for (int k = 0; k < 3; ++k) {
-        rgb[k] = NumberIn<double>(words[static_cast<std::size_t>(k) + 1]).value_or(-1);
-      }
-      if (rgb.allFinite() && rgb.minCoeff() >= 0) {
-        material->colour = ToColour(rgb, 1);
-      } else {
-        mesh_.remarks.push_back(
-            fmt::format("{}: Kd of material '{}' is not three numbers from 0 to 1: left out",
-                        path.string(), material->name));
-      }
-    } else if (words[0] == "map_Kd" && material != nullptr) {
-      // Options such as `-s 1 1 1` come before the name, which then cannot hold blanks.
-      std::string picture =
-          words[1].starts_with('-') ? std::string(words.back()) : RestOf(line, words[0]);
-      std::replace(picture.begin(), picture.end(), '\\', '/');
-      const Companion found = Find(from, picture);
-      mesh_.companions.push_back(found);
-      if (found.inside) {
-        material->picture = found.path;
-      } else {
-        mesh_.remarks.push_back(
-            fmt::format("{}: the picture {} of material {} is not looked at, expected a relative "
-                        "path inside the folder above the mesh's",
-                        path.string(), Quoted(picture), Quoted(material->name)));
-      }
-    }
-  }
-}
-
 Expected<void> ObjReader::ReadLine(std::string_view line) {
   const auto words = WordsOf(line.substr(0, line.find('#')));
   if (words.empty()) return {};
@@ -328,9 +202,9 @@ Expected<void> ObjReader::ReadLine(std::string_view line) {
   if (words[0] == "vt") return ReadTexcoord(words);
   if (words[0] == "f") return ReadFace(words);
   if (words[0] == "usemtl") {
-    material_ = MaterialNamed(RestOf(line, words[0]));
+    material_ = materials_.Named(RestOf(line, words[0]));
   } else if (words[0] == "mtllib") {
-    ReadLibrary(RestOf(line, words[0]));
+    materials_.ReadLibrary(RestOf(line, words[0]));
   } else if (!kKnown.contains(words[0])) {
     ++not_faces_;
   }

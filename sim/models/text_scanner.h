@@ -1,9 +1,11 @@
 // Lines and words of a text file, without copies.
 #pragma once
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -23,6 +25,16 @@ inline std::vector<std::string_view> WordsOf(std::string_view line) {
     if (at > first) words.push_back(line.substr(first, at - first));
   }
   return words;
+}
+
+// The rest of a line after its first word: a name, which may hold blanks.
+inline std::string RestOf(std::string_view line, std::string_view first_word) {
+  const char* rest = first_word.data() + first_word.size();
+  std::string name(rest, static_cast<std::size_t>(line.data() + line.size() - rest));
+  const auto blank = [](unsigned char c) { return std::isspace(c) != 0; };
+  name.erase(name.begin(), std::find_if_not(name.begin(), name.end(), blank));
+  name.erase(std::find_if_not(name.rbegin(), name.rend(), blank).base(), name.end());
+  return name;
 }
 
 // The whole word as a number ("nan" and "inf" included), or nothing.

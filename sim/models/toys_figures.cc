@@ -67,55 +67,94 @@ std::vector<ModelPart> MakeDuck() {
   return parts;
 }
 
-std::vector<ModelPart> MakeRockingHorse() {
-  constexpr double kCell_m = 0.0092;
-  const double lift = 0.046;  // of the hooves, which stand on the rockers
-  const auto up = [&](double x, double y, double z) { return V(x, y, z + lift); };
-  const BlobField barrel = Joined({Limb(up(-0.060, 0, 0.125), up(0.060, 0, 0.125), 0.043, 0.041),
-                                   Ellipsoid(up(-0.066, 0, 0.130), {0.044, 0.044, 0.046})},
-                                  0.02);
-  const BlobField neck = Limb(up(0.072, 0, 0.140), up(0.112, 0, 0.200), 0.034, 0.024);
+namespace {
+
+// Of the rocking horse, whose hooves stand on the rockers.
+V OnRockers(double x, double y, double z) {
+  constexpr double kLift_m = 0.046;
+  return {x, y, z + kLift_m};
+}
+
+BlobField HorseBarrel() {
+  return Joined({Limb(OnRockers(-0.060, 0, 0.125), OnRockers(0.060, 0, 0.125), 0.043, 0.041),
+                 Ellipsoid(OnRockers(-0.066, 0, 0.130), {0.044, 0.044, 0.046})},
+                0.02);
+}
+
+BlobField HorseBody(const BlobField& barrel) {
+  const BlobField neck = Limb(OnRockers(0.072, 0, 0.140), OnRockers(0.112, 0, 0.200), 0.034, 0.024);
   const BlobField head =
-      Joined({Limb(up(0.112, 0, 0.210), up(0.166, 0, 0.176), 0.026, 0.018)}, 0.01);
+      Joined({Limb(OnRockers(0.112, 0, 0.210), OnRockers(0.166, 0, 0.176), 0.026, 0.018)}, 0.01);
   std::vector<BlobField> all{barrel, neck, head};
   for (const int side : {-1, 1}) {
-    all.push_back(Limb(up(0.068, side * 0.024, 0.110), up(0.098, side * 0.046, 0), 0.024, 0.0155));
-    all.push_back(
-        Limb(up(-0.072, side * 0.024, 0.110), up(-0.104, side * 0.046, 0), 0.026, 0.0155));
-    all.push_back(
-        Limb(up(0.104, side * 0.013, 0.228), up(0.100, side * 0.017, 0.250), 0.010, 0.0065));
+    all.push_back(Limb(OnRockers(0.068, side * 0.024, 0.110), OnRockers(0.098, side * 0.046, 0),
+                       0.024, 0.0155));
+    all.push_back(Limb(OnRockers(-0.072, side * 0.024, 0.110), OnRockers(-0.104, side * 0.046, 0),
+                       0.026, 0.0155));
+    all.push_back(Limb(OnRockers(0.104, side * 0.013, 0.228), OnRockers(0.100, side * 0.017, 0.250),
+                       0.010, 0.0065));
   }
-  const BlobField body = Joined(all, 0.016);
-  std::vector<ModelPart> parts;
-  parts.push_back({"horse",
-                   MakeBlob(body, Box({-0.14, -0.075, 0.01}, {0.20, 0.075, 0.315}), kCell_m),
-                   {186, 126, 74},
-                   "",
-                   ""});
+  return Joined(all, 0.016);
+}
 
-  const BlobField saddle = Common(Swollen(barrel, 0.006),
-                                  Common(Below(up(0.034, 0, 0), {1, 0, 0.1}),
-                                         Common(Below(up(-0.034, 0, 0), {-1, 0, 0.1}),
-                                                Below(up(0, 0, 0.112), {0, 0, -1}), 0.004),
-                                         0.004),
-                                  0.006);
+BlobField Saddle(const BlobField& barrel) {
+  return Common(Swollen(barrel, 0.006),
+                Common(Below(OnRockers(0.034, 0, 0), {1, 0, 0.1}),
+                       Common(Below(OnRockers(-0.034, 0, 0), {-1, 0, 0.1}),
+                              Below(OnRockers(0, 0, 0.112), {0, 0, -1}), 0.004),
+                       0.004),
+                0.006);
+}
+
+// A bow that touches the ground in the middle.
+std::vector<Eigen::Vector2d> RockerOutline() {
+  constexpr int kSteps = 28;
+  const double radius = 0.36;
+  const double height = 0.028;
+  std::vector<Eigen::Vector2d> bow;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double angle = -0.46 + 0.92 * i / kSteps;
+    bow.emplace_back(radius * std::sin(angle), radius - radius * std::cos(angle));
+  }
+  for (int i = kSteps; i >= 0; --i) {
+    const double angle = -0.46 + 0.92 * i / kSteps;
+    const double inner = radius - height;
+    bow.emplace_back(inner * std::sin(angle), radius - inner * std::cos(angle));
+  }
+  return bow;
+}
+
+}  // namespace
+
+std::vector<ModelPart> MakeRockingHorse() {
+  constexpr double kCell_m = 0.0092;
+  const BlobField barrel = HorseBarrel();
+  std::vector<ModelPart> parts;
+  parts.push_back(
+      {"horse",
+       MakeBlob(HorseBody(barrel), Box({-0.14, -0.075, 0.01}, {0.20, 0.075, 0.315}), kCell_m),
+       {186, 126, 74},
+       "",
+       ""});
   parts.push_back({"saddle",
-                   MakeBlob(saddle, Box({-0.05, -0.06, 0.14}, {0.05, 0.06, 0.235}), 0.006),
+                   MakeBlob(Saddle(barrel), Box({-0.05, -0.06, 0.14}, {0.05, 0.06, 0.235}), 0.006),
                    {164, 40, 52},
                    "",
                    ""});
-  const BlobField mane = Joined({Limb(up(0.090, 0, 0.238), up(0.060, 0, 0.190), 0.014, 0.015),
-                                 Limb(up(0.060, 0, 0.190), up(0.034, 0, 0.166), 0.015, 0.010),
-                                 Limb(up(0.090, 0, 0.238), up(0.122, 0, 0.240), 0.014, 0.009)},
-                                0.012);
+  const BlobField mane =
+      Joined({Limb(OnRockers(0.090, 0, 0.238), OnRockers(0.060, 0, 0.190), 0.014, 0.015),
+              Limb(OnRockers(0.060, 0, 0.190), OnRockers(0.034, 0, 0.166), 0.015, 0.010),
+              Limb(OnRockers(0.090, 0, 0.238), OnRockers(0.122, 0, 0.240), 0.014, 0.009)},
+             0.012);
   parts.push_back({"mane",
                    MakeBlob(mane, Box({0.01, -0.025, 0.18}, {0.14, 0.025, 0.31}), 0.005),
                    {78, 50, 34},
                    "",
                    ""});
-  const BlobField tail = Joined({Limb(up(-0.104, 0, 0.150), up(-0.132, 0, 0.118), 0.014, 0.016),
-                                 Limb(up(-0.132, 0, 0.118), up(-0.138, 0, 0.070), 0.016, 0.009)},
-                                0.012);
+  const BlobField tail =
+      Joined({Limb(OnRockers(-0.104, 0, 0.150), OnRockers(-0.132, 0, 0.118), 0.014, 0.016),
+              Limb(OnRockers(-0.132, 0, 0.118), OnRockers(-0.138, 0, 0.070), 0.016, 0.009)},
+             0.012);
   parts.push_back({"tail",
                    MakeBlob(tail, Box({-0.165, -0.025, 0.09}, {-0.08, 0.025, 0.22}), 0.005),
                    {78, 50, 34},
@@ -124,23 +163,9 @@ std::vector<ModelPart> MakeRockingHorse() {
   for (const int side : {-1, 1}) {
     const std::string which = side < 0 ? "right" : "left";
     parts.push_back(
-        {"eye_" + which, Ball(up(0.126, side * 0.0225, 0.207), 0.0055, 16), kDark, "", ""});
-    // A bow that touches the ground in the middle.
-    constexpr int kSteps = 28;
-    const double radius = 0.36;
-    const double height = 0.028;
-    std::vector<Eigen::Vector2d> bow;
-    for (int i = 0; i <= kSteps; ++i) {
-      const double angle = -0.46 + 0.92 * i / kSteps;
-      bow.emplace_back(radius * std::sin(angle), radius - radius * std::cos(angle));
-    }
-    for (int i = kSteps; i >= 0; --i) {
-      const double angle = -0.46 + 0.92 * i / kSteps;
-      const double inner = radius - height;
-      bow.emplace_back(inner * std::sin(angle), radius - inner * std::cos(angle));
-    }
+        {"eye_" + which, Ball(OnRockers(0.126, side * 0.0225, 0.207), 0.0055, 16), kDark, "", ""});
     parts.push_back({"rocker_" + which,
-                     Translated(MakePrism(bow, 0.0135, 0.003), 0, side * 0.046, 0),
+                     Translated(MakePrism(RockerOutline(), 0.0135, 0.003), 0, side * 0.046, 0),
                      {70, 118, 150},
                      "",
                      ""});
@@ -158,7 +183,11 @@ std::vector<ModelPart> MakeRockingHorse() {
   return parts;
 }
 
-std::vector<ModelPart> MakeShip() {
+namespace {
+
+// The hull of the ship, `swell` outside its beam and up to `rise` above its deck: the whole of it
+// or the rail alone.
+Shape ShipHull(double swell, double rise, bool whole) {
   constexpr int kSections = 28;
   constexpr int kRibs = 20;
   const double half_length = 0.180;
@@ -172,28 +201,30 @@ std::vector<ModelPart> MakeShip() {
     return s > 0.45 ? 0.045 * std::pow((s - 0.45) / 0.55, 2) : 0.0;
   };
   const auto deck = [](double s) { return 0.060 + 0.030 * (s > 0 ? s * s : 0.35 * s * s); };
-  // Sections of the hull: from `shrink` inside the beam, between two heights.
-  const auto hull = [&](double swell, double rise, bool whole) {
-    std::vector<std::vector<V>> rings;
-    for (int i = 0; i <= kSections; ++i) {
-      const double s = std::sin(std::numbers::pi * (static_cast<double>(i) / kSections - 0.5));
-      const double x = half_length * s + (s > 0 ? 0.012 * s * s : 0);
-      const double b = beam(s) + swell;
-      const double top = deck(s) + rise;
-      const double low = whole ? keel(s) : deck(s) - 0.016;
-      std::vector<V> ring;
-      for (int r = 0; r <= kRibs; ++r) {
-        const double angle = std::numbers::pi * r / kRibs;
-        const double c = std::cos(angle);
-        // A superellipse: full in the bilge, upright at the sides.
-        const double power = whole ? 0.62 : 0.2;
-        const double y = b * std::copysign(std::pow(std::abs(c), power), c);
-        ring.emplace_back(x, y, top - (top - low) * std::pow(std::sin(angle) + 1e-12, power));
-      }
-      rings.push_back(ring);
+  std::vector<std::vector<V>> rings;
+  for (int i = 0; i <= kSections; ++i) {
+    const double s = std::sin(std::numbers::pi * (static_cast<double>(i) / kSections - 0.5));
+    const double x = half_length * s + (s > 0 ? 0.012 * s * s : 0);
+    const double b = beam(s) + swell;
+    const double top = deck(s) + rise;
+    const double low = whole ? keel(s) : deck(s) - 0.016;
+    std::vector<V> ring;
+    for (int r = 0; r <= kRibs; ++r) {
+      const double angle = std::numbers::pi * r / kRibs;
+      const double c = std::cos(angle);
+      // A superellipse: full in the bilge, upright at the sides.
+      const double power = whole ? 0.62 : 0.2;
+      const double y = b * std::copysign(std::pow(std::abs(c), power), c);
+      ring.emplace_back(x, y, top - (top - low) * std::pow(std::sin(angle) + 1e-12, power));
     }
-    return MakeLoft(rings);
-  };
+    rings.push_back(ring);
+  }
+  return MakeLoft(rings);
+}
+
+}  // namespace
+
+std::vector<ModelPart> MakeShip() {
   const auto block = [](double x0, double x1, double low, double high, double half, double bevel) {
     return MakeExtrusion(RoundedRectangle({x0, low}, {x1, high}, bevel * 1.6), half, bevel);
   };
@@ -202,8 +233,8 @@ std::vector<ModelPart> MakeShip() {
   };
   const Colour white{238, 236, 228};
   std::vector<ModelPart> parts;
-  parts.push_back({"hull", hull(0, 0, true), {38, 70, 120}, "", ""});
-  parts.push_back({"rail", hull(0.003, 0.004, false), {196, 152, 98}, "", ""});
+  parts.push_back({"hull", ShipHull(0, 0, true), {38, 70, 120}, "", ""});
+  parts.push_back({"rail", ShipHull(0.003, 0.004, false), {196, 152, 98}, "", ""});
   parts.push_back({"house", block(-0.104, 0.062, 0.055, 0.098, 0.038, 0.006), white, "", ""});
   parts.push_back({"bridge", block(-0.010, 0.050, 0.090, 0.132, 0.033, 0.006), white, "", ""});
   parts.push_back(

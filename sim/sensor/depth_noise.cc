@@ -118,6 +118,49 @@ cv::Mat SimKinect(const ModelImage& image, std::uint64_t seed, const Frame& fram
   });
 }
 
+cv::Mat Nguyen(const ModelImage& image, const cv::Mat& incidence) {
+  return image.Map([&](int u, int v, const PixelNoise& noise) {
+    const double lateral = NguyenLateralSigma_px(incidence.at<float>(v, u));
+    const double z = image.Nearest(u + lateral * noise.shift_u, v + lateral * noise.shift_v);
+    return IfKnown(z, [&](double known) {
+      return known + NguyenAxialSigma_m(known, incidence.at<float>(v, u)) * noise.axial;
+    });
+  });
+}
+
+cv::Mat IclNuim(const ModelImage& image) {
+  return image.Map([&](int u, int v, const PixelNoise& noise) {
+    const double z = image.Bilinear(u + kIclShiftSigma_px * noise.shift_u,
+                                    v + kIclShiftSigma_px * noise.shift_v);
+    return IfKnown(
+        z, [&](double known) { return IclDepth_m(known, kIclDisparitySigma * noise.axial); });
+  });
+}
+
+cv::Mat CoFusion(const ModelImage& image) {
+  return image.Map([&](int u, int v, const PixelNoise& noise) {
+    const double z = image.At(u + static_cast<int>(kCoFusionShiftSigma_px * noise.shift_u),
+                              v + static_cast<int>(kCoFusionShiftSigma_px * noise.shift_v));
+    return IfKnown(
+        z, [&](double known) { return IclDepth_m(known, kCoFusionDisparitySigma * noise.axial); });
+  });
+}
+
+cv::Mat Redwood(const ModelImage& image, const cv::Size& size) {
+  return image.Map([&](int u, int v, const PixelNoise& noise) {
+    const auto even = [](double at, int end) {
+      const int nearest = std::clamp(static_cast<int>(std::floor(at + 0.5)), 0, end - 1);
+      return nearest - nearest % 2;
+    };
+    const double z = image.At(even(u + kRedwoodShiftSigma_px * noise.shift_u, size.width),
+                              even(v + kRedwoodShiftSigma_px * noise.shift_v, size.height));
+    if (z >= kRedwoodMaxRange_m) return 0.0;
+    return IfKnown(z, [&](double known) {
+      return RedwoodDepth_m(known, kRedwoodDisparitySigma * noise.axial);
+    });
+  });
+}
+
 // Depth 0 at edges and on dark surfaces.
 cv::Mat CutAzure(const cv::Mat& noisy, const cv::Mat& colour) {
   cv::Mat result = noisy.clone();
@@ -138,6 +181,23 @@ cv::Mat CutAzure(const cv::Mat& noisy, const cv::Mat& colour) {
     }
   });
   return result;
+}
+
+cv::Mat Azure(const ModelImage& image, const cv::Mat& colour) {
+  return CutAzure(image.Map([&](int u, int v, const PixelNoise& noise) {
+    const double z = image.Bilinear(u + kAzureShiftSigma_px * noise.shift_u,
+                                    v + kAzureShiftSigma_px * noise.shift_v);
+    return IfKnown(z, [&](double known) { return known + AzureSigma_m(known) * noise.axial; });
+  }),
+                  colour);
+}
+
+cv::Mat D435(const ModelImage& image, double focal_px) {
+  return image.Map([&](int u, int v, const PixelNoise& noise) {
+    return IfKnown(image.At(u, v), [&](double known) {
+      return known + D435Sigma_m(known, focal_px) * noise.axial;
+    });
+  });
 }
 
 }  // namespace
@@ -180,57 +240,20 @@ cv::Mat ApplyDepthModel(DepthModel model, double noise_scale, std::uint64_t seed
       return depth;
     case DepthModel::kNguyen2012:
       CV_Assert(incidence.size() == depth.size());
-      return image.Map([&](int u, int v, const PixelNoise& noise) {
-        const double lateral = NguyenLateralSigma_px(incidence.at<float>(v, u));
-        const double z = image.Nearest(u + lateral * noise.shift_u, v + lateral * noise.shift_v);
-        return IfKnown(z, [&](double known) {
-          return known + NguyenAxialSigma_m(known, incidence.at<float>(v, u)) * noise.axial;
-        });
-      });
+      return Nguyen(image, incidence);
     case DepthModel::kIclNuim:
-      return image.Map([&](int u, int v, const PixelNoise& noise) {
-        const double z = image.Bilinear(u + kIclShiftSigma_px * noise.shift_u,
-                                        v + kIclShiftSigma_px * noise.shift_v);
-        return IfKnown(
-            z, [&](double known) { return IclDepth_m(known, kIclDisparitySigma * noise.axial); });
-      });
+      return IclNuim(image);
     case DepthModel::kSimKinect:
       return SimKinect(image, seed, frame);
     case DepthModel::kCoFusion:
-      return image.Map([&](int u, int v, const PixelNoise& noise) {
-        const double z = image.At(u + static_cast<int>(kCoFusionShiftSigma_px * noise.shift_u),
-                                  v + static_cast<int>(kCoFusionShiftSigma_px * noise.shift_v));
-        return IfKnown(z, [&](double known) {
-          return IclDepth_m(known, kCoFusionDisparitySigma * noise.axial);
-        });
-      });
+      return CoFusion(image);
     case DepthModel::kRedwood:
-      return image.Map([&](int u, int v, const PixelNoise& noise) {
-        const auto even = [](double at, int size) {
-          const int nearest = std::clamp(static_cast<int>(std::floor(at + 0.5)), 0, size - 1);
-          return nearest - nearest % 2;
-        };
-        const double z = image.At(even(u + kRedwoodShiftSigma_px * noise.shift_u, depth.cols),
-                                  even(v + kRedwoodShiftSigma_px * noise.shift_v, depth.rows));
-        if (z >= kRedwoodMaxRange_m) return 0.0;
-        return IfKnown(z, [&](double known) {
-          return RedwoodDepth_m(known, kRedwoodDisparitySigma * noise.axial);
-        });
-      });
+      return Redwood(image, depth.size());
     case DepthModel::kAzure:
       CV_Assert(frame.colour.size() == depth.size());
-      return CutAzure(image.Map([&](int u, int v, const PixelNoise& noise) {
-        const double z = image.Bilinear(u + kAzureShiftSigma_px * noise.shift_u,
-                                        v + kAzureShiftSigma_px * noise.shift_v);
-        return IfKnown(z, [&](double known) { return known + AzureSigma_m(known) * noise.axial; });
-      }),
-                      frame.colour);
+      return Azure(image, frame.colour);
     case DepthModel::kD435:
-      return image.Map([&](int u, int v, const PixelNoise& noise) {
-        return IfKnown(image.At(u, v), [&](double known) {
-          return known + D435Sigma_m(known, frame.intrinsics.fx) * noise.axial;
-        });
-      });
+      return D435(image, frame.intrinsics.fx);
   }
   return depth;
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/files.h"
+#include "eval/sweep/bench_result.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/tiny_scene.h"

@@ -376,30 +376,5 @@ TEST(ChildOutput, ALogThatIsALinkIsRefused) {
   EXPECT_FALSE(fs::exists(folder / "elsewhere"));
 }
 
-TEST(ControlGroup, EndsWhatIsInIt) {
-  const auto parent = WritableControlGroup();
-  TSDFPP_NEEDS(parent.has_value(), "a control group (cgroup 2) in which it may make others");
-  fs::path path;
-  {
-    auto group = ControlGroup::Make(*parent, 1000 * kMb, 1000);
-    ASSERT_TRUE(group.has_value());
-    path = group->path();
-    TSDFPP_NEEDS(group->end_all() >= 0, "Linux 5.14");
-    const pid_t child = fork();
-    if (child == 0) {
-      if (write(group->enter(), "0", 1) != 1) _exit(1);
-      setsid();
-      pause();
-      _exit(0);
-    }
-    while (Numbers(path / "cgroup.procs") != std::vector<pid_t>{child}) usleep(1000);
-    ASSERT_EQ(write(group->end_all(), "1", 1), 1);
-    int status = 0;
-    ASSERT_EQ(waitpid(child, &status, 0), child);
-    EXPECT_TRUE(WIFSIGNALED(status));
-  }
-  EXPECT_FALSE(fs::exists(path));
-}
-
 }  // namespace
 }  // namespace tsdfpp

@@ -1,128 +1,41 @@
-// Files of any mapper against the truth: closed forms on a wall with two boxes, every file format
-// and layout, everything that can be wrong with a mesh, and the same numbers as `compare`.
+// Files of any mapper against the truth: closed forms on a wall with two boxes, what is said of
+// meshes that fit badly, and the same numbers as `compare`.
 #include "eval/score/evaluate_meshes.h"
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
-#include "core/gltf.h"
-#include "core/ply.h"
 #include "core/pose_text.h"
 #include "eval/compare/compare.h"
 #include "eval/run/open_source.h"
-#include "eval/score/surface_file.h"
 #include "metrics/mesh_tools.h"
 #include "tests/core/temp_folder.h"
+#include "tests/eval/box_meshes.h"
 #include "tests/sequence/box_source.h"
 
 namespace tsdfpp {
 namespace {
 
-using test::BoxSource;
-using test::TempFolder;
 namespace fs = std::filesystem;
-
-constexpr int kLast = 5;
-constexpr InstanceId kLeft = 3;
-constexpr InstanceId kRight = 8;
-// Single precision at 3 m, twice: the file's rounding and the query's.
-constexpr double kRounding_m = 2e-6;
-
-// The true surface of each object in the world after frame `kLast`, cut finely enough that a box of
-// faces selects them well.
-std::map<InstanceId, TriangleMesh> TruthMeshes(BoxSource& source) {
-  const auto frame = source.Read(kLast);
-  const auto models = source.Truth();
-  std::map<InstanceId, TriangleMesh> meshes;
-  for (const TrueModel& model : *models) {
-    TriangleMesh mesh = model.mesh_O;
-    if (model.info.id != kBackground) {
-      for (Eigen::Vector3f& vertex : mesh.vertices) {
-        vertex = (frame->T_WO.at(model.info.id) * vertex.cast<double>()).cast<float>();
-      }
-    }
-    meshes[model.info.id] = mesh;
-  }
-  return meshes;
-}
-
-TriangleMesh Moved(TriangleMesh mesh, const Eigen::Vector3f& by) {
-  for (Eigen::Vector3f& vertex : mesh.vertices) vertex += by;
-  return mesh;
-}
-
-TriangleMesh SceneOf(const std::map<InstanceId, TriangleMesh>& meshes, bool labelled) {
-  TriangleMesh scene;
-  for (const auto& [id, mesh] : meshes) {
-    TriangleMesh one = mesh;
-    if (labelled) one.face_ids.assign(one.triangles.size(), id);
-    AppendMesh(one, scene);
-  }
-  return scene;
-}
-
-void Put(const fs::path& path, const TriangleMesh& mesh) {
-  const auto written = WritePly(path, mesh);
-  ASSERT_TRUE(written.has_value()) << written.error().message;
-}
-
-EvaluateConfig At(const fs::path& folder, std::vector<int> frames = {kLast}) {
-  EvaluateConfig config;
-  config.meshes = folder;
-  config.frames = std::move(frames);
-  config.truth.sampling.fine_per_cm2 = 1;
-  config.truth.sampling.coarse_per_cm2 = 0.05;
-  return config;
-}
-
-EvaluateResult Evaluated(const EvaluateConfig& config) {
-  BoxSource source;
-  auto result = RunEvaluate(source, config, {});
-  if (!result) {
-    ADD_FAILURE() << result.error().message;
-    return {};
-  }
-  return std::move(*result);
-}
-
-Error ErrorOf(const EvaluateConfig& config) {
-  BoxSource source;
-  const auto result = RunEvaluate(source, config, {});
-  EXPECT_FALSE(result.has_value());
-  return result ? Error{} : result.error();
-}
-
-// All of it but times and how it was read.
-nlohmann::json Scores(const EvaluatedFrame& frame) {
-  nlohmann::json json = ToJson(frame.evaluation);
-  json.erase("mesh_s");
-  json.erase("evaluate_s");
-  return json;
-}
-
-const ObjectScores& Of(const EvaluateResult& result, InstanceId id) {
-  for (const ObjectScores& scores : result.frames.back().evaluation.objects) {
-    if (scores.info.id == id) return scores;
-  }
-  ADD_FAILURE() << "no object " << id;
-  return result.frames.back().evaluation.objects.front();
-}
-
-bool Says(const std::vector<std::string>& remarks, const std::string& words) {
-  return std::any_of(remarks.begin(), remarks.end(), [&](const std::string& remark) {
-    return remark.find(words) != std::string::npos;
-  });
-}
-
-// The three objects under their own names.
-void PutNamed(const fs::path& folder, const std::map<InstanceId, TriangleMesh>& meshes) {
-  Put(folder / "background-0.ply", meshes.at(kBackground));
-  Put(folder / "left-3.ply", meshes.at(kLeft));
-  Put(folder / "right-8.ply", meshes.at(kRight));
-}
+using test::At;
+using test::BoxSource;
+using test::ErrorOf;
+using test::Evaluated;
+using test::kLast;
+using test::kLeft;
+using test::kRight;
+using test::kRounding_m;
+using test::Moved;
+using test::Of;
+using test::Put;
+using test::PutNamed;
+using test::Says;
+using test::SceneOf;
+using test::Scores;
+using test::TempFolder;
+using test::TruthMeshes;
 
 TEST(EvaluateMeshes, TheTruthScoresFull) {
   const TempFolder folder;
@@ -187,65 +100,6 @@ TEST(EvaluateMeshes, HalfOfAnObjectIsHalfSeen) {
   ASSERT_LT(in_half, seen);
   EXPECT_NEAR(*Of(result, kBackground).preserved.completion.value,
               static_cast<double>(in_half) / seen, 1e-6);
-}
-
-TEST(EvaluateMeshes, EveryFormatAndUnitGivesTheSameScores) {
-  const TempFolder folder;
-  BoxSource source;
-  const auto meshes = TruthMeshes(source);
-  PutNamed(folder / "ply", meshes);
-  const nlohmann::json expected = Scores(Evaluated(At(folder / "ply")).frames[0]);
-  fs::create_directories(folder / "obj");
-  fs::create_directories(folder / "stl");
-  const std::map<InstanceId, std::string> stems{
-      {kBackground, "background-0"}, {kLeft, "left-3"}, {kRight, "right-8"}};
-  std::vector<NamedMesh> nodes;
-  for (const auto& [id, mesh] : meshes) {
-    std::ofstream obj(folder / "obj" / (stems.at(id) + ".obj"));
-    obj.precision(9);
-    for (const Eigen::Vector3f& v : mesh.vertices) {
-      obj << "v " << 1000.0 * static_cast<double>(v.x()) << " "
-          << 1000.0 * static_cast<double>(v.y()) << " " << 1000.0 * static_cast<double>(v.z())
-          << "\n";
-    }
-    for (const auto& t : mesh.triangles) {
-      obj << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
-    }
-    std::ofstream stl(folder / "stl" / (stems.at(id) + ".stl"));
-    stl.precision(9);
-    stl << "solid s\n";
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      stl << "facet normal 0 0 0\nouter loop\n";
-      for (int k = 0; k < 3; ++k) {
-        const Eigen::Vector3f& v = Corner(mesh, t, k);
-        stl << "vertex " << v.x() << " " << v.y() << " " << v.z() << "\n";
-      }
-      stl << "endloop\nendfacet\n";
-    }
-    stl << "endsolid s\n";
-    nodes.push_back({stems.at(id).substr(0, stems.at(id).rfind('-')), id, mesh});
-  }
-  ASSERT_TRUE(WriteGlb(folder / "glb/scene.glb", nodes).has_value());
-  Put(folder / "labels/scene.ply", SceneOf(meshes, true));
-  for (const char* form : {"obj", "stl", "glb", "labels"}) {
-    EvaluateConfig config = At(folder / form);
-    if (std::string(form) == "obj") {
-      config.scale = 0.001;
-      config.scale_is_given = true;
-    }
-    const EvaluateResult result = Evaluated(config);
-    ASSERT_EQ(result.frames.size(), 1U) << form;
-    const nlohmann::json scores = Scores(result.frames[0]);
-    // Shares are the same; distances to the rounding of text and of millimetres.
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (const char* share : {"completion", "visible_completion", "label_purity"}) {
-        EXPECT_EQ(scores["objects"][i][share], expected["objects"][i][share]) << form;
-      }
-      EXPECT_NEAR(scores["objects"][i]["accuracy"]["mean_m"].get<double>(),
-                  expected["objects"][i]["accuracy"]["mean_m"].get<double>(), kRounding_m)
-          << form;
-    }
-  }
 }
 
 TEST(EvaluateMeshes, PartsWithoutNamesAreMatchedByOverlap) {
@@ -376,74 +230,6 @@ TEST(EvaluateMeshes, WhatIsLeftAfterTheRemovalByWhatIsKnownOfItsPlace) {
       << table;
 }
 
-TEST(EvaluateMeshes, SeveralFramesNeedAFolderEach) {
-  const TempFolder folder;
-  BoxSource source;
-  PutNamed(folder / "m/000005", TruthMeshes(source));
-  EXPECT_EQ(Evaluated(At(folder / "m")).frames.size(), 1U);
-  const Error missing = ErrorOf(At(folder / "m", {4, 5}));
-  EXPECT_EQ(missing.kind, ErrorKind::kData);
-  EXPECT_NE(missing.message.find("holds nothing for frame 4, expected a subfolder 000004"),
-            std::string::npos)
-      << missing.message;
-  PutNamed(folder / "m/frame-4", TruthMeshes(source));
-  const EvaluateResult both = Evaluated(At(folder / "m", {5, 4}));
-  ASSERT_EQ(both.frames.size(), 2U);
-  EXPECT_EQ(both.frames[0].evaluation.frame, 4);
-  EXPECT_EQ(both.frames[1].evaluation.frame, 5);
-}
-
-struct Bad {
-  std::string name;
-  std::function<void(TriangleMesh&)> spoil;
-  std::string sentence;  // of the error
-};
-
-TEST(EvaluateMeshes, WhatCannotBeScoredIsRefusedWithASentence) {
-  BoxSource source;
-  const TriangleMesh good = SceneOf(TruthMeshes(source), true);
-  const std::vector<Bad> all{
-      {"millimetres",
-       [](TriangleMesh& mesh) {
-         for (Eigen::Vector3f& vertex : mesh.vertices) vertex *= 1000;
-       },
-       "is it in another unit? Give its scale (--scale 0.001 would fit"},
-      {"empty", [](TriangleMesh& mesh) { mesh = {}; }, "has no faces, expected a mesh"},
-      {"points", [](TriangleMesh& mesh) { mesh.triangles.clear(), mesh.face_ids.clear(); },
-       "has no faces, expected a mesh"},
-      {"nan", [](TriangleMesh& mesh) { mesh.vertices[3].y() = NAN; },
-       "a vertex has no finite x, y, z"},
-      {"infinite", [](TriangleMesh& mesh) { mesh.vertices[0].x() = INFINITY; },
-       "a vertex has no finite x, y, z"},
-      {"flat",
-       [](TriangleMesh& mesh) {
-         for (auto& t : mesh.triangles) t[2] = t[1];
-       },
-       "none of them has an area"},
-  };
-  for (const Bad& bad : all) {
-    const TempFolder folder;
-    TriangleMesh mesh = good;
-    bad.spoil(mesh);
-    Put(folder / "m/scene.ply", mesh);
-    const Error error = ErrorOf(At(folder / "m"));
-    EXPECT_EQ(error.kind, ErrorKind::kData) << bad.name;
-    EXPECT_NE(error.message.find(bad.sentence), std::string::npos) << error.message;
-    EXPECT_NE(error.message.find("scene.ply"), std::string::npos) << error.message;
-  }
-}
-
-TEST(EvaluateMeshes, HalfAFileIsRefused) {
-  const TempFolder folder;
-  BoxSource source;
-  Put(folder / "m/scene.ply", SceneOf(TruthMeshes(source), true));
-  const auto bytes = ReadFile(folder / "m/scene.ply");
-  ASSERT_TRUE(WriteFile(folder / "m/scene.ply", bytes->substr(0, bytes->size() / 2)).has_value());
-  const Error error = ErrorOf(At(folder / "m"));
-  EXPECT_EQ(error.kind, ErrorKind::kData);
-  EXPECT_NE(error.message.find("the file ends"), std::string::npos) << error.message;
-}
-
 TEST(EvaluateMeshes, AnotherFrameScoresNothingAndSaysSo) {
   const TempFolder folder;
   BoxSource source;
@@ -542,28 +328,6 @@ TEST(EvaluateMeshes, MasksAreComparedUnderTheirOwnIds) {
   result = Evaluated(config);
   EXPECT_EQ(result.masks->mean_iou.value, 1.0);
   EXPECT_EQ(result.masks->object_of.at(8), kLeft);
-}
-
-TEST(EvaluateMeshes, WhatIsTypedWronglyIsSaid) {
-  const TempFolder folder;
-  BoxSource source;
-  PutNamed(folder / "m", TruthMeshes(source));
-  EvaluateConfig config = At(folder / "m", {6});
-  EXPECT_EQ(ErrorOf(config).message, "--at 6 is out of range: boxes has frames 0 to 5");
-  config.frames = {5, 5};
-  EXPECT_EQ(ErrorOf(config).message, "--at names frame 5 twice");
-  config.frames = {5};
-  config.removed = {kBackground};
-  EXPECT_NE(ErrorOf(config).message.find("cannot be removed"), std::string::npos);
-  config.removed = {};
-  config.meshes = folder / "nowhere";
-  EXPECT_NE(ErrorOf(config).message.find("nowhere: no such folder"), std::string::npos);
-  fs::create_directories(folder / "nothing");
-  config.meshes = folder / "nothing";
-  EXPECT_NE(ErrorOf(config).message.find("holds no mesh of frame 5"), std::string::npos);
-  config.meshes = folder / "m";
-  Put(folder / "m/scene-without-car.ply", SceneOf(TruthMeshes(source), true));
-  EXPECT_NE(ErrorOf(config).message.find("expected ids between dashes"), std::string::npos);
 }
 
 // The key: what `compare` says of its own meshes is what the files say.

@@ -1,3 +1,4 @@
+// Longer than most files: one class, with a way to change each form of file.
 #include "tests/fuzz/mutate.h"
 
 #include <zlib.h>

@@ -27,6 +27,7 @@ function(tsdfpp_add_readers target)
       one_line.cc
       plain_name.cc
       ply.cc
+      ply_header.cc
       pose_text.cc
       quiet_stderr.cc
       toml_reader.cc)
@@ -63,6 +64,7 @@ function(tsdfpp_add_readers target)
       models/mesh_repair.cc
       models/mesh_shapes.cc
       models/model_catalogue.cc
+      models/obj_materials.cc
       models/obj_reader.cc
       config/object_motion.cc
       models/profile_shapes.cc
@@ -88,13 +90,17 @@ function(tsdfpp_add_readers target)
   set(eval
       adapters/adapter.cc
       tools/base64.cc
+      sweep/bench_result.cc
       sweep/bench_set.cc
       sweep/cell.cc
+      score/coco_panoptic.cc
       run/compare_names.cc
       score/evaluation_columns.cc
       score/evaluation_json.cc
+      score/evaluate_panoptic.cc
       sweep/experiment.cc
       run/folder_lock.cc
+      gate/axis_choice.cc
       gate/gate_config.cc
       gate/gate_reference.cc
       gate/gate_verdict.cc

@@ -6,7 +6,7 @@
 #include "eval/adapters/adapter.h"
 #include "eval/gate/gate_config.h"
 #include "eval/gate/gate_reference.h"
-#include "eval/sweep/bench_set.h"
+#include "eval/sweep/bench_result.h"
 #include "sim/config/scene_config.h"
 #include "sim/motion/random_scene.h"
 #include "sim/scene/scene_inputs.h"
@@ -105,7 +105,8 @@ void AddConfigTargets(std::vector<Target>& targets) {
   targets.push_back(
       {"gates", "", ReadGates, {"eval/gate/gate_config.cc", "eval/gate/gate_reference.cc"}});
   targets.push_back({"adapter", "adapter.toml", ReadAdapterInput, {"eval/adapters/adapter.cc"}});
-  targets.push_back({"bench_set", "", ReadBenchSet, {"eval/sweep/bench_set.cc"}});
+  targets.push_back(
+      {"bench_set", "", ReadBenchSet, {"eval/sweep/bench_result.cc", "eval/sweep/bench_set.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

@@ -118,12 +118,12 @@ bool ReadGltfInput(std::string_view input) {
 }  // namespace
 
 void AddMeshTargets(std::vector<Target>& targets) {
-  targets.push_back({"ply", "mesh.ply", ReadPlyInput, {"core/ply.cc"}});
-  targets.push_back(
-      {"obj",
-       "",
-       ReadObjInput,
-       {"sim/models/obj_reader.cc", "sim/models/mesh_import.cc", "sim/models/mesh_repair.cc"}});
+  targets.push_back({"ply", "mesh.ply", ReadPlyInput, {"core/ply.cc", "core/ply_header.cc"}});
+  targets.push_back({"obj",
+                     "",
+                     ReadObjInput,
+                     {"sim/models/obj_reader.cc", "sim/models/obj_materials.cc",
+                      "sim/models/mesh_import.cc", "sim/models/mesh_repair.cc"}});
   targets.push_back({"stl", "mesh.stl", ReadStlInput, {"sim/models/stl_reader.cc"}});
   targets.push_back(
       {"gltf", "scene.glb", ReadGltfInput, {"core/gltf_document.cc", "core/gltf_reader.cc"}});

@@ -89,11 +89,11 @@ void AddResultTargets(std::vector<Target>& targets) {
   targets.push_back({"run_note", "", ReadRunJson, {"eval/run/run_folder.cc"}});
   targets.push_back({"gate_results", "", ReadGatesJson, {"eval/report/report_gates.cc"}});
   targets.push_back({"cell", "cell.json", ReadCell, {"eval/sweep/cell.cc"}});
-  targets.push_back(
-      {"coco",
-       "",
-       ReadCoco,
-       {"cli/metric_panoptic.cc", "eval/score/label_image.cc", "metrics/segmentation.cc"}});
+  targets.push_back({"coco",
+                     "",
+                     ReadCoco,
+                     {"eval/score/coco_panoptic.cc", "eval/score/evaluate_panoptic.cc",
+                      "eval/score/label_image.cc", "metrics/segmentation.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

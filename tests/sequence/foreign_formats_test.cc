@@ -7,13 +7,10 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
-#include "sequence/background_masks.h"
 #include "sequence/export.h"
 #include "sequence/open_sequence.h"
-#include "sequence/timed_poses.h"
 #include "tests/core/temp_folder.h"
 #include "tests/sequence/box_source.h"
-#include "tests/sequence/memory_source.h"
 #include "tests/sequence/other_sets.h"
 
 namespace tsdfpp {
@@ -21,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::BoxSource;
+using test::NotesSay;
 using test::TempFolder;
 
 // Half a unit and a float's rounding.
@@ -33,13 +31,6 @@ void ExpectBoxDepth(const Frame& was, const Frame& is, double units_per_m) {
 void ExpectJpegOf(const cv::Mat& was, const cv::Mat& is) {
   constexpr double kJpegBound = 5;
   EXPECT_LT(cv::norm(was, is, cv::NORM_L1) / static_cast<double>(3 * was.total()), kJpegBound);
-}
-
-bool NotesSay(const SequenceNotes& notes, const std::string& words) {
-  for (const std::string& note : notes) {
-    if (note.find(words) != std::string::npos) return true;
-  }
-  return false;
 }
 
 TEST(ForeignFormats, Replica) {
@@ -126,149 +117,6 @@ TEST(ForeignFormats, TumAssociatesAndInterpolates) {
   EXPECT_NEAR(second.time_s, 0.09, 1e-9);
   EXPECT_LT(cv::norm(second.depth, source.Read(2)->depth, cv::NORM_INF), 0.0002);
   EXPECT_NEAR(second.T_WC.translation().x(), 0.2 + 0.8 * 80 / 85, 1e-6);
-}
-
-// As in TUM's own fr2/desk. associate.py keeps a dictionary by time, so the last line counts.
-TEST(ForeignFormats, ATimeThatStandsTwiceIsRemarkedOn) {
-  const TempFolder folder;
-  const fs::path file = folder / "groundtruth.txt";
-  const auto write = [&](const std::string& lines) {
-    std::ofstream(file) << "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n" << lines;
-  };
-  write(
-      "1.0 1 0 0 0 0 0 1\n1.50 2 0 0 0 0 0 1\n1.5 3 0 0 0 0 0 1\n1.5 4 0 0 0 0 0 1\n"
-      "2.0 5 0 0 0 0 0 1\n2.0 5 0 0 0 0 0 1\n");
-  std::vector<std::string> remarks;
-  const auto poses = ReadTimedPoses(file, &remarks);
-  ASSERT_TRUE(poses.has_value()) << poses.error().message;
-  ASSERT_EQ(poses->size(), 3U);
-  EXPECT_EQ(poses->at(1.0).translation().x(), 1);
-  EXPECT_EQ(poses->at(1.5).translation().x(), 4);
-  EXPECT_EQ(poses->at(2.0).translation().x(), 5);
-  EXPECT_EQ(remarks,
-            (std::vector<std::string>{
-                file.string() +
-                ": lines that repeat the time of an earlier one: 3, 2 of them with another "
-                "pose, the first is line 5 (time 1.5); of a time the last line counts"}));
-
-  write("2.0 1 0 0 0 0 0 1\n1.0 2 0 0 0 0 0 1\n3.0 3 0 0 0 0 0 1\n2.5 4 0 0 0 0 0 1\n");
-  remarks.clear();
-  const auto sorted = ReadTimedPoses(file, &remarks);
-  ASSERT_TRUE(sorted.has_value()) << sorted.error().message;
-  EXPECT_EQ(sorted->begin()->second.translation().x(), 2);
-  EXPECT_EQ(remarks, (std::vector<std::string>{
-                         file.string() +
-                         ": lines that go back in time: 2, the first is line 4 (1.0 after 2.0); "
-                         "poses are taken in the order of their times"}));
-
-  write("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n");
-  remarks.clear();
-  EXPECT_TRUE(ReadTimedPoses(file, &remarks).has_value());
-  EXPECT_TRUE(remarks.empty()) << remarks.front();
-
-  // A recording with such a file opens, and its notes say so.
-  BoxSource source(4);
-  const fs::path set = folder / "desk";
-  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kTum, set).has_value());
-  std::string text = ReadFile(set / "groundtruth.txt").value();
-  const std::string last = text.substr(text.rfind('\n', text.size() - 2) + 1);
-  std::ofstream(set / "groundtruth.txt") << text << last;
-  SequenceNotes notes;
-  const auto read = OpenSequence(set, {}, &notes);
-  ASSERT_TRUE(read.has_value()) << read.error().message;
-  EXPECT_TRUE(NotesSay(notes, "lines that repeat the time of an earlier one: 1, 0 of them"));
-  EXPECT_LT((read.value()->Read(3)->T_WC.matrix() - source.Read(3)->T_WC.matrix()).norm(), 1e-8);
-}
-
-// Every format that may lack masks: what is mapped is background, and partly missing ones are
-// named.
-TEST(ForeignFormats, WithoutMasksAllIsBackground) {
-  const TempFolder folder;
-  BoxSource source;
-  const auto expect_background = [&](const fs::path& path) {
-    SCOPED_TRACE(path);
-    SequenceOptions options;
-    options.check = false;
-    auto opened = OpenSequence(path, options);
-    ASSERT_TRUE(opened.has_value()) << opened.error().message;
-    const int first = (*opened)->info().first_index;
-    EXPECT_TRUE((*opened)->Read(first)->mask.empty());
-    const auto masked = WithBackgroundMasks(std::move(*opened));
-    ASSERT_TRUE(masked.has_value()) << masked.error().message;
-    EXPECT_EQ(masked->remark,
-              masked->source->info().name + ": has no masks, so all of it is taken for background");
-    const Frame frame = masked->source->Read(first + 1).value();
-    EXPECT_EQ(frame.mask.type(), CV_16UC1);
-    EXPECT_EQ(frame.mask.size(), frame.depth.size());
-    EXPECT_EQ(cv::countNonZero(frame.mask), 0);
-  };
-  const auto exported = [&](DatasetFormat format, const std::string& name) {
-    EXPECT_TRUE(ExportSequence(source, format, folder / name).has_value());
-    return folder / name;
-  };
-  fs::remove_all(exported(DatasetFormat::kTum, "tum") / "mask");
-  expect_background(folder / "tum");
-  fs::remove_all(exported(DatasetFormat::kKlg, "klg") / "mask");
-  expect_background(folder / "klg");
-  exported(DatasetFormat::kBop, "bop");
-  fs::remove_all(folder / "bop/test/000000/mask");
-  fs::remove_all(folder / "bop/test/000000/mask_visib");
-  expect_background(folder / "bop");
-  exported(DatasetFormat::kSevenScenes, "chess");
-  for (int i = 0; i < 6; ++i) {
-    fs::remove(folder / fmt::format("chess/frame-{:06d}.mask.png", i));
-  }
-  expect_background(folder / "chess");
-  test::WriteScannet(source, folder / "scannet");
-  fs::remove_all(folder / "scannet/instance-filt");
-  expect_background(folder / "scannet");
-  test::WriteReplica(source, folder / "replica");
-  expect_background(folder / "replica");
-
-  // With masks the source stays what it is.
-  auto opened = OpenSequence(exported(DatasetFormat::kTum, "with")).value();
-  const FrameSource* const before = opened.get();
-  const auto same = WithBackgroundMasks(std::move(opened)).value();
-  EXPECT_EQ(same.source.get(), before);
-  EXPECT_EQ(same.remark, "");
-  // Some masks are an error, in a reader of files and in one in memory.
-  fs::remove(folder / "with/mask/0.033333.png");
-  const auto partly = OpenSequence(folder / "with");
-  ASSERT_FALSE(partly.has_value());
-  EXPECT_NE(partly.error().message.find("mask/0.033333.png: no such mask"), std::string::npos)
-      << partly.error().message;
-  auto memory = std::make_unique<test::MemorySource>();
-  memory->on_read = [](Frame& frame) -> Expected<void> {
-    if (frame.index == 1) frame.mask = cv::Mat();
-    return {};
-  };
-  const auto late = WithBackgroundMasks(std::move(memory)).value();
-  const auto frame = late.source->Read(2);
-  ASSERT_FALSE(frame.has_value());
-  EXPECT_NE(
-      frame.error().message.find("frame 2 has a mask and frame 1 has none, expected masks for all"),
-      std::string::npos)
-      << frame.error().message;
-}
-
-TEST(ForeignFormats, PosesAreInterpolatedOnlyAcrossShortGaps) {
-  TimedPoses poses;
-  for (const double t : {1.0, 1.05, 2.0}) {
-    poses[t] = Pose::Identity();
-    poses[t].translation().x() = t;
-  }
-  const auto x = [&](double t) {
-    const auto pose = PoseAt(poses, t);
-    return pose ? pose->translation().x() : -1;
-  };
-  EXPECT_EQ(x(1.05), 1.05);
-  EXPECT_NEAR(x(1.03), 1.03, 1e-12);
-  EXPECT_EQ(x(1.06), 1.05) << "the nearest, within 20 ms";
-  EXPECT_EQ(x(1.08), -1) << "in a gap of 0.95 s";
-  EXPECT_EQ(x(1.985), 2.0);
-  EXPECT_EQ(x(0.985), 1.0);
-  EXPECT_EQ(x(0.97), -1);
-  EXPECT_EQ(x(2.03), -1);
 }
 
 // Three cups of one obj_id in lists whose order changes, one cup missing at times; one plate.

@@ -94,4 +94,11 @@ void WriteScannet(FrameSource& source, const fs::path& set) {
   }
 }
 
+bool NotesSay(const SequenceNotes& notes, const std::string& words) {
+  for (const std::string& note : notes) {
+    if (note.find(words) != std::string::npos) return true;
+  }
+  return false;
+}
+
 }  // namespace tsdfpp::test

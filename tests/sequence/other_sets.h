@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/frame_source.h"
+#include "sequence/sequence_options.h"
 
 namespace tsdfpp::test {
 
@@ -15,5 +16,8 @@ void WriteReplica(FrameSource& source, const std::filesystem::path& set, bool be
 // color/ (twice as large as depth), depth/, pose/, intrinsic/, instance-filt/ (as large as color);
 // numbers 0, 10, 20... without leading zeros; the pose of the frame at place 2 is infinite.
 void WriteScannet(FrameSource& source, const std::filesystem::path& set);
+
+// Whether one of the notes holds these words.
+bool NotesSay(const SequenceNotes& notes, const std::string& words);
 
 }  // namespace tsdfpp::test

@@ -1,0 +1,65 @@
+#include "eval/score/coco_panoptic.h"
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "core/json_text.h"
+#include "core/one_line.h"
+
+namespace tsdfpp {
+namespace {
+
+// Throws where it is none: nlohmann's own conversion wraps what does not fit.
+int IdOf(const nlohmann::json& json) {
+  const auto id = WholeIn(json, 0, std::numeric_limits<int>::max());
+  if (!id) throw std::out_of_range(fmt::format("{} is no id", JsonShown(json)));
+  return static_cast<int>(*id);
+}
+
+// 0 or 1, also as false or true. Throws where it is neither number nor one of these.
+bool IsFlagged(const nlohmann::json& object, const char* key, int otherwise) {
+  const nlohmann::json flag = object.value(key, nlohmann::json(otherwise));
+  if (flag.is_boolean()) return flag.get<bool>();
+  const int number = IdOf(flag);
+  if (number > 1) {
+    throw std::out_of_range(fmt::format("'{}' is {}, expected 0 or 1", key, JsonShown(flag)));
+  }
+  return number == 1;
+}
+
+}  // namespace
+
+Expected<CocoAnnotations> ReadCocoAnnotations(const std::filesystem::path& path) {
+  TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
+  CocoAnnotations out;
+  try {
+    for (const auto& category : json.value("categories", nlohmann::json::array())) {
+      out.is_thing[IdOf(category.at("id"))] = IsFlagged(category, "isthing", 1);
+    }
+    for (const auto& annotation : json.at("annotations")) {
+      const std::string file = annotation.at("file_name");
+      const std::string id = JsonText(annotation.at("image_id"));
+      if (out.by_file.contains(file) || out.file_of_id.contains(id)) {
+        throw std::out_of_range(
+            fmt::format("image {} or file {} is there twice", id, Quoted(file)));
+      }
+      std::vector<PanopticSegment>& segments = out.by_file[file];
+      out.id_of_file[file] = id;
+      out.file_of_id[id] = file;
+      for (const auto& info : annotation.at("segments_info")) {
+        segments.push_back(
+            {IdOf(info.at("id")), IdOf(info.at("category_id")), IsFlagged(info, "iscrowd", 0)});
+      }
+    }
+  } catch (const std::exception& error) {
+    return DataError("{}: is no panoptic JSON as COCO's: {}", path.string(),
+                     WithoutTag(error.what()));
+  }
+  if (out.by_file.empty()) return DataError("{}: has no annotations", path.string());
+  return out;
+}
+
+}  // namespace tsdfpp
