@@ -62,4 +62,14 @@ enum class PatchField { kDistance, kWeight, kColourCount, kRed, kGreen, kBlue };
 void PatchValuesOf(const PatchBlocks& blocks, const PulledPoints& points, PatchField field,
                    PatchValues& values);
 
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::PatchBits) PatchBits;
+decltype(tsdfpp::CubesOf) CubesOf;
+decltype(tsdfpp::MarkedAt) MarkedAt;
+decltype(tsdfpp::MarkedNearest) MarkedNearest;
+decltype(tsdfpp::InMarkedCube) InMarkedCube;
+decltype(tsdfpp::PatchValuesOf) PatchValuesOf;
+}  // namespace plain
+
 }  // namespace tsdfpp
