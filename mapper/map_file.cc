@@ -3,8 +3,8 @@
 #include "core/files.h"
 #include "core/plain_name.h"
 #include "mapper/map_persistence.h"
-#include "mapper/methods/volume_store.h"
 #include "mapper/store/section_file.h"
+#include "mapper/store/volume_store.h"
 
 namespace tsdfpp {
 namespace {

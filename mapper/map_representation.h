@@ -8,23 +8,24 @@
 
 #include "core/types.h"
 #include "mapper/map_config.h"
-#include "mapper/mesh/mesh_cache.h"
-#include "mapper/mesh/scene_parts.h"
 #include "mapper/rays/ray_cast.h"
 
 namespace tsdfpp {
 
 class BlockMoves;
+class BlockSurfaces;
 class MapEditing;
 class MapPersistence;
 class VoxelInspection;
 
 struct MapMemory {
-  std::size_t blocks = 0;      // of voxel data and of lists
-  std::size_t bytes = 0;       // of those blocks and their tables
-  std::size_t mesh_bytes = 0;  // besides: of the meshes kept since one was asked for
+  std::size_t blocks = 0;         // of voxel data and of lists
+  std::size_t bytes = 0;          // of those blocks and their tables
+  std::size_t derived_bytes = 0;  // besides: of what was made from them when it was read
 };
 
+// Functions that are const change nothing that anybody can see: any number of threads may call them
+// at once, of one map that nobody changes meanwhile.
 class MapRepresentation {
  public:
   virtual ~MapRepresentation() = default;
@@ -54,12 +55,8 @@ class MapRepresentation {
   // T_WL, where an object's lattice is now in the world; the identity for methods that move values.
   virtual Pose ObjectLattice(InstanceId id) const = 0;
 
-  // Meshes are kept by block, and a block is meshed again only after a change in it or next to it.
-  // So meshing, though const, is not for two threads at once; a copy of the map starts without.
-
-  // Brings the kept meshes in line with the map, as SceneMesh() does before it puts them together;
-  // says how much there was to do since the last mesh. Methods that keep none do nothing.
-  virtual MeshWork UpdateMeshes() const { return {}; }
+  // Meshes are made from scratch here. Whoever asks again and again owns a SceneMesher
+  // (mapper/scene_mesher.h), which keeps them and makes what changed.
 
   // The whole surface of one object, hidden parts included, in the world at its current pose,
   // coloured. One-field methods give the triangles labelled so.
@@ -67,14 +64,6 @@ class MapRepresentation {
 
   // The visible scene: coloured, with face_ids.
   virtual TriangleMesh SceneMesh() const = 0;
-
-  // The visible scene for somebody who follows it: the parts of it that are not as they were when
-  // this was last asked, all that have triangles the first time, at a cost that goes with their
-  // number. By id, then block. Who replaces what he has of an id and block by what he is told,
-  // dropping it where it has no triangles, has the triangles of SceneMesh(), in its order where
-  // parts are by id and block. A copy of the map starts anew. Call from one thread, as
-  // UpdateMeshes.
-  virtual SceneChanges TakeSceneChanges() const = 0;
 
   // The map seen from a pose: options.surfaces images, the visible scene first. The n-th surface
   // along a ray is the first one of the map without the objects of the n - 1 before it.
@@ -90,10 +79,8 @@ class MapRepresentation {
   virtual const MapPersistence* persistence() const { return nullptr; }
   virtual MapPersistence* persistence() { return nullptr; }
   virtual const BlockMoves* block_moves() const { return nullptr; }
+  virtual const BlockSurfaces* block_surfaces() const { return nullptr; }
 };
-
-// All objects with their hidden parts, by increasing id: ObjectMesh of each, with face_ids.
-TriangleMesh AllObjectsMesh(const MapRepresentation& map);
 
 // The config must be valid (MapConfig::Validate).
 std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& config);

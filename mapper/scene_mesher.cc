@@ -101,4 +101,11 @@ std::size_t SceneMesher::Bytes() const {
   return bytes;
 }
 
+TriangleMesh AllObjectsMesh(const MapRepresentation& map) {
+  TriangleMesh all;
+  SceneMesher mesher;
+  for (const InstanceId id : map.Objects()) Append(all, mesher.ObjectMesh(map, id), id);
+  return all;
+}
+
 }  // namespace tsdfpp

@@ -60,4 +60,7 @@ class SceneMesher {
   std::map<InstanceId, TriangleMesh> told_;  // of a map without blocks
 };
 
+// All objects with their hidden parts, by increasing id: ObjectMesh of each, with face_ids.
+TriangleMesh AllObjectsMesh(const MapRepresentation& map);
+
 }  // namespace tsdfpp

@@ -38,6 +38,13 @@ class RefreshOnce {
     });
   }
 
+  // What `read` returns, while nobody refreshes; of what is derived as it happens to be.
+  template <typename Function>
+  auto Alone(const Function& read) const {
+    const std::lock_guard lock(mutex_);
+    return read();
+  }
+
  private:
   mutable std::atomic<bool> is_outdated_ = true;
   mutable std::mutex mutex_;

@@ -5,15 +5,23 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/volume/block_grid.h"
 
 namespace tsdfpp {
 
 struct ListEntry {
   InstanceId id = kNoInstance;
   std::int16_t confidence = 0;
+};
+
+// The lists of a block: kBlockVoxels lists of the same number of entries, one after the other.
+struct ListsOfBlock {
+  Index3 index;
+  std::vector<ListEntry> entries;
 };
 
 // A view of K stored entries, `stride` apart; the used ones come first. Confidences are at most

@@ -42,7 +42,10 @@ void AddMapTargets(std::vector<Target>& targets) {
                      kMapFile,
                      ReadMap,
                      {"mapper/map_file.cc", "mapper/store/section_file.cc",
-                      "mapper/methods/volume_store.cc", "mapper/methods/map_store.cc"}});
+                      "mapper/store/volume_store.cc", "mapper/methods/object_volume_map.cc",
+                      "mapper/methods/tsdfpp_map.cc", "mapper/methods/literal_map.cc",
+                      "mapper/methods/single_field_map.cc", "mapper/methods/labelled_field.cc",
+                      "mapper/index/pair_index.cc", "mapper/index/voting_index.cc"}});
 }
 
 }  // namespace tsdfpp::fuzz

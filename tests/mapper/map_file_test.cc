@@ -6,9 +6,9 @@
 
 #include "core/files.h"
 #include "core/limits.h"
-#include "mapper/methods/volume_store.h"
 #include "mapper/store/byte_stream.h"
 #include "mapper/store/section_file.h"
+#include "mapper/store/volume_store.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/core/temp_folder.h"
 #include "tests/mapper/compare_maps.h"
