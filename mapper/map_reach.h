@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "mapper/map_representation.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
 

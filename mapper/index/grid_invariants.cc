@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "mapper/volume/object_volume.h"
+
 namespace tsdfpp {
 namespace {
 

@@ -71,9 +71,21 @@ class VotingIndex final : public GlobalIndex {
 
   ListBlock& ListsOf(const Index3& block);
   // To be changed: the voxel is no longer taken for settled.
-  static VoxelList ListOf(ListBlock& lists, int place);
+  static VoxelList ListOf(ListBlock& lists, int place) {
+    lists.settled[static_cast<std::size_t>(place >> 6)] &=
+        ~(1ULL << static_cast<unsigned>(place & 63));
+    const auto at = static_cast<std::size_t>(place);
+    return {&lists.ids[at], &lists.confidences[at], static_cast<int>(lists.layers()), kBlockVoxels};
+  }
   // The same with room for one object more, unless it has K.
-  VoxelList ListWithRoom(ListBlock& lists, int place) const;
+  VoxelList ListWithRoom(ListBlock& lists, int place) const {
+    const std::size_t layers = lists.layers();
+    const std::size_t last = (layers - 1) * kBlockVoxels + static_cast<std::size_t>(place);
+    if (lists.ids[last] != kNoInstance && layers < static_cast<std::size_t>(layers_)) {
+      lists.Resize(layers + 1);
+    }
+    return ListOf(lists, place);
+  }
   // True where another object is active than was.
   bool Vote(ListBlock& lists, InstanceId id, BlockMask votes) const;
   static void FreeEmptyLayers(ListBlock& lists);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -10,8 +11,19 @@
 #include "core/types.h"
 #include "mapper/map_config.h"
 #include "mapper/volume/block_grid.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
+
+// Calls function(place) for each voxel of a mask, in order.
+template <typename Function>
+void ForEachVoxel(const BlockMask& mask, const Function& function) {
+  int first = 0;
+  for (std::uint64_t slice : mask) {
+    for (; slice != 0; slice &= slice - 1) function(first + std::countr_zero(slice));
+    first += 64;
+  }
+}
 
 struct ListEntry {
   InstanceId id = kNoInstance;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
 
