@@ -261,7 +261,7 @@ class FrameWalk {
   // Evaluates a map and writes what is to be seen of it.
   Expected<void> EvaluateRun(CompareRun& run, const Frame& frame) {
     const int index = frame.index;
-    SceneMeshes meshes = MeshesOf(run.pipeline.map(), result_.movers);
+    SceneMeshes meshes = MeshesOf(run.pipeline.map(), result_.movers, run.mesher);
     if (result_.config.keep_meshes) {
       TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out_ / run.FolderName() / "frames", index));
     }

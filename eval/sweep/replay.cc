@@ -241,14 +241,16 @@ Expected<Remade> MapAgain(const Recorded& recorded, const std::vector<int>& fram
   return remade;
 }
 
+// `why_no_slice` is empty where there is one.
 Expected<void> WriteNote(const Recorded& recorded, int frame, const ReplayResult& result,
-                         const fs::path& file) {
-  const json note{{"cell", recorded.id},
-                  {"frame", frame},
-                  {"settings", SettingsJson(recorded.settings)},
-                  {"program", ProgramIdentity()},
-                  {"image_digest", result.image_digest},
-                  {"map_digest", result.map_digest}};
+                         const std::string& why_no_slice, const fs::path& file) {
+  json note{{"cell", recorded.id},
+            {"frame", frame},
+            {"settings", SettingsJson(recorded.settings)},
+            {"program", ProgramIdentity()},
+            {"image_digest", result.image_digest},
+            {"map_digest", result.map_digest}};
+  if (!why_no_slice.empty()) note["no_slice"] = why_no_slice;
   return WriteFile(file, JsonText(note, 1) + "\n");
 }
 
@@ -279,12 +281,19 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   const fs::path& out = run.path();
   TSDFPP_RETURN_IF_ERROR(WriteCamera(remade.both.frame, out / "camera"));
   TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", remade.scene));
+  std::string why_no_slice;
   if (const MapRepresentation* map = mapper.map()) {
     TSDFPP_RETURN_IF_ERROR(
         WriteViews(*map, source.info().intrinsics, remade.both.frame.T_WC, 2, out / "views"));
-    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(remade.both, recorded.removed)), out));
+    const auto slice = CutMap(*map, SliceOf(remade.both, recorded.removed));
+    if (slice) {
+      TSDFPP_RETURN_IF_ERROR(WriteSlice(*slice, out));
+    } else {
+      why_no_slice = slice.error().message;
+    }
   }
-  TSDFPP_RETURN_IF_ERROR(WriteNote(recorded, options.frame, result, out / "replay.json"));
+  TSDFPP_RETURN_IF_ERROR(
+      WriteNote(recorded, options.frame, result, why_no_slice, out / "replay.json"));
   TSDFPP_ASSIGN(result.files, NamesBelow(out));
   TSDFPP_RETURN_IF_ERROR(run.Commit());
   return result;
