@@ -1,13 +1,13 @@
 // What tsdf++ and tsdf++/anchored share: object volumes, their meshes, the visible scene.
 #pragma once
 
-#include "mapper/map_representation.h"
 #include "mapper/mesh/scene_parts.h"
+#include "mapper/methods/voxel_map.h"
 #include "mapper/volume/volume_fusion.h"
 
 namespace tsdfpp {
 
-class LayeredMap : public MapRepresentation {
+class LayeredMap : public VoxelMap {
  public:
   const MapConfig& config() const override { return config_; }
   // Of volumes that stay in their objects' lattices.

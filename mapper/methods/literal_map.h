@@ -3,12 +3,12 @@
 #pragma once
 
 #include "mapper/index/voxel_labels.h"
-#include "mapper/map_representation.h"
+#include "mapper/methods/voxel_map.h"
 #include "mapper/volume/volume_fusion.h"
 
 namespace tsdfpp {
 
-class LiteralMap final : public MapRepresentation {
+class LiteralMap final : public VoxelMap {
  public:
   explicit LiteralMap(const MapConfig& config) : config_(config) {}
 

@@ -76,7 +76,7 @@ Fault FindVoxelFault(const TsdfBlock& block, std::size_t i, const MapConfig& con
 }
 
 // Objects whose listings need volumes that cover, in the lattice that `T_LW` leads to.
-Fault FindCoverFault(const MapRepresentation& map, const MapConfig& config, bool by_distance) {
+Fault FindCoverFault(const VoxelMap& map, const MapConfig& config, bool by_distance) {
   for (const Eigen::Vector3i& v : map.ListedVoxels()) {
     std::optional<std::pair<float, InstanceId>> last;
     for (const Listing& listing : map.ListAt(v)) {
@@ -114,7 +114,7 @@ Fault FindHashFault(const std::string& name, const BlockGrid<Block>& grid) {
 
 }  // namespace
 
-void CheckInDebugBuilds([[maybe_unused]] const MapRepresentation& map) {
+void CheckInDebugBuilds([[maybe_unused]] const VoxelMap& map) {
 #ifndef NDEBUG
   if (map.Memory().blocks > kMostBlocksInDebugBuilds) return;
   if (const Fault fault = map.FindFault()) {
@@ -216,7 +216,7 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
   return with_cover ? FindCubeFault(name, grid) : std::nullopt;
 }
 
-Fault FindListFault(const MapRepresentation& map) {
+Fault FindListFault(const VoxelMap& map) {
   const std::vector<InstanceId> objects = map.Objects();
   const MapConfig& config = map.config();
   const int layers = LayersOf(map.method(), config);
@@ -249,7 +249,7 @@ Fault FindListFault(const MapRepresentation& map) {
   return std::nullopt;
 }
 
-Fault FindCountFault(const MapRepresentation& map, std::size_t blocks) {
+Fault FindCountFault(const VoxelMap& map, std::size_t blocks) {
   const std::size_t counted = map.Memory().blocks;
   if (counted == blocks) return std::nullopt;
   return fmt::format("the map counts {} blocks and has {}", counted, blocks);

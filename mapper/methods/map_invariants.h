@@ -5,13 +5,13 @@
 #include <optional>
 #include <string>
 
-#include "mapper/map_representation.h"
+#include "mapper/methods/voxel_map.h"
 
 namespace tsdfpp {
 
-// Aborts with the sentence of MapRepresentation::FindFault(), where there is one, in builds without
+// Aborts with the sentence of VoxelInspection::FindFault(), where there is one, in builds without
 // NDEBUG and for maps of up to 1000 blocks; does nothing otherwise. Called after every event.
-void CheckInDebugBuilds(const MapRepresentation& map);
+void CheckInDebugBuilds(const VoxelMap& map);
 
 // The parts of FindFault(); each returns a sentence, or nothing where all is well.
 using Fault = std::optional<std::string>;
@@ -23,10 +23,10 @@ Fault FindGridFault(const std::string& name, const TsdfGrid& grid, const MapConf
 
 // Lists as the interface gives them: not empty, no longer than K, no object twice, confidences in
 // range, every object in the map.
-Fault FindListFault(const MapRepresentation& map);
+Fault FindListFault(const VoxelMap& map);
 
 // Blocks as Memory() counts them.
-Fault FindCountFault(const MapRepresentation& map, std::size_t blocks);
+Fault FindCountFault(const VoxelMap& map, std::size_t blocks);
 
 // docs/map.md, "Cover": whether a volume covers the point q, in voxels of its lattice.
 bool CoversPoint(const TsdfGrid& grid, const Eigen::Vector3d& q, float back);

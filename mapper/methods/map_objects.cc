@@ -49,7 +49,8 @@ TsdfGrid InWorldLattice(const TsdfGrid& volume, const Pose& T_WL, const MapConfi
 }
 
 TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {
-  const TsdfGrid* grid = map.GridOf(id);
+  const VoxelInspection& voxels = VoxelsOf(map);
+  const TsdfGrid* grid = voxels.GridOf(id);
   if (grid == nullptr) return {};
   if (!IsOneField(map.method())) return *grid;
   TsdfGrid volume;
@@ -57,7 +58,7 @@ TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {
     auto block = std::make_unique<TsdfBlock>(*entry->block);
     for (int place = 0; place < kBlockVoxels; ++place) {
       const Index3 v = VoxelAt(entry->index, place);
-      if (!map.ValueAt(id, {v.x, v.y, v.z})) block->Clear(place);
+      if (!voxels.ValueAt(id, {v.x, v.y, v.z})) block->Clear(place);
     }
     block->UpdateMasks(map.config().back());
     if (block->AnyObserved()) volume.Add(entry->index, std::move(block));

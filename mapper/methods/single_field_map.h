@@ -5,8 +5,8 @@
 #include <functional>
 
 #include "mapper/index/voxel_labels.h"
-#include "mapper/map_representation.h"
 #include "mapper/mesh/mesh_cache.h"
+#include "mapper/methods/voxel_map.h"
 #include "mapper/volume/tsdf_block.h"
 #include "mapper/volume/volume_fusion.h"
 
@@ -21,7 +21,7 @@ enum class FieldRule {
   kStatic,      // poses move nothing
 };
 
-class SingleFieldMap final : public MapRepresentation {
+class SingleFieldMap final : public VoxelMap {
  public:
   SingleFieldMap(const MapConfig& config, FieldRule rule);
 

@@ -1,5 +1,6 @@
 // Saved maps, behind their checksums and compression (tests/fuzz/mutate.h packs them again).
 #include "mapper/map_file.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/fuzz/complaint.h"
 #include "tests/fuzz/target.h"
 
@@ -12,13 +13,14 @@ bool ReadMap(std::string_view input) {
   const auto loaded = MapFromBytes(input, kMapFile);
   if (!Accepted(loaded, kMapFile)) return false;
   const MapRepresentation& map = *loaded->map;
-  const auto fault = map.FindFault();
+  const auto fault = VoxelsOf(map).FindFault();
   Require(!fault, "a map with a fault: " + fault.value_or(""));
   const MappedRun* const run = loaded->run ? &*loaded->run : nullptr;
-  const std::string bytes = MapToBytes(map, run);
+  const std::string bytes = MapToBytes(map, run).value();
   const auto again = MapFromBytes(bytes, kMapFile);
   Require(again.has_value(), again ? "" : "what was saved is refused: " + again.error().message);
-  Require(MapToBytes(*again->map, run) == bytes, "what was saved is loaded as something else");
+  Require(MapToBytes(*again->map, run).value() == bytes,
+          "what was saved is loaded as something else");
   // What `tsdfpp map --from` and `evaluate` do first.
   const TriangleMesh scene = map.SceneMesh();
   for (const auto& triangle : scene.triangles) {

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "mapper/map_editing.h"
 #include "mapper/map_representation.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/from_scratch.h"
@@ -113,7 +114,7 @@ TEST_P(SceneChanges, LeadToTheWholeMesh) {
       } else if (what == 4) {
         // And back, so that the same id is another volume, or the same one in other hands.
         constexpr InstanceId kOther = 9;
-        if (map->Rename(id, kOther)) {
+        if (EditingOf(*map).Rename(id, kOther)) {
           const int told = dice.Whole(3);
           if (told == 0) {
             ASSERT_TRUE(follower.Take(*map)) << "seed " << seed << ", event " << event;
@@ -121,7 +122,7 @@ TEST_P(SceneChanges, LeadToTheWholeMesh) {
             map->UpdateMeshes();  // has seen that the id is gone when it is back
           }
         }
-        static_cast<void>(map->Rename(kOther, id));
+        static_cast<void>(EditingOf(*map).Rename(kOther, id));
       } else if (what == 5) {
         map->ObjectMesh(
             id);  // brings a part of what is kept up to date, behind the follower's back
