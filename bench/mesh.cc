@@ -209,6 +209,7 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
 
   std::vector<Run> runs;
   for (const Method method : AllMethods()) {
+    if (!InfoOf(method).has_voxels) continue;  // nor meshes that are kept by block
     runs.emplace_back();
     runs.back().name = MethodName(method);
     runs.back().pipeline =

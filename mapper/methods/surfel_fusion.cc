@@ -92,7 +92,8 @@ class SurfelFusion {
     const Eigen::Vector3d ray = pixels_.rays().At(u, v);
     const double depth = splat.DepthAlong(ray, distance2);
     if (depth == 0) return false;
-    return std::abs(static_cast<double>(pixels_.depth(u, v)) - depth) * ray.norm() <= slack_m_;
+    const double apart_m = static_cast<double>(pixels_.depth(u, v)) - depth;
+    return apart_m * apart_m * ray.squaredNorm() <= slack_m_ * slack_m_;
   }
 
   bool HasNormal(std::size_t u, std::size_t v) const {

@@ -14,7 +14,7 @@
 namespace tsdfpp {
 
 // The rules' constants; lengths are in voxels.
-inline constexpr double kSurfelSpacing_voxels = 0.5;
+inline constexpr double kSurfelSpacing_voxels = 0.75;
 // Where pixels are coarser: no point of a surface that is seen again is farther from a pixel's.
 inline constexpr double kSurfelSpacing_pixels = 0.75;
 inline constexpr double kMostSurfelRadius_voxels = 4;

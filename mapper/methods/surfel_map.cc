@@ -106,29 +106,24 @@ Pose SurfelMap::ObjectLattice(InstanceId id) const {
   return object == objects_.end() ? Pose::Identity() : object->second.T_WL;
 }
 
-std::map<InstanceId, Pose> SurfelMap::MovedLattices() const {
-  std::map<InstanceId, Pose> lattices;
-  for (const auto& [id, object] : objects_) {
-    if (!object.lattice_is_world) lattices.emplace(id, object.T_WL);
-  }
-  return lattices;
-}
-
-ObjectMove SurfelMap::MoveTo(InstanceId id, const Pose& T_WO) const {
-  ObjectMove move;
-  const auto object = objects_.find(id);
-  if (object != objects_.end() && object->second.T_WO_birth) {
-    move.T_WL = LatticeAt(object->second, T_WO);
-  }
-  return move;
-}
-
 TriangleMesh SurfelMap::ObjectMesh(InstanceId id) const {
   const auto object = objects_.find(id);
   return object == objects_.end() ? TriangleMesh{} : MeshOf(object->second);
 }
 
 TriangleMesh SurfelMap::SceneMesh() const { return AllObjectsMesh(*this); }
+
+SceneChanges SurfelMap::TakeSceneChanges() const {
+  SceneChanges changes;
+  for (const InstanceId id : Objects()) shown_.insert(id);
+  for (auto id = shown_.begin(); id != shown_.end();) {
+    ScenePiece& piece = changes.parts.emplace_back();
+    piece.id = *id;
+    Append(piece.mesh, ObjectMesh(*id), *id);
+    id = SurfelsOf(*id) == nullptr ? shown_.erase(id) : std::next(id);
+  }
+  return changes;
+}
 
 std::vector<RaySurface> SurfelMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
                                             const RayCastOptions& options) const {

@@ -3,6 +3,10 @@
 // fits maps of another kind, and what they keep.
 #pragma once
 
+#include <optional>
+#include <set>
+#include <string>
+
 #include "mapper/map_representation.h"
 #include "mapper/methods/surfel_list.h"
 
@@ -20,35 +24,19 @@ class SurfelMap final : public MapRepresentation {
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
-  std::map<InstanceId, Pose> MovedLattices() const override;
-  ObjectMove MoveTo(InstanceId id, const Pose& T_WO) const override;
   // A hexagon a stable disc, whose sides touch it: four triangles.
   TriangleMesh ObjectMesh(InstanceId id) const override;
   // The stable discs of all objects.
   TriangleMesh SceneMesh() const override;
+  // One part an object, of which each that has surfels, or had when this was last asked, is told.
+  SceneChanges TakeSceneChanges() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
   // An object's list counts as one block.
   MapMemory Memory() const override;
-  std::optional<std::string> FindFault() const override;
 
-  Expected<void> Rename(InstanceId, InstanceId) override { return NoVoxels("renames nothing"); }
-  Expected<void> Add(InstanceId, const TsdfGrid&, const Pose&, const Pose&) override {
-    return NoVoxels("takes no volumes");
-  }
-  SceneChanges TakeSceneChanges() const override { return {}; }
-  std::optional<VoxelValue> ValueAt(InstanceId, const Eigen::Vector3i&) const override {
-    return {};
-  }
-  const TsdfGrid* GridOf(InstanceId) const override { return nullptr; }
-  std::vector<Listing> ListAt(const Eigen::Vector3i&) const override { return {}; }
-  std::vector<Eigen::Vector3i> ObservedVoxels(InstanceId) const override { return {}; }
-  std::vector<Eigen::Vector3i> ListedVoxels() const override { return {}; }
-  void Save(Sections&) const override {}
-  Expected<void> Load(const Sections&) override { return NoVoxels("has no saved form"); }
-  static Expected<void> NoVoxels(std::string_view what) {
-    return UsageError("method 'surfels' keeps no voxels and {}", what);
-  }
+  // The first thing found in what is stored that docs/map.md rules out, in a sentence.
+  std::optional<std::string> FindFault() const;
 
   // What there is, stable or not, in the object's lattice frame; nullptr where there is nothing.
   const std::vector<Surfel>* SurfelsOf(InstanceId id) const;
@@ -57,6 +45,7 @@ class SurfelMap final : public MapRepresentation {
   MapConfig config_;
   SurfelObjects objects_;
   std::uint32_t frames_ = 0;  // fused so far
+  mutable std::set<InstanceId> shown_;
 };
 
 }  // namespace tsdfpp

@@ -16,6 +16,8 @@ namespace {
 // at a flatter angle stand for as much as at this one.
 constexpr double kSteepest = 10;
 constexpr double kLeastCosine = 1 / kSteepest;
+// To each side, of the differences that normals are made of.
+constexpr double kNormalStep_voxels = 0.5;
 // Pixels between the ends of a difference at most: half.
 constexpr int kMostStep = 8;
 // Where the steps to both sides differ by more depth, the surface bends there.
@@ -45,41 +47,41 @@ SurfelPixels::SurfelPixels(const Frame& frame, const cv::Mat& labels, double vox
       tbb::simple_partitioner());
 }
 
-bool SurfelPixels::GoesOn(int u, int v, int to_u, int to_v, int pixels) const {
-  if (to_u < 0 || to_u >= camera_.width || to_v < 0 || to_v >= camera_.height) return false;
+float SurfelPixels::DepthWhereItGoesOn(int u, int v, int to_u, int to_v, double most_m) const {
+  if (to_u < 0 || to_u >= camera_.width || to_v < 0 || to_v >= camera_.height) return 0;
   const float z = frame_->depth.at<float>(v, u);
   const float to_z = frame_->depth.at<float>(to_v, to_u);
-  if (!IsValidDepth(to_z) || labels_.at<InstanceId>(to_v, to_u) != labels_.at<InstanceId>(v, u)) {
-    return false;
-  }
-  return std::abs(static_cast<double>(to_z) - static_cast<double>(z)) <=
-         kSteepest * pixels * Footprint(static_cast<double>(z));
+  const bool goes_on = IsValidDepth(to_z) &&
+                       labels_.at<InstanceId>(to_v, to_u) == labels_.at<InstanceId>(v, u) &&
+                       std::abs(static_cast<double>(to_z) - static_cast<double>(z)) <= most_m;
+  return goes_on ? to_z : 0;
 }
 
 Eigen::Vector3d SurfelPixels::StepAlong(int u, int v, int axis) const {
-  const auto point = [&](int at_u, int at_v) {
-    return PointAt(static_cast<std::size_t>(at_u), static_cast<std::size_t>(at_v));
+  const auto ray = [&](int at_u, int at_v) {
+    return rays_.At(static_cast<std::size_t>(at_u), static_cast<std::size_t>(at_v));
   };
-  const Eigen::Vector3d here = point(u, v);
-  const double spacing_m = kSurfelSpacing_voxels * voxel_m_;
+  const auto z = static_cast<double>(frame_->depth.at<float>(v, u));
+  const double footprint_m = Footprint(z);
   int step = static_cast<int>(
-      std::clamp(std::floor(spacing_m / Footprint(here.z())), 1.0, double{kMostStep}));
+      std::clamp(std::floor(kNormalStep_voxels * voxel_m_ / footprint_m), 1.0, double{kMostStep}));
   for (; step >= 1; step /= 2) {
     const int du = axis == 0 ? step : 0;
     const int dv = axis == 0 ? 0 : step;
-    const bool on = GoesOn(u, v, u + du, v + dv, step);
-    const bool back = GoesOn(u, v, u - du, v - dv, step);
-    if (!on && !back) continue;
-    const Eigen::Vector3d to_next =
-        on ? Eigen::Vector3d(point(u + du, v + dv) - here) : Eigen::Vector3d::Zero();
-    const Eigen::Vector3d from_last =
-        back ? Eigen::Vector3d(here - point(u - du, v - dv)) : Eigen::Vector3d::Zero();
-    if (!back) return to_next;
-    if (!on) return from_last;
-    if (std::abs(to_next.z() - from_last.z()) <= kBend_voxels * voxel_m_) {
-      return to_next + from_last;
-    }
-    return std::abs(to_next.z()) <= std::abs(from_last.z()) ? to_next : from_last;
+    const double most_m = kSteepest * step * footprint_m;
+    const auto on = static_cast<double>(DepthWhereItGoesOn(u, v, u + du, v + dv, most_m));
+    const auto back = static_cast<double>(DepthWhereItGoesOn(u, v, u - du, v - dv, most_m));
+    if (on == 0 && back == 0) continue;
+    const double falls_on = on - z;
+    const double falls_back = z - back;
+    const bool bends = std::abs(falls_on - falls_back) > kBend_voxels * voxel_m_;
+    const bool takes_on =
+        on != 0 && (back == 0 || !bends || std::abs(falls_on) <= std::abs(falls_back));
+    const bool takes_back = back != 0 && (on == 0 || !bends || !takes_on);
+    const Eigen::Vector3d here = z * ray(u, v);
+    const Eigen::Vector3d end = takes_on ? Eigen::Vector3d(on * ray(u + du, v + dv)) : here;
+    const Eigen::Vector3d begin = takes_back ? Eigen::Vector3d(back * ray(u - du, v - dv)) : here;
+    return end - begin;
   }
   return Eigen::Vector3d::Zero();
 }

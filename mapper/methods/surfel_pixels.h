@@ -50,7 +50,9 @@ class SurfelPixels {
   // The way along the surface to where it goes from a pixel along a row or a column; 0 where it
   // goes nowhere.
   Eigen::Vector3d StepAlong(int u, int v, int axis) const;
-  bool GoesOn(int u, int v, int to_u, int to_v, int pixels) const;
+  // The depth of another pixel where the surface goes on to there: where it is of the same label,
+  // and at most so much nearer or farther; else 0.
+  float DepthWhereItGoesOn(int u, int v, int to_u, int to_v, double most_m) const;
 
   const Frame* frame_;
   cv::Mat labels_;

@@ -21,7 +21,7 @@ std::vector<PlainSurfel> SurfelReference::SurfelsOf(InstanceId id) const {
   return object == objects_.end() ? std::vector<PlainSurfel>{} : object->second.surfels;
 }
 
-double SurfelReference::Reach(double z) const { return std::max(h_ / 2, 0.75 * z / f_); }
+double SurfelReference::Reach(double z) const { return 0.75 * std::max(h_, z / f_); }
 
 double SurfelReference::RadiusOf(const Pixel& pixel) const {
   return std::min(Reach(pixel.z) + pixel.extent, 4 * h_);
