@@ -185,8 +185,8 @@ class SurfelFusion {
     if (surfel.confidence < std::numeric_limits<std::uint16_t>::max()) ++surfel.confidence;
   }
 
-  // Whether the frame sees past the place of a surfel that no pixel confirmed: every pixel around
-  // shows something else more than the slack behind it (Keller et al. 2013, section 4.3).
+  // Whether the frame sees past the place of a surfel that no pixel confirmed: the pixel there and
+  // those around it show something more than the slack behind it (Keller et al. 2013, section 4.3).
   bool IsSeenThrough(const Splat& splat) const {
     const Eigen::Vector3d& q = splat.centre_C;
     if (q.z() < kNearestSeen_m) return false;
@@ -202,11 +202,9 @@ class SurfelFusion {
     const auto at_u = static_cast<std::size_t>(u);
     const auto at_v = static_cast<std::size_t>(v);
     if (!pixels_.IsUsable(at_u, at_v) || !is_past(at_u, at_v)) return false;
-    const auto around = static_cast<std::size_t>(std::min(
-        std::ceil(std::sqrt(splat.radius2) / pixels_.Footprint(q.z())), double{kMostAround}));
-    for (std::size_t y = at_v - std::min(at_v, around); y <= std::min(at_v + around, height_ - 1);
+    for (std::size_t y = at_v - std::min<std::size_t>(at_v, 1); y < std::min(at_v + 2, height_);
          ++y) {
-      for (std::size_t x = at_u - std::min(at_u, around); x <= std::min(at_u + around, width_ - 1);
+      for (std::size_t x = at_u - std::min<std::size_t>(at_u, 1); x < std::min(at_u + 2, width_);
            ++x) {
         if (pixels_.IsUsable(x, y) && !is_past(x, y)) return false;
       }
@@ -279,8 +277,6 @@ class SurfelFusion {
   }
 
   static constexpr std::size_t kRoom = 256;  // surfels that a list has room for besides
-  // Pixels looked at to each side of a surfel that may be seen through.
-  static constexpr int kMostAround = 16;
   enum class Fate : std::uint8_t { kUnseen, kSeen, kGone };
 
   SurfelPixels pixels_;

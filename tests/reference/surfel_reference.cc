@@ -38,7 +38,7 @@ std::optional<Eigen::Vector3d> SurfelReference::LiesOn(const Pixel& pixel,
                                                        const Eigen::Vector3d& centre,
                                                        const Eigen::Vector3d& normal,
                                                        double radius) const {
-  if (!pixel.normal || centre.z() < 0.05) return std::nullopt;
+  if (!pixel.has_normal || centre.z() < 0.05) return std::nullopt;
   const auto meeting = Meet(pixel.ray, centre, normal);
   if (!meeting || (*meeting - centre).norm() > radius) return std::nullopt;
   if ((*meeting - pixel.point).norm() > h_) return std::nullopt;
@@ -94,23 +94,23 @@ std::vector<SurfelReference::Pixel> SurfelReference::PixelsOf(const Frame& frame
     if (!right || !down) continue;
     const Eigen::Vector3d normal = down->cross(*right);
     if (normal.norm() == 0 || normal.dot(pixel.ray) >= 0) continue;
+    pixel.has_normal = true;
     pixel.normal = normal.normalized().cast<float>().cast<double>();
-    const double cosine = -pixel.normal->dot(pixel.ray.normalized());
+    const double cosine = -pixel.normal.dot(pixel.ray.normalized());
     pixel.extent = pixel.z / f_ / (std::sqrt(2.0) * std::max(cosine, 0.1));
   }
   return pixels;
 }
 
-bool SurfelReference::IsSeenThrough(const std::vector<Pixel>& pixels, const Eigen::Vector3d& q,
-                                    double radius) const {
+bool SurfelReference::IsSeenThrough(const std::vector<Pixel>& pixels,
+                                    const Eigen::Vector3d& q) const {
   if (q.z() < 0.05) return false;
-  const int around = std::min(static_cast<int>(std::ceil(radius / (q.z() / f_))), 16);
   const double u = std::floor(k_.fx * q.x() / q.z() + k_.cx + 0.5);
   const double v = std::floor(k_.fy * q.y() / q.z() + k_.cy + 0.5);
   bool middle_is_usable = false;
   for (const Pixel& pixel : pixels) {
     if (pixel.id == kNoInstance) continue;
-    if (std::abs(pixel.u - u) > around || std::abs(pixel.v - v) > around) continue;
+    if (std::abs(pixel.u - u) > 1 || std::abs(pixel.v - v) > 1) continue;
     if ((pixel.z - q.z()) * pixel.ray.norm() <= h_) return false;
     middle_is_usable = middle_is_usable || (pixel.u == u && pixel.v == v);
   }
@@ -137,7 +137,7 @@ void SurfelReference::Fuse(const Frame& frame, const cv::Mat& labels) {
       const auto meeting = LiesOn(pixel, centre, normal, static_cast<double>(surfel.radius_m));
       if (!meeting) continue;
       pixel.lies_on_one = true;
-      if (pixel.normal->dot(normal) < std::cos(M_PI / 6)) continue;
+      if (pixel.normal.dot(normal) < std::cos(M_PI / 6)) continue;
       const double apart = (*meeting - centre).norm();
       if (chosen[i] != nullptr && apart >= least) continue;
       chosen[i] = &surfel;
@@ -160,7 +160,7 @@ void SurfelReference::Fuse(const Frame& frame, const cv::Mat& labels) {
         if (chosen[i] != &old) continue;
         ++count;
         offset += (pixels[i].point - centre).dot(normal);
-        normals += *pixels[i].normal;
+        normals += pixels[i].normal;
         for (int c = 0; c < 3; ++c) colours[c] += pixels[i].colour[c];
         radius = std::min(radius, RadiusOf(pixels[i]));
       }
@@ -180,21 +180,19 @@ void SurfelReference::Fuse(const Frame& frame, const cv::Mat& labels) {
         surfel.confidence = std::min(old.confidence + 1, 65535);
       }
       const bool is_late = surfel.confidence < 2 && frames_ - surfel.born >= 10;
-      if (is_late ||
-          (count == 0 && IsSeenThrough(pixels, centre, static_cast<double>(old.radius_m))))
-        continue;
+      if (is_late || (count == 0 && IsSeenThrough(pixels, centre))) continue;
       kept.push_back(surfel);
     }
     object.surfels = kept;
   }
 
   for (const Pixel& pixel : pixels) {
-    if (pixel.lies_on_one || !pixel.normal) continue;
+    if (pixel.lies_on_one || !pixel.has_normal) continue;
     Object& object = objects_[pixel.id];
     const Pose T_LC = object.T_WL().inverse() * frame.T_WC;
     PlainSurfel surfel;
     surfel.centre_L = (T_LC * pixel.point).cast<float>();
-    surfel.normal_L = (T_LC.linear() * *pixel.normal).cast<float>();
+    surfel.normal_L = (T_LC.linear() * pixel.normal).cast<float>();
     surfel.radius_m = static_cast<float>(RadiusOf(pixel));
     for (int c = 0; c < 3; ++c) {
       surfel.colour[static_cast<std::size_t>(c)] = 256 * pixel.colour[c];
@@ -204,7 +202,7 @@ void SurfelReference::Fuse(const Frame& frame, const cv::Mat& labels) {
     object.surfels.push_back(surfel);
     for (Pixel& other : pixels) {
       if (other.id != pixel.id || other.lies_on_one) continue;
-      other.lies_on_one = LiesOn(other, pixel.point, *pixel.normal, Reach(pixel.z)).has_value();
+      other.lies_on_one = LiesOn(other, pixel.point, pixel.normal, Reach(pixel.z)).has_value();
     }
   }
 }

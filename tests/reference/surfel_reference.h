@@ -52,7 +52,8 @@ class SurfelReference {
     double z = 0;
     Eigen::Vector3d ray;
     Eigen::Vector3d point;
-    std::optional<Eigen::Vector3d> normal;
+    bool has_normal = false;
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     cv::Vec3b colour;
     bool lies_on_one = false;
     double extent = 0;
@@ -68,8 +69,7 @@ class SurfelReference {
   std::optional<Eigen::Vector3d> Step(const std::vector<Pixel>& pixels, const Pixel& at, int du,
                                       int dv) const;
   std::vector<Pixel> PixelsOf(const Frame& frame, const cv::Mat& labels) const;
-  bool IsSeenThrough(const std::vector<Pixel>& pixels, const Eigen::Vector3d& q,
-                     double radius) const;
+  bool IsSeenThrough(const std::vector<Pixel>& pixels, const Eigen::Vector3d& q) const;
   double RadiusOf(const Pixel& pixel) const;
 
   double h_;
