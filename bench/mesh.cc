@@ -279,6 +279,7 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
 
   Maps maps{{}, Open3dVolume(config.voxel_m, options.open3d_band * config.voxel_m)};
   for (const Method method : AllMethods()) {
+    if (!InfoOf(method).has_voxels) continue;  // nor meshes that are kept by block
     maps.runs.emplace_back();
     maps.runs.back().name = MethodName(method);
     maps.runs.back().pipeline =

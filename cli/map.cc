@@ -56,6 +56,11 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
     return UsageError("--layers {} does not fit method {}, whose number of layers is fixed",
                       options.map.layers, options.method);
   }
+  if (!InfoOf(config.method).has_voxels && (options.trunc_front > 0 || options.trunc_back > 0)) {
+    return UsageError(
+        "--trunc-front and --trunc-back do not fit method {}, which has no truncation",
+        options.method);
+  }
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
   return config;
 }

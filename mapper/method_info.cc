@@ -6,7 +6,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr std::array<MethodInfo, 8> kMethods{
+constexpr auto kMethods = std::to_array<MethodInfo>(
     {{Method::kTsdf, "tsdf", "one field, in which an object's voxels move with it", "#c04a00",
       "#ff8a4c", true, true, 1, false},
      {Method::kTsdfMin, "tsdf/min", "one field, in which the nearer surface stays", "#8a6100",
@@ -24,7 +24,10 @@ constexpr std::array<MethodInfo, 8> kMethods{
       "layers over volumes that stay in their objects' own frames", "#00795a", "#2fcfa0", false,
       false, 4, true},
      {Method::kVolumes, "volumes", "a volume for each object in its own frame, and no index",
-      "#5a5a5a", "#b4b4b4", false, false, kMaxLayers, false}}};
+      "#5a5a5a", "#b4b4b4", false, false, kMaxLayers, false},
+     {Method::kSurfels, "surfels",
+      "a list of discs for each object in its own frame, and no voxels", "#6a3fb5", "#b79bff",
+      false, false, kMaxLayers, false, false}});
 
 }  // namespace
 

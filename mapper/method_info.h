@@ -22,7 +22,8 @@ enum class Method {
   kTsdfpp,
   kTsdfppLiteral,
   kTsdfppAnchored,
-  kVolumes
+  kVolumes,
+  kSurfels
 };
 
 struct MethodInfo {
@@ -38,6 +39,8 @@ struct MethodInfo {
   // Objects that a voxel lists (K), and whether a setting changes that.
   int layers;
   bool layers_can_be_set;
+  // It keeps signed distances in voxels, within a band about the surface; else it lists surfaces.
+  bool has_voxels = true;
 };
 
 // In the order in which lists show them.

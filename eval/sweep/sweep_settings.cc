@@ -275,12 +275,16 @@ std::string MapKey(const CellSettings& settings) {
     return fmt::format("open3d voxel_m {} truncation_voxels {}{}", config.map.voxel_m,
                        config.map.trunc_front_voxels, sabotage);
   }
-  const bool moves_values = InfoOf(config.method).moves_values;
+  const MethodInfo& info = InfoOf(config.method);
+  if (!info.has_voxels) {
+    return fmt::format("{} voxel_m {} poses {}{}", info.name, config.map.voxel_m,
+                       PoseSourceName(config.poses), sabotage);
+  }
   return fmt::format(
-      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}", MethodName(config.method),
-      config.map.voxel_m, config.map.trunc_front_voxels, config.map.trunc_back_voxels,
+      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}", info.name, config.map.voxel_m,
+      config.map.trunc_front_voxels, config.map.trunc_back_voxels,
       LayersOf(config.method, config.map), PoseSourceName(config.poses),
-      moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "",
+      info.moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "",
       IsOneField(config.method)
           ? fmt::format(" moved_voxels {} removed_voxels {} vote_band {}",
                         MovedVoxelsName(config.map.moved_voxels),

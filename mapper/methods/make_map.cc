@@ -4,6 +4,7 @@
 #include "mapper/methods/anchored_map.h"
 #include "mapper/methods/literal_map.h"
 #include "mapper/methods/single_field_map.h"
+#include "mapper/methods/surfel_map.h"
 #include "mapper/methods/tsdfpp_map.h"
 #include "mapper/methods/volumes_map.h"
 
@@ -41,6 +42,7 @@ constexpr Maker kMakers[] = {
     {Method::kTsdfppLiteral, MakeFixed<LiteralMap>},
     {Method::kTsdfppAnchored, MakeLayered<AnchoredMap>},
     {Method::kVolumes, MakeFixed<VolumesMap>},
+    {Method::kSurfels, MakeFixed<SurfelMap>},
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Tests that run for each method.
+// Tests that run for each method, or for each that has voxels.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -8,23 +8,12 @@
 #include <string>
 
 #include "mapper/map_representation.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
 
 class EveryMethodTest : public ::testing::TestWithParam<Method> {};
-
-inline std::string MethodTestName(Method method) {
-  std::string name(MethodName(method));
-  for (char& c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-  }
-  return name;
-}
-
-#define TSDFPP_FOR_EVERY_METHOD(suite)                                        \
-  INSTANTIATE_TEST_SUITE_P(Methods, suite, ::testing::ValuesIn(AllMethods()), \
-                           [](const auto& tested) { return MethodTestName(tested.param); })
 
 inline void SetPosesThenFuse(MapRepresentation& map, const Frame& frame) {
   for (const auto& [id, T_WO] : frame.T_WO) map.SetObjectPose(id, T_WO);

@@ -15,7 +15,7 @@ using reference::MakePose;
 using reference::Scene;
 
 class Freeing : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(Freeing);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(Freeing);
 
 std::size_t BlocksOf(const std::vector<Eigen::Vector3i>& voxels) {
   std::set<VoxelKey> blocks;

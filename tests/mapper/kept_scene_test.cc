@@ -30,7 +30,7 @@ cv::Mat LabelsIn(const Frame& frame, const cv::Rect& window, InstanceId as) {
 }
 
 class KeptScene : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(KeptScene);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(KeptScene);
 
 TEST_P(KeptScene, FollowsSmallChanges) {
   int small = 0;

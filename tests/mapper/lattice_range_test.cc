@@ -62,7 +62,7 @@ Expected<void> Check(const MapRepresentation& map, const Frame& frame) {
 }
 
 class LatticeEdge : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(LatticeEdge);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(LatticeEdge);
 
 // Vertices are single precision in metres: as far out as this they are rounded to so much.
 void ExpectSameMeshShifted(const TriangleMesh& mesh, const TriangleMesh& shifted,

@@ -6,6 +6,7 @@
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/mesh_checks.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -34,7 +35,7 @@ double AlongRay(const Eigen::Vector3d& eye, const Eigen::Vector3d& p) {
 }
 
 TEST(AccuracyTest, OneFrameOfAPlaneGivesTheDistanceAlongTheRay) {
-  for (const Method method : AllMethods()) {
+  for (const Method method : VoxelMethods()) {
     const auto map = MakeMap(method, ToyConfig());
     // Steep, so that all of the image sees the plane within 55 degrees of its normal.
     const Pose T_WC = reference::LookAt({0.12, 0.1, 0.5}, {0, 0, 0});
@@ -59,7 +60,7 @@ TEST(AccuracyTest, OneFrameOfAPlaneGivesTheDistanceAlongTheRay) {
 }
 
 TEST(AccuracyTest, MeshOfAPlaneIsThePlane) {
-  for (const Method method : AllMethods()) {
+  for (const Method method : VoxelMethods()) {
     const auto map = MakeMap(method, ToyConfig());
     for (int i = 0; i < 5; ++i) {
       const Pose T_WC = reference::LookAt({0.15 * std::cos(1.3 * i), 0.15 * std::sin(1.3 * i), 0.5},
@@ -91,7 +92,7 @@ TEST(AccuracyTest, MeshOfABallIsTheBall) {
   // band; across the surface it stays below a voxel.
   constexpr double kRimError_voxels = 1.0;
   constexpr double kMeanBallError_voxels = 0.2;
-  for (const Method method : AllMethods()) {
+  for (const Method method : VoxelMethods()) {
     const auto map = MakeMap(method, ToyConfig());
     for (int i = 0; i < 8; ++i) {
       const double angle = 0.785 * i + 0.1;

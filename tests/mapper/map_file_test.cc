@@ -29,7 +29,7 @@ class MapFile : public EveryMethodTest {
     return std::move(*loaded);
   }
 };
-TSDFPP_FOR_EVERY_METHOD(MapFile);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(MapFile);
 
 MappedRun SomeRun() {
   MappedRun run;

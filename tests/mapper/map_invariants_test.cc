@@ -45,10 +45,10 @@ class Invariants : public EveryMethodTest {
     EXPECT_NE(fault->find(words), std::string::npos) << *fault;
   }
 };
-TSDFPP_FOR_EVERY_METHOD(Invariants);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(Invariants);
 
 std::vector<Method> MethodsWithLists() {
-  std::vector<Method> methods = AllMethods();
+  std::vector<Method> methods = VoxelMethods();
   std::erase(methods, Method::kVolumes);
   return methods;
 }

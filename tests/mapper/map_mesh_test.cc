@@ -9,6 +9,7 @@
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/mesh_checks.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/mapper/visible_triangles.h"
 
@@ -49,7 +50,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, ObjectMeshTest,
                          ::testing::Values(Method::kTsdfpp, Method::kTsdfppAnchored,
                                            Method::kTsdfppLiteral, Method::kVolumes),
                          MethodTestName);
-INSTANTIATE_TEST_SUITE_P(Methods, EveryMesh, ::testing::ValuesIn(AllMethods()), MethodTestName);
+INSTANTIATE_TEST_SUITE_P(Methods, EveryMesh, ::testing::ValuesIn(VoxelMethods()), MethodTestName);
 
 TEST_P(ObjectMeshTest, LiesInTheReferencesCrossedCubes) {
   SideBySide maps(GetParam(), ToyConfig(), ToyBox(), ToyIds());

@@ -26,7 +26,7 @@ bool IsAnchored(Method method) {
 }
 
 class MapObjects : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(MapObjects);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(MapObjects);
 
 // The renamed brick goes on moving and being seen under its new name, and the ball goes on as it.
 TEST_P(MapObjects, ARenamedObjectIsTheSameObject) {
@@ -161,7 +161,7 @@ TEST_P(MapObjects, AnObjectComesFromAnotherMapAtItsPlace) {
 // Renames among the other events, at random, against the reference.
 class RandomRenames : public ::testing::TestWithParam<std::tuple<Method, int>> {};
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomRenames,
-                         ::testing::Combine(::testing::ValuesIn(AllMethods()),
+                         ::testing::Combine(::testing::ValuesIn(VoxelMethods()),
                                             ::testing::Range(0, 4)));
 
 TEST_P(RandomRenames, EveryEventLeavesTheSameVoxels) {

@@ -10,6 +10,7 @@
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/map_snapshot.h"
 #include "tests/mapper/mesh_checks.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -47,16 +48,11 @@ std::unique_ptr<MapRepresentation> MappedToys(Method method, const MapConfig& co
 }
 
 class EveryMethod : public ::testing::TestWithParam<Method> {};
-INSTANTIATE_TEST_SUITE_P(Methods, EveryMethod, ::testing::ValuesIn(AllMethods()),
-                         [](const auto& parameters) {
-                           std::string name(MethodName(parameters.param));
-                           for (char& c : name) {
-                             if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-                           }
-                           return name;
-                         });
+TSDFPP_FOR_EVERY_METHOD(EveryMethod);
+class EveryVoxelMethod : public ::testing::TestWithParam<Method> {};
+TSDFPP_FOR_EVERY_VOXEL_METHOD(EveryVoxelMethod);
 
-TEST_P(EveryMethod, ListsHoldNoObjectTwiceAndNoneTooMany) {
+TEST_P(EveryVoxelMethod, ListsHoldNoObjectTwiceAndNoneTooMany) {
   const auto layers = static_cast<std::size_t>(LayersOf(GetParam(), ToyConfig()));
   const auto map = MakeMap(GetParam(), ToyConfig());
   Drive(*map, 5, [&] {
@@ -97,9 +93,16 @@ TEST_P(EveryMethod, ObjectsAreListedInOrderAndLeaveWhenRemoved) {
   map->Remove(kBall);
   EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kBackground, kBrick, kTray}));
   EXPECT_TRUE(map->ObjectMesh(kBall).triangles.empty());
-  for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
-    for (const Listing& entry : VoxelsOf(*map).ListAt(v)) ASSERT_NE(entry.id, kBall) << Text(v);
+  if (map->inspection() != nullptr) {
+    for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
+      for (const Listing& entry : VoxelsOf(*map).ListAt(v)) ASSERT_NE(entry.id, kBall) << Text(v);
+    }
   }
+  // Once more, and one that never was there.
+  const std::string before = SnapshotOf(*map, ToyIds());
+  map->Remove(kBall);
+  map->Remove(17);
+  EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
 }
 
 TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
@@ -143,7 +146,7 @@ TEST_P(EveryMethod, AnUnchangedPoseMovesNothing) {
   EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
 }
 
-TEST_P(EveryMethod, MemoryCountsBlocks) {
+TEST_P(EveryVoxelMethod, MemoryCountsBlocks) {
   const auto map = MakeMap(GetParam(), ToyConfig());
   EXPECT_EQ(map->Memory().blocks, 0U);
   Drive(*map, 1);
@@ -154,6 +157,17 @@ TEST_P(EveryMethod, MemoryCountsBlocks) {
   }
   EXPECT_GE(memory.blocks, blocks.size());
   EXPECT_GE(memory.bytes, memory.blocks * 512 * sizeof(std::uint16_t));
+}
+
+TEST_P(EveryMethod, AnEmptyMapAndFramesWithoutDepthHoldNothing) {
+  const auto map = MakeMap(GetParam(), ToyConfig());
+  Frame nothing = RenderToys(TableWithToys(), 0.3);
+  nothing.depth.setTo(0);
+  for (int i = 0; i < 3; ++i) SetPosesAndFuse(*map, nothing);
+  EXPECT_TRUE(map->Objects().empty());
+  EXPECT_EQ(map->Memory().blocks, 0U);
+  EXPECT_TRUE(map->SceneMesh().triangles.empty());
+  EXPECT_TRUE(map->ObjectMesh(kBrick).triangles.empty());
 }
 
 // With one place for an inactive object, three toys over the table still leave the table listed.

@@ -17,7 +17,7 @@ using reference::MakePose;
 using reference::Scene;
 
 class Query : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(Query);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(Query);
 
 // Those with a volume an object.
 class LayeredQuery : public EveryMethodTest {};

@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "tests/mapper/compare_maps.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -243,7 +244,7 @@ class Story {
 };
 
 class Sequences : public ::testing::TestWithParam<Method> {};
-INSTANTIATE_TEST_SUITE_P(Methods, Sequences, ::testing::ValuesIn(AllMethods()),
+INSTANTIATE_TEST_SUITE_P(Methods, Sequences, ::testing::ValuesIn(VoxelMethods()),
                          [](const auto& parameters) {
                            std::string name(MethodName(parameters.param));
                            for (char& c : name) {

@@ -23,12 +23,14 @@ inline void AppendMesh(const TriangleMesh& mesh, std::string& bytes) {
   for (const auto& id : mesh.face_ids) AppendBytes(id, bytes);
 }
 
-// Voxels, lists and meshes.
+// Voxels and lists, where there are such, and meshes.
 inline std::string SnapshotOf(const MapRepresentation& map, const std::vector<InstanceId>& ids) {
   std::string bytes;
+  const VoxelInspection* voxels = map.inspection();
   for (const InstanceId id : ids) {
-    for (const Eigen::Vector3i& v : VoxelsOf(map).ObservedVoxels(id)) {
-      const auto value = VoxelsOf(map).ValueAt(id, v);
+    for (const Eigen::Vector3i& v :
+         voxels == nullptr ? std::vector<Eigen::Vector3i>{} : voxels->ObservedVoxels(id)) {
+      const auto value = voxels->ValueAt(id, v);
       for (int a = 0; a < 3; ++a) AppendBytes(v[a], bytes);
       AppendBytes(value->distance_m, bytes);
       AppendBytes(value->weight, bytes);
@@ -36,9 +38,10 @@ inline std::string SnapshotOf(const MapRepresentation& map, const std::vector<In
     }
     AppendMesh(map.ObjectMesh(id), bytes);
   }
-  for (const Eigen::Vector3i& v : VoxelsOf(map).ListedVoxels()) {
+  for (const Eigen::Vector3i& v :
+       voxels == nullptr ? std::vector<Eigen::Vector3i>{} : voxels->ListedVoxels()) {
     for (int a = 0; a < 3; ++a) AppendBytes(v[a], bytes);
-    for (const Listing& entry : VoxelsOf(map).ListAt(v)) {
+    for (const Listing& entry : voxels->ListAt(v)) {
       AppendBytes(entry.id, bytes);
       AppendBytes(entry.confidence, bytes);
     }

@@ -22,7 +22,7 @@ bool KeepsLattices(Method method) {
 }
 
 class MapSymmetries : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(MapSymmetries);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(MapSymmetries);
 
 TEST_P(MapSymmetries, AWorldShiftedByBlocksIsTheSameBitForBit) {
   constexpr int kFrames = 4;

@@ -13,6 +13,7 @@
 #include "mapper/mesh/scene_parts.h"
 #include "tests/mapper/from_scratch.h"
 #include "tests/mapper/mesh_checks.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/mapper/visible_triangles.h"
 #include "tests/reference/plain_mesh.h"
@@ -259,7 +260,7 @@ TEST(MeshCache, MakesAgainOnlyWhatChangedAndWhatReadsIt) {
 }
 
 class KeptMeshes : public ::testing::TestWithParam<Method> {};
-INSTANTIATE_TEST_SUITE_P(Methods, KeptMeshes, ::testing::ValuesIn(AllMethods()),
+INSTANTIATE_TEST_SUITE_P(Methods, KeptMeshes, ::testing::ValuesIn(VoxelMethods()),
                          [](const auto& parameters) {
                            std::string name(MethodName(parameters.param));
                            for (char& c : name) {

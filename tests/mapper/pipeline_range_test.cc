@@ -27,7 +27,7 @@ Pipeline NewPipeline(Method method, PoseSource poses = PoseSource::kGiven) {
 }
 
 class PipelineRange : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(PipelineRange);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(PipelineRange);
 
 TEST_P(PipelineRange, ARefusedFrameLeavesNoTrace) {
   Pipeline undisturbed = NewPipeline(GetParam());

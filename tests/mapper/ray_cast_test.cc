@@ -9,6 +9,7 @@
 #include "mapper/map_representation.h"
 #include "mapper/methods/cast_by_removal.h"
 #include "tests/mapper/map_snapshot.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/reference/ray_reference.h"
 
@@ -60,17 +61,11 @@ std::string BytesOf(const std::vector<RaySurface>& surfaces) {
   return bytes;
 }
 
-std::string NameOf(Method method) {
-  std::string name(MethodName(method));
-  for (char& c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-  }
-  return name;
-}
-
 class RayCast : public ::testing::TestWithParam<Method> {};
-INSTANTIATE_TEST_SUITE_P(Methods, RayCast, ::testing::ValuesIn(AllMethods()),
-                         [](const auto& parameters) { return NameOf(parameters.param); });
+TSDFPP_FOR_EVERY_METHOD(RayCast);
+// Beside a reference that walks through voxels.
+class RayCastInVoxels : public ::testing::TestWithParam<Method> {};
+TSDFPP_FOR_EVERY_VOXEL_METHOD(RayCastInVoxels);
 
 bool KeepsOneSurface(Method method) {
   return IsOneField(method) || method == Method::kTsdfppLiteral;
@@ -97,7 +92,7 @@ bool MixesObjects(Method method) {
 }
 constexpr double kNormalTolerance = 0.02;
 
-TEST_P(RayCast, AgreesWithTinySteps) {
+TEST_P(RayCastInVoxels, AgreesWithTinySteps) {
   const MapConfig config = ToyConfig();
   // A move in one field leaves voxels without a label, of which the interface does not tell.
   const bool moving = !IsOneField(GetParam());
@@ -368,7 +363,7 @@ TEST_P(RayCast, AnEmptyMapShowsNothing) {
 }
 
 // From amid the toys, with blocks before, beside and behind the camera.
-TEST_P(RayCast, NearSurfacesAreSeenFromCloseBy) {
+TEST_P(RayCastInVoxels, NearSurfacesAreSeenFromCloseBy) {
   const MapConfig config = ToyConfig();
   const bool moving = !IsOneField(GetParam());
   const auto map = DrivenToys(GetParam(), config, moving);

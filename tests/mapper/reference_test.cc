@@ -8,6 +8,7 @@
 
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
+#include "tests/mapper/methods_of_tests.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -50,7 +51,7 @@ class ReferenceTest : public ::testing::TestWithParam<std::tuple<Method, double>
 };
 
 INSTANTIATE_TEST_SUITE_P(Methods, ReferenceTest,
-                         ::testing::Combine(::testing::ValuesIn(AllMethods()),
+                         ::testing::Combine(::testing::ValuesIn(VoxelMethods()),
                                             ::testing::Values(4.0, 2.0)),
                          [](const auto& parameters) {
                            return TestName(std::get<0>(parameters.param)) + "_back_" +

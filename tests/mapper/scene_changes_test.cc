@@ -94,7 +94,7 @@ cv::Mat LabelsIn(const Frame& frame, const cv::Rect& window) {
 }
 
 class SceneChanges : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(SceneChanges);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(SceneChanges);
 
 TEST_P(SceneChanges, LeadToTheWholeMesh) {
   int small = 0;

@@ -38,8 +38,9 @@ std::unique_ptr<DenseMap> MakeDenseMap(Method method, const MapConfig& config, c
     case Method::kTsdfppAnchored:
     case Method::kVolumes:
       return MakeDenseAnchored(config, box, LayersOf(method, config));
+    default:
+      return nullptr;  // has no voxels
   }
-  return nullptr;
 }
 
 std::optional<VoxelValue> AsValue(const DenseVoxel& voxel) {
