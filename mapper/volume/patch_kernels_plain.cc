@@ -73,7 +73,7 @@ void PatchBits(const PatchBlocks& blocks, const PulledPoints& points, BlockMask 
   });
 }
 
-void CubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes) {
+void PatchCubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes) {
   cubes.all_observed.fill(0);
   cubes.any_negative.fill(0);
   cubes.crossed.fill(0);

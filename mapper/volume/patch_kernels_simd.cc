@@ -281,8 +281,8 @@ void PatchBits(const PatchBlocks& blocks, const PulledPoints& points, BlockMask 
   run(blocks, points, mask, rows);
 }
 
-void CubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes) {
-  const auto run = UsesPlainKernels() ? plain::CubesOf : HWY_DYNAMIC_DISPATCH(Cubes);
+void PatchCubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes) {
+  const auto run = UsesPlainKernels() ? plain::PatchCubesOf : HWY_DYNAMIC_DISPATCH(Cubes);
   run(observed, negative, cubes);
 }
 

@@ -14,9 +14,10 @@
 namespace tsdfpp {
 namespace {
 
-constexpr float kVoxel_m = 0.02F;
-constexpr float kFront_m = 0.0799560546875F;  // half-precision numbers, as MapConfig gives them
-constexpr float kBack_m = 0.0799560546875F;
+// Sums of 1 m and these are exact.
+constexpr float kVoxel_m = 0x1.4p-6F;  // 1.95 cm
+constexpr float kFront_m = 4 * kVoxel_m;
+constexpr float kBack_m = 4 * kVoxel_m;
 constexpr int kWidth = 72;
 constexpr int kHeight = 51;
 
@@ -54,6 +55,13 @@ struct TwinFrame {
     }
     for (auto& level : colour) level = static_cast<std::uint8_t>(dice.Whole(256));
     kernel = {depth.data(), label.data(), colour.data(), kWidth, kHeight, {60, 61, 35.2F, 24.7F}};
+    // Or so that lattices along the camera's axes meet the borders of pixels.
+    if (dice.Whole(3) == 0) kernel.intrinsics = {60, 60, 35.5F, 24.5F};
+  }
+
+  void SetDepth(float depth_m) {
+    std::fill(depth.begin(), depth.end(), depth_m);
+    farthest = depth_m;
   }
 };
 
@@ -63,20 +71,24 @@ struct TwinPlace {
   BlockPlace place;
 
   explicit TwinPlace(Dice& dice) {
-    const Eigen::Vector3d axis =
-        Eigen::Vector3d(dice.Uniform(-1, 1), dice.Uniform(-1, 1), dice.Uniform(-1, 1)).normalized();
-    const bool turned = dice.Whole(4) > 0;
-    const Eigen::Matrix3d R =
-        Eigen::AngleAxisd(turned ? dice.Uniform(-0.5, 0.5) : 0, axis).toRotationMatrix();
-    const Eigen::Vector3d t(dice.Uniform(-0.1, 0.1), dice.Uniform(-0.1, 0.1), 0);
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c)
-        T_CL[static_cast<std::size_t>(4 * r + c)] = static_cast<float>(R(r, c));
-      T_CL[static_cast<std::size_t>(4 * r + 3)] = static_cast<float>(t[r]);
+    const Eigen::Vector3d axis(dice.Uniform(-1, 1), dice.Uniform(-1, 1), dice.Uniform(-1, 1));
+    Pose T = Pose::Identity();
+    if (dice.Whole(3) > 0) {
+      T.rotate(Eigen::AngleAxisd(dice.Uniform(-0.5, 0.5), axis.normalized()));
+      T.translation() = Eigen::Vector3d(dice.Uniform(-0.1, 0.1), dice.Uniform(-0.1, 0.1), 0);
+    }
+    for (int i = 0; i < 12; ++i) {
+      T_CL[static_cast<std::size_t>(i)] = static_cast<float>(T.matrix()(i / 4, i % 4));
     }
     place.T_CL = T_CL.data();
     place.voxel = kVoxel_m;
     place.first = {8 * (dice.Whole(5) - 2), 8 * (dice.Whole(5) - 2), 8 * (dice.Whole(8) - 1)};
+  }
+
+  // All voxels at one point before the camera, at which s is the depth less 1 m, exactly.
+  void MeetAtOneMetre() {
+    T_CL = {};
+    T_CL.back() = 1;
   }
 
   // What a caller may know of the block, where it is so.
@@ -174,9 +186,23 @@ void ExpectTheSameFusion(Dice& dice, int round, bool with_votes, Seen& seen) {
   const std::array<int, 4> caps{1, 7, 50, 255};
   const int weight_cap = caps[static_cast<std::size_t>(dice.Whole(4))];
   const Shown shown = round % 5 == 0 ? Shown::kOne : round % 11 == 0 ? Shown::kNone : Shown::kMany;
-  const TwinFrame frame(dice, shown, round % 3 > 0);
+  TwinFrame frame(dice, shown, round % 3 > 0);
   TwinPlace at(dice);
   FusionRule rule = DrawRule(dice, weight_cap);
+  if (round % 7 == 0) {
+    // Where one rule ends and the next one begins.
+    const std::array<float, 9> limits{0,
+                                      rule.front,
+                                      -rule.back,
+                                      rule.colour_band,
+                                      -rule.colour_band,
+                                      rule.first_colour_band,
+                                      kVoxel_m,
+                                      -0.5F * kVoxel_m,
+                                      2 * kVoxel_m};
+    at.MeetAtOneMetre();
+    frame.SetDepth(1 + limits[static_cast<std::size_t>(dice.Whole(9))]);
+  }
   VoteArrays votes(dice, 1 + dice.Whole(10));
   VoteArrays plain_votes(votes);
   TsdfBlock block;

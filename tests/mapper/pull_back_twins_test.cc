@@ -13,7 +13,7 @@
 namespace tsdfpp {
 namespace {
 
-constexpr double kVoxel_m = 0.02;
+constexpr double kVoxel_m = 1.0 / 64;  // so that some points are exactly half-way
 constexpr BlockDraw kDraw{0.08F, 0.08F, 50, 0.95};
 
 // A block pulled back into a lattice whose blocks are drawn; some are not there.
@@ -21,8 +21,8 @@ class Pulled {
  public:
   Pulled(Dice& dice, int round) {
     Pose T = Pose::Identity();
-    if (round % 4 == 1) {  // by whole voxels: each point is a voxel
-      T.translation() = Eigen::Vector3d(dice.Whole(9), dice.Whole(9), dice.Whole(9)) * kVoxel_m;
+    if (round % 4 == 1) {  // by whole and half voxels
+      T.translation() = Eigen::Vector3d(dice.Whole(9), dice.Whole(9), dice.Whole(9)) * kVoxel_m / 2;
     } else if (round % 4 == 2) {  // hardly less than that: fractions that round to 1
       T.translation() = Eigen::Vector3d(-1e-12, dice.Uniform(0, 1), -1e-10);
     } else if (round % 4 == 3) {
@@ -119,8 +119,8 @@ TEST(PullBackTwins, TheSameBitsAndCubes) {
     }
     PatchCubes cubes;
     PatchCubes expected;
-    CubesOf(observed, negative, cubes);
-    plain::CubesOf(observed, negative, expected);
+    PatchCubesOf(observed, negative, cubes);
+    plain::PatchCubesOf(observed, negative, expected);
     ForEachPlace(points, 1, [&](std::size_t place) {
       ASSERT_EQ(BitAt(cubes.all_observed, place), BitAt(expected.all_observed, place)) << place;
       ASSERT_EQ(BitAt(cubes.any_negative, place), BitAt(expected.any_negative, place)) << place;
