@@ -41,8 +41,6 @@ Expected<MapQuery> MapQuery::Of(const MapRepresentation& map) {
 
 MapQuery::MapQuery(const MapRepresentation& map, const VoxelInspection& voxels)
     : voxels_(&voxels), voxel_m_(map.config().voxel_m), one_field_(IsOneField(map.method())) {
-  // An index that is made when it is asked for is made here, before many ask at once.
-  voxels.ListAt(Eigen::Vector3i::Zero());
   const std::vector<InstanceId> ids =
       one_field_ ? std::vector<InstanceId>{kBackground} : map.Objects();
   for (const InstanceId id : ids) {

@@ -28,9 +28,9 @@ std::string Text(const std::vector<Listing>& list);
                                      const std::optional<VoxelValue>& expected);
 
 // Of a reference, which is no MapRepresentation: itself.
-template <typename Reference>
-requires(!std::is_base_of_v<MapRepresentation, Reference>) const Reference& VoxelsOf(
-    const Reference& map) {
+template <typename Reference,
+          typename = std::enable_if_t<!std::is_base_of_v<MapRepresentation, Reference>>>
+const Reference& VoxelsOf(const Reference& map) {
   return map;
 }
 
