@@ -172,7 +172,8 @@ Expected<void> MeasureGhosts(const FigureOptions& options) {
         TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(profile));
         SceneMeshes meshes;
         MapFootage(footage, config, {frame}, [&](int, const MapRepresentation& map) {
-          meshes = MeshesOf(map, scene.movers);
+          SceneMesher mesher;
+          meshes = MeshesOf(map, scene.movers, mesher);
         });
         for (const bool after : {false, true}) {
           const std::set<InstanceId> removed = after ? scene.movers : std::set<InstanceId>{};

@@ -3,6 +3,7 @@
 
 #include "bench/figure_runs.h"
 #include "bench/figures.h"
+#include "mapper/voxel_inspection.h"
 #include "metrics/mesh_tools.h"
 
 namespace tsdfpp {
@@ -56,7 +57,7 @@ Measured ListedShare(const MapRepresentation& map, const SceneTruth& truth, std:
             .array()
             .floor()
             .cast<int>();
-    for (const Listing& entry : map.ListAt(voxel)) {
+    for (const Listing& entry : VoxelsOf(map).ListAt(voxel)) {
       if (entry.id == truth.trackers()[i].id()) listed[k] = 1;
     }
   }

@@ -2,6 +2,7 @@
 
 #include "bench/figure_runs.h"
 #include "bench/figures.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
 namespace {
@@ -22,7 +23,7 @@ constexpr int kAbove_voxels = 14;
 
 std::string DistanceCell(const MapRepresentation& map, InstanceId id, const Eigen::Vector3i& voxel,
                          double voxel_m) {
-  const auto value = map.ValueAt(id, voxel);
+  const auto value = VoxelsOf(map).ValueAt(id, voxel);
   return value ? Cell(value->distance_m / voxel_m, 3) : std::string();
 }
 
@@ -49,7 +50,7 @@ Expected<void> MeasureSlice(const FigureOptions& options) {
       for (int z = -kBelow_voxels; z <= kAbove_voxels; ++z) {
         for (int y = -kHalfWidth_voxels; y <= kHalfWidth_voxels; ++y) {
           const Eigen::Vector3i voxel = middle + Eigen::Vector3i(0, y, z);
-          const std::vector<Listing> list = map.ListAt(voxel);
+          const std::vector<Listing> list = VoxelsOf(map).ListAt(voxel);
           table.Add({std::string(MethodName(method)), moment->name, std::to_string(voxel.y()),
                      std::to_string(voxel.z()), list.empty() ? "" : std::to_string(list[0].id),
                      list.size() < 2 ? "" : std::to_string(list[1].id),

@@ -18,6 +18,8 @@
 #include "eval/adapters/voxel_block_grid.h"
 #include "eval/run/open_source.h"
 #include "mapper/pipeline.h"
+#include "mapper/scene_mesher.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
 namespace {
@@ -54,20 +56,22 @@ struct KeptTimes {
   std::vector<double> changes_ratio;
   std::vector<double> all_ratio;
 
-  void Measure(const MapRepresentation& map, bool also_whole);
+  void Measure(const MapRepresentation& map, SceneMesher& mesher, bool also_whole);
   void Print(const std::string& name) const;
 };
 
-void KeptTimes::Measure(const MapRepresentation& map, bool also_whole) {
-  index_ms.push_back(MillisecondsOf([&] { map.ListAt(Eigen::Vector3i::Zero()); }));
+void KeptTimes::Measure(const MapRepresentation& map, SceneMesher& mesher, bool also_whole) {
+  index_ms.push_back(MillisecondsOf([&] {
+    if (const VoxelInspection* voxels = map.inspection()) voxels->ListAt(Eigen::Vector3i::Zero());
+  }));
   MeshWork work;
-  update_ms.push_back(MillisecondsOf([&] { work = map.UpdateMeshes(); }));
-  changes_ms.push_back(update_ms.back() + MillisecondsOf([&] { map.TakeSceneChanges(); }));
-  all_ms.push_back(changes_ms.back() + MillisecondsOf([&] { map.SceneMesh(); }));
+  update_ms.push_back(MillisecondsOf([&] { work = mesher.Update(map); }));
+  changes_ms.push_back(update_ms.back() + MillisecondsOf([&] { mesher.TakeSceneChanges(map); }));
+  all_ms.push_back(changes_ms.back() + MillisecondsOf([&] { mesher.SceneMesh(map); }));
   share.push_back(static_cast<double>(work.changed) / static_cast<double>(work.blocks));
   if (!also_whole) return;
-  const auto copy = map.Clone();
-  whole_ms.push_back(MillisecondsOf([&] { copy->SceneMesh(); }));
+  SceneMesher from_scratch;
+  whole_ms.push_back(MillisecondsOf([&] { from_scratch.SceneMesh(map); }));
   const double fair_ms = whole_ms.back() * share.back();
   update_ratio.push_back(update_ms.back() / fair_ms);
   changes_ratio.push_back(changes_ms.back() / fair_ms);
@@ -85,6 +89,7 @@ void KeptTimes::Print(const std::string& name) const {
 struct Run {
   std::string name;
   std::unique_ptr<Pipeline> pipeline;
+  SceneMesher mesher;  // of its map
   double growth_mb = 0;
   KeptTimes frames;  // of the run
   KeptTimes small;   // of frames that show one object alone
@@ -187,7 +192,7 @@ void PrintMemory(const std::vector<Run>& runs, const Open3dVolume& peer, double 
     const MapMemory memory = run.pipeline->map().Memory();
     std::printf("%-28s %14.1f %10.1f %10.1f\n", run.name.c_str(),
                 static_cast<double>(memory.bytes) / 1e6, run.growth_mb,
-                static_cast<double>(memory.mesh_bytes) / 1e6);
+                static_cast<double>(run.mesher.Bytes() + memory.derived_bytes) / 1e6);
   }
   std::printf(
       "(occupied blocks: with lists and tables; growth: of the process, meshes left out)\n");
@@ -226,14 +231,16 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
     peer_growth_mb += growth_of([&] { peer.Integrate(frame); });
     for (Run& run : runs) {
       run.growth_mb += growth_of([&] { run.pipeline->Process(frame).value(); });
-      run.frames.Measure(run.pipeline->map(), (i + 1) % options.every == 0 || i + 1 == count);
+      run.frames.Measure(run.pipeline->map(), run.mesher,
+                         (i + 1) % options.every == 0 || i + 1 == count);
       if (i + 1 < count) continue;
       const cv::Mat labels = LargestObjectAlone(frame);
       const auto copy = run.pipeline->map().Clone();
-      copy->TakeSceneChanges();
+      SceneMesher mesher;
+      mesher.TakeSceneChanges(*copy);
       for (int repeat = 0; repeat < kSmallChanges; ++repeat) {
         copy->Fuse(frame, labels);
-        run.small.Measure(*copy, true);
+        run.small.Measure(*copy, mesher, true);
       }
     }
   }
@@ -252,9 +259,10 @@ Expected<void> RunMeshBench(const MeshBenchOptions& options) {
     scalable = peer.ExtractMesh();
     peer_ms.push_back(scalable.seconds);
     for (std::size_t m = 0; m < runs.size(); ++m) {
-      const auto copy = runs[m].pipeline->map().Clone();
-      whole_ms[m].push_back(
-          MillisecondsOf([&] { triangles[m] = copy->SceneMesh().triangles.size(); }));
+      SceneMesher from_scratch;
+      whole_ms[m].push_back(MillisecondsOf([&] {
+        triangles[m] = from_scratch.SceneMesh(runs[m].pipeline->map()).triangles.size();
+      }));
     }
   }
   scalable.seconds = Median(peer_ms);

@@ -8,6 +8,7 @@
 
 #include "bench/clocks.h"
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
 namespace {
@@ -83,7 +84,9 @@ std::unique_ptr<MapRepresentation> MapSplit(const Row& row, const std::vector<Fr
     T_WO.rotate(Eigen::AngleAxisd(1e-6 * (id + 1), Eigen::Vector3d::UnitZ()));
     map->SetObjectPose(static_cast<InstanceId>(id), T_WO);
   }
-  map->SceneMesh();  // brings the index up to date
+  if (const VoxelInspection* voxels = map->inspection()) {
+    voxels->ListAt(Eigen::Vector3i::Zero());  // brings the index up to date
+  }
   return map;
 }
 

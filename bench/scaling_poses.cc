@@ -6,6 +6,7 @@
 #include "bench/figure_runs.h"
 #include "bench/scaling.h"
 #include "bench/scaling_runs.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
 namespace {
@@ -49,14 +50,14 @@ Expected<void> MeasurePoses(const ScalingOptions& options) {
           const double start = WallMilliseconds();
           const double cpu_start = CpuMilliseconds();
           map->SetObjectPose(id, T_WO);
-          if (way.refresh) map->ListAt(Eigen::Vector3i::Zero());
+          if (way.refresh) VoxelsOf(*map).ListAt(Eigen::Vector3i::Zero());
           if (frame.index < kFirstMove || !wall.contains(id)) continue;
           wall[id].back().ms.push_back(WallMilliseconds() - start);
           cpu[id].back().ms.push_back(CpuMilliseconds() - cpu_start);
         }
         map->Fuse(frame, frame.mask);
       }
-      for (const Car& car : kCars) blocks[car.id] = map->GridOf(car.id)->size();
+      for (const Car& car : kCars) blocks[car.id] = VoxelsOf(*map).GridOf(car.id)->size();
     }
     for (const Car& car : kCars) {
       const Times least = LeastOf(wall[car.id]);

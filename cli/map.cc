@@ -141,6 +141,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   if (!removed.empty() && !start.mask_remark.empty() && options.load.empty()) {
     return UsageError("--remove {} has nothing to remove: {}", options.remove, start.mask_remark);
   }
+  if (!options.save.empty()) TSDFPP_RETURN_IF_ERROR(CheckCanBeSaved(pipeline.map()));
   if (!start.mask_remark.empty()) spdlog::warn("{}", start.mask_remark);
   const int frames = start.last - start.first + 1;
   if (options.views > 0 && frames == 0) {

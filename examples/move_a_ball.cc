@@ -32,7 +32,8 @@ int main() {
   map->SetObjectPose(1, Pose(Eigen::Translation3d(0, 0, 0.7)));
   map->Fuse(frame, frame.mask);
   map->SetObjectPose(1, Pose(Eigen::Translation3d(0.15, 0, 0.7)));
-  const auto ball = tsdfpp::MapQuery(*map).At(Eigen::Vector3d(0.15, 0, 0.58)).visible.value();
+  const auto query = tsdfpp::MapQuery::Of(*map).value();
+  const auto ball = query.At(Eigen::Vector3d(0.15, 0, 0.58)).visible.value();
   std::cout << "object " << ball.id << " is " << ball.distance_m << " m away, towards "
             << -ball.gradient_W.transpose() << "\n";
   const auto saved = tsdfpp::SaveMap("ball.tsdfpp", *map);

@@ -2,8 +2,9 @@
 
 #include "core/files.h"
 #include "core/plain_name.h"
-#include "mapper/methods/volume_store.h"
+#include "mapper/map_persistence.h"
 #include "mapper/store/section_file.h"
+#include "mapper/store/volume_store.h"
 
 namespace tsdfpp {
 namespace {
@@ -116,11 +117,17 @@ Expected<Settings> SettingsFromText(const std::string& text) {
 
 }  // namespace
 
-std::string MapToBytes(const MapRepresentation& map, const MappedRun* run) {
+Expected<void> CheckCanBeSaved(const MapRepresentation& map) {
+  if (map.persistence() != nullptr) return {};
+  return UsageError("a map of method '{}' cannot be saved", MethodName(map.method()));
+}
+
+Expected<std::string> MapToBytes(const MapRepresentation& map, const MappedRun* run) {
+  TSDFPP_RETURN_IF_ERROR(CheckCanBeSaved(map));
   Sections sections;
   sections[kConfigSection] = SettingsToText(map.method(), map.config());
   if (run != nullptr) sections[kRunSection] = RunToBytes(*run);
-  map.Save(sections);
+  map.persistence()->Save(sections);
   return PackSections(sections);
 }
 
@@ -144,13 +151,18 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
     loaded.run = std::move(*run);
   }
   loaded.map = MakeMap(settings->method, settings->config);
+  MapPersistence* persistence = loaded.map->persistence();
+  if (persistence == nullptr) {
+    return DataError("{}: its map is of method '{}', which is not kept in files", where,
+                     MethodName(settings->method));
+  }
   Sections expected;
-  loaded.map->Save(expected);
+  persistence->Save(expected);
   if (NamesOf(sections) != NamesOf(expected)) {
     return DataError("{}: has sections '{}', expected '{}' for a map of method {}", where,
                      NamesOf(sections), NamesOf(expected), MethodName(settings->method));
   }
-  if (auto status = loaded.map->Load(sections); !status) {
+  if (auto status = persistence->Load(sections); !status) {
     return DataError("{}: its map is wrong: {}", where, status.error().message);
   }
   if (loaded.run) {
@@ -168,7 +180,8 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
 
 Expected<void> SaveMap(const std::filesystem::path& path, const MapRepresentation& map,
                        const MappedRun* run) {
-  return WriteFile(path, MapToBytes(map, run));
+  TSDFPP_ASSIGN(const std::string bytes, MapToBytes(map, run));
+  return WriteFile(path, bytes);
 }
 
 Expected<LoadedMap> LoadMap(const std::filesystem::path& path) {

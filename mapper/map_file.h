@@ -27,9 +27,12 @@ struct LoadedMap {
   std::optional<MappedRun> run;
 };
 
+// Whether the map can be saved. Errors: kUsage, a sentence, where its method writes no files.
+Expected<void> CheckCanBeSaved(const MapRepresentation& map);
+
 // The file's bytes: the same for maps that are equal, whatever their past and the number of
-// threads.
-std::string MapToBytes(const MapRepresentation& map, const MappedRun* run = nullptr);
+// threads. Errors: those of CheckCanBeSaved.
+Expected<std::string> MapToBytes(const MapRepresentation& map, const MappedRun* run = nullptr);
 
 // `where` names the file in errors, which are kData and one sentence: a foreign, newer, truncated
 // or damaged file, one whose content no map can have, or whose names cannot be shown or be
@@ -37,7 +40,8 @@ std::string MapToBytes(const MapRepresentation& map, const MappedRun* run = null
 // is the saved one: whatever happens to both, they stay equal, bit for bit.
 Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& where);
 
-// The file appears whole or not at all. Errors: kEnvironment where the disk refuses.
+// The file appears whole or not at all. Errors: kEnvironment where the disk refuses; those of
+// CheckCanBeSaved.
 Expected<void> SaveMap(const std::filesystem::path& path, const MapRepresentation& map,
                        const MappedRun* run = nullptr);
 

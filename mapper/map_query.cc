@@ -34,15 +34,18 @@ Eigen::Vector3d TrilinearGradient(const std::array<float, 8>& corner,
 
 }  // namespace
 
-MapQuery::MapQuery(const MapRepresentation& map)
-    : map_(&map), voxel_m_(map.config().voxel_m), one_field_(IsOneField(map.method())) {
-  // An index that is made when it is asked for is made here, before many ask at once.
-  map.ListAt(Eigen::Vector3i::Zero());
+Expected<MapQuery> MapQuery::Of(const MapRepresentation& map) {
+  TSDFPP_ASSIGN(const VoxelInspection* voxels, AskForVoxels(map, "a question about a point"));
+  return MapQuery(map, *voxels);
+}
+
+MapQuery::MapQuery(const MapRepresentation& map, const VoxelInspection& voxels)
+    : voxels_(&voxels), voxel_m_(map.config().voxel_m), one_field_(IsOneField(map.method())) {
   const std::vector<InstanceId> ids =
       one_field_ ? std::vector<InstanceId>{kBackground} : map.Objects();
   for (const InstanceId id : ids) {
     const Pose T_WL = map.ObjectLattice(id);
-    objects_.push_back({id, VoxelReader(*map.GridOf(id)), T_WL.inverse(), T_WL.linear()});
+    objects_.push_back({id, VoxelReader(*voxels.GridOf(id)), T_WL.inverse(), T_WL.linear()});
   }
 }
 
@@ -82,7 +85,7 @@ PointAnswer MapQuery::At(const Eigen::Vector3d& p_W) const {
               return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.id < b.id;
             });
   const Index3 nearest = FloorOf(p_W / voxel_m_ + Eigen::Vector3d::Constant(0.5));
-  const std::vector<Listing> list = map_->ListAt({nearest.x, nearest.y, nearest.z});
+  const std::vector<Listing> list = voxels_->ListAt({nearest.x, nearest.y, nearest.z});
   if (one_field_) answer.objects[0].id = list.empty() ? kBackground : list[0].id;
   answer.visible = answer.objects[0];
   if (list.empty()) return answer;

@@ -7,6 +7,7 @@
 
 #include "mapper/map_representation.h"
 #include "mapper/volume/object_volume.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
 
@@ -38,7 +39,8 @@ struct PointAnswer {
 // map's blocks; a question costs some eight reads an object.
 class MapQuery {
  public:
-  explicit MapQuery(const MapRepresentation& map);
+  // Errors: kUsage, a sentence, where the map has no voxels.
+  static Expected<MapQuery> Of(const MapRepresentation& map);
 
   // `p_W` in the world's frame, metres. A point that is not finite, or too far away for the
   // lattice, is unknown.
@@ -47,6 +49,8 @@ class MapQuery {
   std::vector<PointAnswer> At(const std::vector<Eigen::Vector3d>& points_W) const;
 
  private:
+  MapQuery(const MapRepresentation& map, const VoxelInspection& voxels);
+
   struct Object {
     InstanceId id;
     VoxelReader reader;
@@ -56,7 +60,7 @@ class MapQuery {
 
   std::optional<SurfaceDistance> Ask(const Object& object, const Eigen::Vector3d& p_W) const;
 
-  const MapRepresentation* map_;
+  const VoxelInspection* voxels_;
   double voxel_m_;
   bool one_field_;
   std::vector<Object> objects_;

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "mapper/block_moves.h"
 #include "mapper/volume/lattice_range.h"
 
 namespace tsdfpp {
@@ -111,15 +112,19 @@ Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, cons
                           const std::map<InstanceId, Pose>& T_WO) {
   const MapConfig& config = map.config();
   const LatticeRange range(config.voxel_m);
-  Lattices T_WL = map.MovedLattices();
+  const BlockMoves* moves = map.block_moves();
+  Lattices T_WL;
+  if (moves != nullptr) T_WL = moves->MovedLattices();
   for (const auto& [id, pose] : T_WO) {
     const std::string what = fmt::format("frame {}: object {}", frame.index, id);
     TSDFPP_RETURN_IF_ERROR(CheckRigid(pose, what + "'s"));
+    if (moves == nullptr) continue;
     TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, pose, what + " is posed at"));
-    const ObjectMove move = map.MoveTo(id, pose);
+    const ObjectMove move = moves->MoveTo(id, pose);
     TSDFPP_RETURN_IF_ERROR(CheckMoved(range, move, 0, what + "'s pose takes a part of it to"));
     T_WL.insert_or_assign(id, move.T_WL);
   }
+  if (moves == nullptr) return {};
   std::erase_if(T_WL, [](const auto& lattice) {
     return lattice.second.matrix() == Pose::Identity().matrix();
   });

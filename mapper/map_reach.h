@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "mapper/map_representation.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
 
@@ -15,6 +16,7 @@ Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels);
 
 // Whether the map can take these poses of objects and then this frame, whose form is right: the
 // poses, what they move, the camera, and all that the frame's depth may show lie in the range.
+// A map that is not made of blocks has no range; then only the poses have to be rigid.
 // Errors: kData, a sentence. Costs a few rays and boxes, and a look at the pixels only where the
 // image's corners, as far away as depth is valid, do not all lie in the range.
 Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,

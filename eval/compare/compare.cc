@@ -173,7 +173,7 @@ Expected<void> EvaluateRun(CompareRun& run, const Frame& frame,
                            const CompareResult& result, PictureMaker& pictures,
                            std::optional<ReportRecorder>& recorder) {
   const int index = frame.index;
-  SceneMeshes meshes = MeshesOf(run.pipeline.map(), result.movers);
+  SceneMeshes meshes = MeshesOf(run.pipeline.map(), result.movers, run.mesher);
   if (result.config.keep_meshes) {
     TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run.FolderName() / "frames", index));
   }

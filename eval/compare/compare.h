@@ -43,6 +43,7 @@ struct CompareRun {
   PipelineConfig config;
   std::string profile;
   Pipeline pipeline;
+  SceneMesher mesher;  // of its map
   LastSeenStores last_seen;
   RunTimes times;
   std::int64_t process_growth_bytes = 0;  // of resident memory while this map worked

@@ -7,6 +7,7 @@
 #include "core/ply.h"
 #include "core/pose_text.h"
 #include "eval/run/open_source.h"
+#include "mapper/scene_mesher.h"
 
 namespace tsdfpp {
 namespace {
@@ -48,10 +49,11 @@ Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
                         const SequenceInfo& info, const std::filesystem::path& out,
                         MeshFormat format) {
   const bool glb = format == MeshFormat::kGlb;
+  SceneMesher mesher;
   const std::vector<InstanceId> mapped = map.Objects();
   for (const ObjectInfo& object : info.objects) {
     if (std::find(mapped.begin(), mapped.end(), object.id) != mapped.end()) {
-      TriangleMesh mesh = map.ObjectMesh(object.id);
+      TriangleMesh mesh = mesher.ObjectMesh(map, object.id);
       const std::filesystem::path stem = out / "mesh" / FileStem(object);
       if (glb) {
         TSDFPP_RETURN_IF_ERROR(
@@ -69,14 +71,14 @@ Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
     }
     TSDFPP_RETURN_IF_ERROR(WriteFile(out / "trajectories" / (FileStem(object) + ".txt"), text));
   }
-  if (!glb) return WritePly(out / "mesh" / "scene.ply", map.SceneMesh());
+  if (!glb) return WritePly(out / "mesh" / "scene.ply", mesher.SceneMesh(map));
   const auto name_of = [&](InstanceId id) {
     for (const ObjectInfo& object : info.objects) {
       if (object.id == id) return object.name;
     }
     return fmt::format("object {}", id);
   };
-  return WriteGlb(out / "mesh" / "scene.glb", SplitByFaceIds(map.SceneMesh(), name_of));
+  return WriteGlb(out / "mesh" / "scene.glb", SplitByFaceIds(mesher.SceneMesh(map), name_of));
 }
 
 }  // namespace tsdfpp

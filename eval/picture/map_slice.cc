@@ -34,7 +34,8 @@ cv::Vec3b Shade(InstanceId id, float distance_m, const MapConfig& config) {
 
 }  // namespace
 
-MapSlice CutMap(const MapRepresentation& map, const SliceFrame& frame) {
+Expected<MapSlice> CutMap(const MapRepresentation& map, const SliceFrame& frame) {
+  TSDFPP_ASSIGN(const MapQuery query, MapQuery::Of(map));
   const int columns = std::max(1, static_cast<int>(std::lround(frame.width_m / frame.pixel_m)));
   const int rows = std::max(1, static_cast<int>(std::lround(frame.height_m / frame.pixel_m)));
   std::vector<Eigen::Vector3d> points_W;
@@ -45,7 +46,7 @@ MapSlice CutMap(const MapRepresentation& map, const SliceFrame& frame) {
       points_W.push_back(frame.middle_W + right * frame.along_W + up * Eigen::Vector3d::UnitZ());
     }
   }
-  const std::vector<PointAnswer> answers = MapQuery(map).At(points_W);
+  const std::vector<PointAnswer> answers = query.At(points_W);
   MapSlice slice;
   slice.distance =
       cv::Mat(rows, columns, CV_32FC1, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));

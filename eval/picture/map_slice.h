@@ -24,7 +24,8 @@ struct MapSlice {
   cv::Mat picture;
 };
 
-// What MapQuery (mapper/map_query.h) answers at each pixel's middle.
-MapSlice CutMap(const MapRepresentation& map, const SliceFrame& frame);
+// What MapQuery (mapper/map_query.h) answers at each pixel's middle. Errors: kUsage, a sentence,
+// where the map has no voxels.
+Expected<MapSlice> CutMap(const MapRepresentation& map, const SliceFrame& frame);
 
 }  // namespace tsdfpp

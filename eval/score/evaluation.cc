@@ -190,10 +190,11 @@ std::set<std::set<InstanceId>> RemovalsOf(const std::set<InstanceId>& movers) {
   return removals;
 }
 
-SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& movers) {
+SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& movers,
+                     SceneMesher& mesher) {
   SceneMeshes meshes;
   const auto start = Clock::now();
-  meshes.scene = map.SceneMesh();
+  meshes.scene = mesher.SceneMesh(map);
   meshes.mesh_s = Since(start);
   for (const std::set<InstanceId>& removed : RemovalsOf(movers)) {
     if (removed.empty()) continue;
@@ -207,7 +208,8 @@ SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& m
 Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
                     const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
                     double voxel_m, LastSeenStores& last_seen) {
-  return EvaluateMeshes(MeshesOf(map, movers), truth, names, movers, voxel_m, last_seen);
+  SceneMesher mesher;
+  return EvaluateMeshes(MeshesOf(map, movers, mesher), truth, names, movers, voxel_m, last_seen);
 }
 
 Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,

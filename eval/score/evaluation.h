@@ -8,7 +8,7 @@
 #include "eval/score/scene_sanity.h"
 #include "eval/score/scene_seams.h"
 #include "eval/truth/scene_truth.h"
-#include "mapper/map_representation.h"
+#include "mapper/scene_mesher.h"
 #include "metrics/accuracy.h"
 #include "metrics/preservation.h"
 #include "metrics/trajectory.h"
@@ -82,9 +82,11 @@ Evaluation EvaluateMeshes(SceneMeshes meshes, const SceneTruth& truth,
                           double voxel_m, LastSeenStores& last_seen);
 
 // What the map's visible scene is before and after the removals, each of which acts on a copy.
-SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& movers);
+// `mesher` keeps what it may from one evaluation of a map to the next.
+SceneMeshes MeshesOf(const MapRepresentation& map, const std::set<InstanceId>& movers,
+                     SceneMesher& mesher);
 
-// EvaluateMeshes of MeshesOf.
+// EvaluateMeshes of MeshesOf, for one evaluation alone.
 Evaluation Evaluate(const MapRepresentation& map, const SceneTruth& truth,
                     const std::vector<ObjectInfo>& names, const std::set<InstanceId>& movers,
                     double voxel_m, LastSeenStores& last_seen);

@@ -40,7 +40,7 @@ Expected<void> CellMapper::Process(const Frame& frame) {
 SceneMeshes CellMapper::Meshes(const std::set<InstanceId>& movers) {
   SceneMeshes meshes;
   if (pipeline_) {
-    meshes = MeshesOf(pipeline_->map(), movers);
+    meshes = MeshesOf(pipeline_->map(), movers, mesher_);
     times_.mesh_s.push_back(meshes.mesh_s);
   } else {
     meshes.scene = open3d_->Triangles();

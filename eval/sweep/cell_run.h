@@ -30,6 +30,7 @@ class CellMapper {
  private:
   PipelineConfig config_;
   std::unique_ptr<Pipeline> pipeline_;
+  SceneMesher mesher_;  // of its map
   std::unique_ptr<Open3dVolume> open3d_;
   RunTimes times_;               // not of Open3D
   std::vector<double> frame_s_;  // of each frame

@@ -241,17 +241,24 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   const fs::path& out = run.path();
   TSDFPP_RETURN_IF_ERROR(WriteCamera(both.frame, out / "camera"));
   TSDFPP_RETURN_IF_ERROR(WritePly(out / "scene.ply", scene));
+  std::string why_no_slice;
   if (const MapRepresentation* map = mapper.map()) {
     TSDFPP_RETURN_IF_ERROR(
         WriteViews(*map, source.info().intrinsics, both.frame.T_WC, 2, out / "views"));
-    TSDFPP_RETURN_IF_ERROR(WriteSlice(CutMap(*map, SliceOf(both, recorded.removed)), out));
+    const auto slice = CutMap(*map, SliceOf(both, recorded.removed));
+    if (slice) {
+      TSDFPP_RETURN_IF_ERROR(WriteSlice(*slice, out));
+    } else {
+      why_no_slice = slice.error().message;
+    }
   }
-  const json note{{"cell", recorded.id},
-                  {"frame", options.frame},
-                  {"settings", SettingsJson(recorded.settings)},
-                  {"program", ProgramIdentity()},
-                  {"image_digest", result.image_digest},
-                  {"map_digest", result.map_digest}};
+  json note{{"cell", recorded.id},
+            {"frame", options.frame},
+            {"settings", SettingsJson(recorded.settings)},
+            {"program", ProgramIdentity()},
+            {"image_digest", result.image_digest},
+            {"map_digest", result.map_digest}};
+  if (!why_no_slice.empty()) note["no_slice"] = why_no_slice;
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "replay.json", JsonText(note, 1) + "\n"));
   TSDFPP_ASSIGN(const std::vector<fs::path> written, ListFilesBelow(out));
   for (const fs::path& file : written) {

@@ -3,17 +3,37 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "core/types.h"
 #include "mapper/map_config.h"
+#include "mapper/volume/block_grid.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
+
+// Calls function(place) for each voxel of a mask, in order.
+template <typename Function>
+void ForEachVoxel(const BlockMask& mask, const Function& function) {
+  int first = 0;
+  for (std::uint64_t slice : mask) {
+    for (; slice != 0; slice &= slice - 1) function(first + std::countr_zero(slice));
+    first += 64;
+  }
+}
 
 struct ListEntry {
   InstanceId id = kNoInstance;
   std::int16_t confidence = 0;
+};
+
+// The lists of a block: kBlockVoxels lists of the same number of entries, one after the other.
+struct ListsOfBlock {
+  Index3 index;
+  std::vector<ListEntry> entries;
 };
 
 // A view of K stored entries, `stride` apart; the used ones come first. Confidences are at most

@@ -25,11 +25,10 @@ struct MeshWork {
   }
 };
 
-// A copy starts empty: it is a cache, and its parts name the blocks of one grid.
 class GridMesh {
  public:
   GridMesh() = default;
-  GridMesh(const GridMesh&) {}
+  GridMesh(const GridMesh&) = delete;
   GridMesh(GridMesh&&) noexcept = default;
   GridMesh& operator=(const GridMesh&) = delete;
   GridMesh& operator=(GridMesh&&) noexcept = default;

@@ -260,6 +260,11 @@ MeshWork PlacedMesh::Update(const ObjectVolume& volume, float voxel) {
   has_moved = has_moved || moves;
   const MeshWork work = mesh.Update(volume.grid, voxel, volume.revision);
   changed.insert(changed.end(), mesh.changed().begin(), mesh.changed().end());
+  // Nor may they pile up while nobody resets them.
+  if (changed.size() > 2 * mesh.parts().size()) {
+    std::sort(changed.begin(), changed.end());
+    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+  }
   for (const Index3& index : mesh.changed()) {
     const MeshPart* part = mesh.PartAt(index);
     if (part != nullptr && part->any_negative) negative.Extend(index);

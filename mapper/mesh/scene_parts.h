@@ -22,13 +22,7 @@ struct ScenePiece {
   TriangleMesh mesh;
 };
 
-// What changed of the visible scene (MapRepresentation::TakeSceneChanges).
-struct SceneChanges {
-  std::vector<ScenePiece> parts;
-  MeshWork work;  // of bringing the kept meshes up to date
-};
-
-// The mesh of an object's volume and where it stands. A copy starts empty.
+// The mesh of an object's volume and where it stands.
 struct PlacedMesh {
   GridMesh mesh;
   Pose T_WL = Pose::Identity();

@@ -1,90 +1,21 @@
 #include "mapper/methods/anchored_map.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
-
-#include <algorithm>
-#include <deque>
-#include <limits>
-#include <set>
-
-#include "mapper/index/cover.h"
-#include "mapper/index/index_kernels.h"
 #include "mapper/map_reach.h"
 #include "mapper/methods/cast_by_removal.h"
 #include "mapper/methods/map_invariants.h"
-#include "mapper/volume/block_set.h"
+#include "mapper/methods/voxel_answers.h"
 #include "mapper/volume/freeing.h"
-#include "mapper/volume/pull_back.h"
 
 namespace tsdfpp {
-namespace {
-
-constexpr std::size_t kBlocksPerTask = 32;
-
-}  // namespace
-
-// The objects, as the workers of one refresh read them.
-struct AnchoredMap::Participants {
-  struct Moved {
-    std::array<double, 12> T_LW;  // rows
-    VoxelReader reader;
-    const std::vector<Index3>* reach;
-
-    bool Reaches(const Index3& block) const {
-      return std::binary_search(reach->begin(), reach->end(), block);
-    }
-  };
-  struct Object {
-    InstanceId id = kNoInstance;
-    const TsdfGrid* grid = nullptr;
-    std::optional<BlockBox> bounds;  // lists nothing outside, where it is known
-    std::optional<Moved> moved;      // unless its lattice is the world's
-  };
-  std::vector<Object> objects;  // by increasing id
-};
-
-// What ComputeBlock finds of one block; kept from block to block for its memory alone.
-struct AnchoredMap::Scratch {
-  // An object's voxels in the block. The pointers are into its volume or into `pulled`.
-  struct Listed {
-    InstanceId id;
-    const BlockMask* cover;
-    const float* distance;
-    TsdfBlock* block;  // which the distances are still to be taken from
-  };
-  std::vector<Listed> listed;
-  std::deque<PulledCover> pulled;  // of moved objects; a deque, so that they stay where they are
-};
-
-AnchoredMap::AnchoredMap(const MapConfig& config, int layers)
-    : LayeredMap(config), layers_(layers) {}
 
 std::unique_ptr<MapRepresentation> AnchoredMap::Clone() const {
+  Index();  // nobody refreshes what is copied
   return std::make_unique<AnchoredMap>(*this);
 }
 
-// Marks all that the object can list now.
-void AnchoredMap::AddReach(InstanceId id) const {
-  const auto volume = volumes_.find(id);
-  if (volume == volumes_.end()) return;
-  if (volume->second.lattice_is_world) {
-    for (const auto& entry : volume->second.grid.entries()) dirty_.push_back(entry.index);
-  } else if (const auto reach = reach_.find(id); reach != reach_.end()) {
-    dirty_.insert(dirty_.end(), reach->second.begin(), reach->second.end());
-  }
-}
-
 void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
-  ObjectVolume& volume = volumes_[id];
-  const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
-  if (!volume.T_WO_birth) volume.T_WO_birth = T_WO;
-  if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
-  AddReach(id);
-  PlaceLattice(volume);
-  reach_.erase(id);
-  moved_.push_back(id);
+  if (!MoveLattice(id, T_WO, [&] { index_.Deactivate(id, volumes_); })) return;
+  index_.Activate(id);
   CheckInDebugBuilds(*this);
 }
 
@@ -93,214 +24,74 @@ void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameView view(frame, labels);
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
-  std::set<InstanceId> changed_ids;
-  InstanceId last = kNoInstance;
-  for (const FusedBlock& block : fused) {
-    if (block.id != last) changed_ids.insert(block.id);
-    last = block.id;
-  }
-  for (const InstanceId id : changed_ids) {
-    if (volumes_.at(id).lattice_is_world) continue;
-    AddReach(id);
-    moved_.push_back(id);
-  }
-  for (const CoverChange& change : UpdateCovers(fused, volumes_)) dirty_.push_back(change.index);
-  // Where one object alone is listed, its distances do not matter; where several are, they order
-  // the list.
-  for (const FusedBlock& block : fused) {
-    if (block.is_listed_with_others) dirty_.push_back(block.index);
-  }
+  index_.NoteFusion(fused, volumes_);
   freeing.FreeEmpty(fused, volumes_);
-  RefreshIndex();
+  Index();
   CheckInDebugBuilds(*this);
 }
 
 void AnchoredMap::Remove(InstanceId id) {
-  RefreshIndex();
+  Index();
   if (!volumes_.contains(id)) return;
-  AddReach(id);
+  index_.Deactivate(id, volumes_);
   volumes_.erase(id);
-  reach_.erase(id);
-  RefreshIndex();
+  Index();
   CheckInDebugBuilds(*this);
 }
 
-void AnchoredMap::RefreshIndex() const {
-  // Moved, then fused: in the list twice.
-  std::sort(moved_.begin(), moved_.end());
-  moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
-  for (const InstanceId id : moved_) {
-    const ObjectVolume& volume = volumes_.at(id);
-    if (volume.lattice_is_world) {
-      // Back at its birth: its cover masks have not been kept.
-      RenewCovers(volume.grid);
-    } else {
-      reach_[id] = BlocksTouchedBy(VoxelReader(volume.grid), volume.T_WL, config_.voxel_m, true);
-    }
-    AddReach(id);
-  }
-  moved_.clear();
-  if (dirty_.empty()) return;
-  tbb::parallel_sort(dirty_.begin(), dirty_.end());
-  dirty_.erase(std::unique(dirty_.begin(), dirty_.end()), dirty_.end());
-
-  Participants participants;
-  for (const auto& [id, volume] : volumes_) {
-    if (volume.grid.empty()) continue;
-    Participants::Object& object = participants.objects.emplace_back();
-    object.id = id;
-    object.grid = &volume.grid;
-    if (volume.lattice_is_world) {
-      // To go through the blocks of a large one would take longer than to look blocks up in it.
-      if (volume.grid.size() > dirty_.size()) continue;
-      BlockBox& bounds = object.bounds.emplace();
-      for (const auto& entry : volume.grid.entries()) bounds.Extend(entry.index);
-      continue;
-    }
-    const std::vector<Index3>& reach = reach_[id];
-    BlockBox& bounds = object.bounds.emplace();
-    for (const Index3& block : reach) bounds.Extend(block);
-    object.moved.emplace(
-        Participants::Moved{RowsOf(volume.T_WL.inverse()), VoxelReader(volume.grid), &reach});
-  }
-  std::vector<IndexBlock> computed(dirty_.size());
-  std::vector<IndexBlock*> existing(dirty_.size());
-  std::vector<std::uint8_t> relisted(dirty_.size(), 1);  // other objects are active than were
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, dirty_.size(), kBlocksPerTask),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        Scratch scratch;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          existing[i] = index_.Find(dirty_[i]);
-          IndexBlock& ids = existing[i] ? *existing[i] : computed[i];
-          std::array<InstanceId, kBlockVoxels> before;
-          const bool was_empty = ids.empty();
-          const bool compares = NotesIndexChanges();
-          if (compares && !was_empty) std::copy_n(ids.begin(), kBlockVoxels, before.begin());
-          ComputeBlock(dirty_[i], participants, scratch, ids);
-          if (!compares || was_empty != ids.empty()) continue;
-          relisted[i] = was_empty || std::equal(before.begin(), before.end(), ids.begin()) ? 0 : 1;
-        }
-      },
-      tbb::simple_partitioner());
-  std::vector<Index3> emptied;
-  for (std::size_t i = 0; i < dirty_.size(); ++i) {
-    if (existing[i] != nullptr && existing[i]->empty()) {
-      emptied.push_back(dirty_[i]);
-    } else if (existing[i] == nullptr && !computed[i].empty()) {
-      index_.FindOrAdd(dirty_[i]) = std::move(computed[i]);
-    }
-  }
-  index_.Erase(emptied);
-  for (std::size_t i = 0; i < dirty_.size(); ++i) {
-    if (relisted[i] != 0) NoteIndexChange(dirty_[i]);
-  }
-  dirty_.clear();
+Expected<void> AnchoredMap::Rename(InstanceId from, InstanceId to) {
+  Index();
+  index_.Deactivate(from, volumes_);
+  const Expected<void> status = ObjectVolumeMap::Rename(from, to);
+  // Where that is refused the old one's lists are made again in vain.
+  if (volumes_.contains(status ? to : from)) index_.Activate(status ? to : from);
+  CheckInDebugBuilds(*this);
+  return status;
 }
 
-void AnchoredMap::ComputeBlock(const Index3& index, const Participants& participants,
-                               Scratch& scratch, IndexBlock& ids) const {
-  std::vector<Scratch::Listed>& listed = scratch.listed;
-  listed.clear();
-  std::size_t pulled = 0;
-  for (const Participants::Object& object : participants.objects) {
-    if (object.bounds && !object.bounds->Holds(index)) continue;
-    if (!object.moved) {
-      TsdfBlock* block = object.grid->Find(index);
-      if (block == nullptr || !Any(block->cover)) continue;
-      listed.push_back({object.id, &block->cover, nullptr, block});
-      continue;
-    }
-    const Participants::Moved& moved = *object.moved;
-    if (!moved.Reaches(index)) continue;
-    if (pulled == scratch.pulled.size()) scratch.pulled.emplace_back();
-    PulledCover& cover = scratch.pulled[pulled];
-    if (CoverOfBlock(moved.reader, moved.T_LW, config_.voxel_m, config_.back(), index, cover)) {
-      listed.push_back({object.id, &cover.covered, cover.distance.data(), nullptr});
-      ++pulled;
-    }
-  }
-  if (listed.empty()) {
-    ids.clear();
-    return;
-  }
-  // No voxel lists more objects than the block has.
-  const int layers = std::min(layers_, static_cast<int>(listed.size()));
-  for (const Scratch::Listed& of : listed) {
-    if (of.block != nullptr) of.block->is_listed_with_others = listed.size() > 1;
-  }
-  const auto size = static_cast<std::size_t>(kBlockVoxels * layers);
-  if (ids.size() != size) ids = IndexBlock(size);
-  if (listed.size() == 1) {
-    ListAlone(*listed[0].cover, listed[0].id, ids.data());
-    return;
-  }
-  std::fill(ids.begin(), ids.end(), kNoInstance);
-  std::array<float, kMaxLayers * kBlockVoxels> distance;
-  std::fill_n(distance.begin(), size, std::numeric_limits<float>::infinity());
-  std::array<float, kBlockVoxels> of_block;
-  for (const Scratch::Listed& of : listed) {
-    if (of.block != nullptr) ToFloats(of.block->distance.data(), kBlockVoxels, of_block.data());
-    const float* its = of.block != nullptr ? of_block.data() : of.distance;
-    InsertByDistance(*of.cover, its, of.id, {layers, distance.data(), ids.data()});
-  }
-}
-
-const InstanceId* AnchoredMap::ActiveIn(const Index3& block) const {
-  const IndexBlock* ids = index_.Find(block);
-  return ids == nullptr || ids->empty() ? nullptr : ids->data();
-}
-
-MeshWork AnchoredMap::UpdateMeshes() const {
-  RefreshIndex();
-  return LayeredMap::UpdateMeshes();
+Expected<void> AnchoredMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                                const Pose& T_WO) {
+  TSDFPP_RETURN_IF_ERROR(ObjectVolumeMap::Add(id, volume, T_WL, T_WO));
+  index_.Activate(id);
+  CheckInDebugBuilds(*this);
+  return {};
 }
 
 std::vector<RaySurface> AnchoredMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
                                               const RayCastOptions& options) const {
-  RefreshIndex();
-  if (options.surfaces <= layers_) return LayeredMap::CastRays(camera, T_WC, options);
+  if (options.surfaces <= layers_) return ObjectVolumeMap::CastRays(camera, T_WC, options);
   // Beyond K objects the lists do not say who comes next.
   RayCastOptions listed = options;
   listed.surfaces = layers_;
-  return CastByRemoval(*this, LayeredMap::CastRays(camera, T_WC, listed), camera, T_WC, options);
-}
-
-std::vector<Listing> AnchoredMap::ListAt(const Eigen::Vector3i& voxel) const {
-  RefreshIndex();
-  std::vector<Listing> listings;
-  const IndexBlock* ids = index_.Find(BlockOf(ToIndex3(voxel)));
-  if (ids == nullptr || ids->empty()) return listings;
-  const int place = PlaceInBlock(ToIndex3(voxel));
-  for (auto i = static_cast<std::size_t>(place); i < ids->size(); i += kBlockVoxels) {
-    if ((*ids)[i] == kNoInstance) break;
-    listings.push_back({(*ids)[i], 0});
-  }
-  return listings;
+  return CastByRemoval(*this, ObjectVolumeMap::CastRays(camera, T_WC, listed), camera, T_WC,
+                       options);
 }
 
 std::vector<Eigen::Vector3i> AnchoredMap::ListedVoxels() const {
-  RefreshIndex();
-  std::vector<Index3> voxels;
-  for (const auto& entry : index_.entries()) {
-    for (int place = 0; place < kBlockVoxels && !entry.block->empty(); ++place) {
-      if ((*entry.block)[static_cast<std::size_t>(place)] != kNoInstance) {
-        voxels.push_back(VoxelAt(entry.index, place));
-      }
-    }
-  }
-  return SortedVoxels(std::move(voxels));
+  return SortedVoxels(Index()->ListedVoxels());
 }
 
 MapMemory AnchoredMap::Memory() const {
-  MapMemory memory = VolumeMemory();
-  for (const auto& entry : index_.entries()) {
-    if (entry.block->empty()) continue;
-    ++memory.blocks;
-    memory.bytes += sizeof(IndexBlock) + entry.block->size() * sizeof(InstanceId);
-  }
-  memory.bytes += index_.TableBytes();
+  MapMemory memory = ObjectVolumeMap::Memory();
+  memory.blocks += Index()->blocks();
+  memory.bytes += Index()->Bytes();
   return memory;
+}
+
+Fault AnchoredMap::FindFault() const {
+  std::size_t blocks = Index()->blocks();
+  if (Fault fault = FindVolumeFault(true, blocks)) return fault;
+  if (Fault fault = FindCountFault(*this, blocks)) return fault;
+  if (Fault fault = FindListFault(*this)) return fault;
+  if (Fault fault = FindCoverFault(*this, true)) return fault;
+  return index_.FindFault(volumes_);
+}
+
+Expected<void> AnchoredMap::Load(const Sections& sections) {
+  TSDFPP_RETURN_IF_ERROR(ObjectVolumeMap::Load(sections));
+  index_.Reset(volumes_);
+  Index();
+  return {};
 }
 
 }  // namespace tsdfpp

@@ -2,11 +2,12 @@
 #pragma once
 
 #include "mapper/map_representation.h"
+#include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
 
 // Whether `to` is free to become an object of a map in which `from`, where given, becomes it.
-// Errors: kUsage; those of MapRepresentation::Rename and Add.
+// Errors: kUsage; those of MapEditing::Rename and Add.
 Expected<void> CheckNewId(InstanceId id, bool is_known);
 Expected<void> CheckRename(InstanceId from, bool from_is_known, InstanceId to, bool to_is_known);
 
@@ -15,7 +16,7 @@ Expected<void> CheckRename(InstanceId from, bool from_is_known, InstanceId to, b
 TsdfGrid InWorldLattice(const TsdfGrid& volume, const Pose& T_WL, const MapConfig& config);
 
 // The volume of one object of a map, as Add() takes it: a copy; for one field the voxels labelled
-// so. Masks are up to date but for `crossed` and `cover`.
+// so. Masks are up to date but for `crossed` and `cover`. Aborts where the map has no voxels.
 TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id);
 
 }  // namespace tsdfpp

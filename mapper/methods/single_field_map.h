@@ -2,12 +2,8 @@
 // paper's baseline and its variants (docs/map.md, "`tsdf`: one field").
 #pragma once
 
-#include <functional>
-
-#include "mapper/index/voxel_labels.h"
-#include "mapper/map_representation.h"
-#include "mapper/mesh/mesh_cache.h"
-#include "mapper/volume/tsdf_block.h"
+#include "mapper/methods/labelled_field.h"
+#include "mapper/methods/voxel_map.h"
 #include "mapper/volume/volume_fusion.h"
 
 namespace tsdfpp {
@@ -21,7 +17,7 @@ enum class FieldRule {
   kStatic,      // poses move nothing
 };
 
-class SingleFieldMap final : public MapRepresentation {
+class SingleFieldMap final : public VoxelMap {
  public:
   SingleFieldMap(const MapConfig& config, FieldRule rule);
 
@@ -37,12 +33,9 @@ class SingleFieldMap final : public MapRepresentation {
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;
-  TriangleMesh ObjectMesh(InstanceId id) const override;
-  TriangleMesh SceneMesh() const override;
-  SceneChanges TakeSceneChanges() const override;
+  SurfacesInBlocks Surfaces() const override;
   std::vector<RaySurface> CastRays(const Intrinsics& camera, const Pose& T_WC,
                                    const RayCastOptions& options) const override;
-  MeshWork UpdateMeshes() const override;
   std::optional<VoxelValue> ValueAt(InstanceId id, const Eigen::Vector3i& voxel) const override;
   const TsdfGrid* GridOf(InstanceId id) const override;
   std::vector<Listing> ListAt(const Eigen::Vector3i& voxel) const override;
@@ -54,49 +47,21 @@ class SingleFieldMap final : public MapRepresentation {
   Expected<void> Load(const Sections& sections) override;
 
  private:
-  struct LabelBlock {
-    LabelBlock() { id.fill(kNoInstance); }
-    std::array<InstanceId, kBlockVoxels> id;
-    std::array<std::uint16_t, kBlockVoxels> confidence{};
-    std::uint64_t ever = 0;  // bit (id % 64) of every label that the block ever had
-  };
+  using LabelBlock = LabelledField::LabelBlock;
 
-  static std::uint64_t EverBit(InstanceId id) { return 1ULL << (id & 63U); }
-  // Whether a voxel that has this distance goes with the object that it is labelled with.
-  bool Moves(float distance) const {
-    return config_.moved_voxels == MovedVoxels::kAll || distance <= config_.voxel();
-  }
-  bool IsObjectsVoxel(const TsdfBlock& block, const LabelBlock& labels, std::size_t i,
-                      InstanceId id) const {
-    return labels.id[i] == id && block.weight[i] > 0 && Moves(block.distance[i]);
-  }
   // `label` is the one that all the block's pixels have, kNoInstance where there may be several.
   // `next` as FuseVoxels() takes it.
   void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
                  const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
   // Rims of one field (docs/map.md, `tsdf/guarded`).
   void CompleteRims(const FrameView& frame);
-  // Gives the label of the voxel nearest to a point (metres), the background's where it has none.
-  VoxelLabels LabelOfVoxels() const;
-  // Makes the object's voxels unlabelled, and unobserved or free; returns their blocks.
-  std::vector<Index3> Vacate(InstanceId id, RemovedVoxels become);
-  // Writes the values of a block that moved here, as `rule_` allows; confidence(i) is what voxel i
-  // brings along.
-  void Arrive(InstanceId id, const Index3& index, const TsdfBlock& arrival,
-              const std::function<std::uint16_t(std::size_t)>& confidence);
   // Labels a voxel, or was given a pose.
-  bool IsKnown(InstanceId id) const;
-  // Frees those of these blocks that have no observed voxel.
-  void FreeEmpty(const std::vector<Index3>& blocks);
-  template <typename Function>
-  void ForEachVoxel(const Function& function) const;
+  bool IsKnown(InstanceId id) const { return T_WO_.contains(id) || field_.Holds(id); }
 
   MapConfig config_;
   FieldRule rule_;
-  TsdfGrid field_;
-  BlockGrid<LabelBlock> labels_;  // the same blocks
+  LabelledField field_;
   std::map<InstanceId, Pose> T_WO_;
-  mutable GridMesh mesh_;
 };
 
 }  // namespace tsdfpp

@@ -1,288 +1,29 @@
 #include "mapper/methods/tsdfpp_map.h"
 
-#include <hwy/cache_control.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <bit>
-#include <cstddef>
-
-#include "mapper/index/cover.h"
-#include "mapper/index/index_kernels.h"
 #include "mapper/map_reach.h"
 #include "mapper/methods/cast_by_removal.h"
 #include "mapper/methods/map_invariants.h"
+#include "mapper/methods/voxel_answers.h"
+#include "mapper/store/volume_store.h"
 #include "mapper/volume/freeing.h"
-#include "mapper/volume/pull_back.h"
 
 namespace tsdfpp {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 16;
-
-constexpr std::size_t kAhead = 4;  // groups, while one is worked on
-
-constexpr std::size_t kLookUpsPerTask = 512;
-
-template <typename Function>
-void ForEachVoxel(const BlockMask& mask, const Function& function) {
-  int first = 0;
-  for (std::uint64_t slice : mask) {
-    for (; slice != 0; slice &= slice - 1) function(first + std::countr_zero(slice));
-    first += 64;
-  }
-}
+constexpr const char* kLists = "LIST";
 
 }  // namespace
-
-// What a frame did at each block of the index, by increasing id. A block that nothing covers, or
-// did, has no lists.
-class TsdfppMap::Groups {
- public:
-  struct Group {
-    Index3 index;
-    ListBlock* lists = nullptr;
-    std::int32_t first_change = kNone;
-    std::int32_t first_vote = kNone;
-    bool relisted = false;  // other objects are active than were
-    bool emptied = false;
-  };
-  static constexpr std::int32_t kNone = -1;
-
-  Groups(TsdfppMap& map, const std::vector<FusedBlock>& fused,
-         const std::vector<CoverChange>& changes)
-      : next_change_(changes.size(), kNone), next_vote_(fused.size(), kNone) {
-    const auto numbers = [&map](const auto& of, const auto& has_lists) {
-      std::vector<std::int32_t> found(of.size(), kNone);
-      tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, of.size(), kLookUpsPerTask),
-          [&](const tbb::blocked_range<std::size_t>& range) {
-            for (std::size_t i = range.begin(); i != range.end(); ++i) {
-              if (!has_lists(of[i])) continue;
-              const auto number = map.index_.NumberOf(of[i].index);
-              found[i] = number ? static_cast<std::int32_t>(*number) : kNone;
-            }
-          },
-          tbb::simple_partitioner());
-      for (std::size_t i = 0; i < of.size(); ++i) {
-        if (found[i] != kNone || !has_lists(of[i])) continue;
-        map.ListsOf(of[i].index);
-        found[i] = static_cast<std::int32_t>(*map.index_.NumberOf(of[i].index));
-      }
-      return found;
-    };
-    const std::vector<std::int32_t> change_at =
-        numbers(changes, [](const CoverChange&) { return true; });
-    const std::vector<std::int32_t> vote_at =
-        numbers(fused, [](const FusedBlock& from) { return Any(from.block->cover); });
-    std::vector<std::int32_t> group_of(map.index_.size(), kNone);
-    const auto group_at = [&](std::int32_t number) -> Group& {
-      std::int32_t& group = group_of[static_cast<std::size_t>(number)];
-      if (group == kNone) {
-        group = static_cast<std::int32_t>(groups_.size());
-        const auto& entry = map.index_.entries()[static_cast<std::size_t>(number)];
-        groups_.push_back({entry.index, entry.block.get()});
-      }
-      return groups_[static_cast<std::size_t>(group)];
-    };
-    for (std::size_t i = 0; i < changes.size(); ++i) {
-      Chain(changes, i, group_at(change_at[i]).first_change, next_change_);
-    }
-    for (std::size_t i = 0; i < fused.size(); ++i) {
-      if (vote_at[i] == kNone) continue;
-      Chain(fused, i, group_at(vote_at[i]).first_vote, next_vote_);
-    }
-  }
-
-  std::vector<Group>& all() { return groups_; }
-  // What the votes at the group read first.
-  void Prefetch(const Group& group, const std::vector<FusedBlock>& fused) const {
-    hwy::Prefetch(&group.lists->settled);
-    if (group.first_vote == kNone) return;
-    const FusedBlock& from = fused[static_cast<std::size_t>(group.first_vote)];
-    hwy::Prefetch(from.votes);
-    hwy::Prefetch(&from.block->cover);
-  }
-  template <typename Function>
-  void ForEachChange(const Group& group, const Function& function) const {
-    ForEach(group.first_change, next_change_, function);
-  }
-  template <typename Function>
-  void ForEachVote(const Group& group, const Function& function) const {
-    ForEach(group.first_vote, next_vote_, function);
-  }
-
- private:
-  using Links = std::vector<std::int32_t>;
-
-  // Into a chain by increasing id.
-  template <typename Item>
-  static void Chain(const std::vector<Item>& items, std::size_t i, std::int32_t& first,
-                    Links& next) {
-    std::int32_t* link = &first;
-    while (*link != kNone && items[static_cast<std::size_t>(*link)].id < items[i].id) {
-      link = &next[static_cast<std::size_t>(*link)];
-    }
-    next[i] = std::exchange(*link, static_cast<std::int32_t>(i));
-  }
-  template <typename Function>
-  static void ForEach(std::int32_t first, const Links& next, const Function& function) {
-    for (std::int32_t i = first; i != kNone; i = next[static_cast<std::size_t>(i)]) {
-      function(static_cast<std::size_t>(i));
-    }
-  }
-
-  std::vector<Group> groups_;
-  Links next_change_;
-  Links next_vote_;
-};
-
-TsdfppMap::TsdfppMap(const MapConfig& config, int layers) : LayeredMap(config), layers_(layers) {}
 
 std::unique_ptr<MapRepresentation> TsdfppMap::Clone() const {
   return std::make_unique<TsdfppMap>(*this);
 }
 
-TsdfppMap::ListBlock& TsdfppMap::ListsOf(const Index3& block) {
-  ListBlock& lists = index_.FindOrAdd(block);
-  if (lists.ids.empty()) lists.Resize(1);
-  return lists;
-}
-
-VoxelList TsdfppMap::ListOf(ListBlock& lists, int place) {
-  lists.settled[static_cast<std::size_t>(place >> 6)] &=
-      ~(1ULL << static_cast<unsigned>(place & 63));
-  const auto at = static_cast<std::size_t>(place);
-  return {&lists.ids[at], &lists.confidences[at], static_cast<int>(lists.layers()), kBlockVoxels};
-}
-
-VoxelList TsdfppMap::ListWithRoom(ListBlock& lists, int place) const {
-  const std::size_t layers = lists.layers();
-  const std::size_t last = (layers - 1) * kBlockVoxels + static_cast<std::size_t>(place);
-  if (lists.ids[last] != kNoInstance && layers < static_cast<std::size_t>(layers_)) {
-    lists.Resize(layers + 1);
-  }
-  return ListOf(lists, place);
-}
-
-void TsdfppMap::FreeEmptyLayers(ListBlock& lists) {
-  std::size_t layers = lists.layers();
-  const auto lists_nothing = [&](std::size_t layer) {
-    const auto first = lists.ids.begin() + static_cast<std::ptrdiff_t>(layer * kBlockVoxels);
-    return std::all_of(first, first + kBlockVoxels,
-                       [](InstanceId id) { return id == kNoInstance; });
-  };
-  while (layers > 1 && lists_nothing(layers - 1)) --layers;
-  if (layers != lists.layers()) lists.Resize(layers);
-}
-
-void TsdfppMap::ListBlock::Resize(std::size_t layers) {
-  const std::size_t size = layers * kBlockVoxels;
-  ids.reserve(size);
-  ids.resize(size, kNoInstance);
-  ids.shrink_to_fit();
-  confidences.reserve(size);
-  confidences.resize(size);
-  confidences.shrink_to_fit();
-}
-
-bool TsdfppMap::Vote(ListBlock& lists, InstanceId id, BlockMask votes) const {
-  if (lists.settled_id != id) {
-    lists.settled_id = id;
-    lists.settled = {};
-  }
-  for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= ~lists.settled[z];
-  if (!Any(votes)) return false;
-  // Nearly every vote is for the active object.
-  const VotesCounted counted =
-      VoteForActive(votes, id, config_.confidence_cap, lists.ids.data(), lists.confidences.data());
-  for (std::size_t z = 0; z < votes.size(); ++z) lists.settled[z] |= counted.saturated[z];
-  bool other_active = false;
-  ForEachVoxel(counted.others, [&](int place) {
-    const InstanceId before = lists.ActiveAt(place);
-    const bool is_listed = ListOf(lists, place).Lists(id);
-    (is_listed ? ListOf(lists, place) : ListWithRoom(lists, place))
-        .Vote(id, config_.confidence_cap);
-    other_active = other_active || lists.ActiveAt(place) != before;
-  });
-  return other_active;
-}
-
-ObjectMove TsdfppMap::MoveTo(InstanceId id, const Pose& T_WO) const {
-  const auto of = volumes_.find(id);
-  return of == volumes_.end() ? ObjectMove{} : MoveOfValues(of->second, T_WO);
-}
-
 void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
-  ObjectVolume& volume = volumes_[id];
-  const std::optional<Pose> T_WO_old = std::exchange(volume.T_WO, T_WO);
-  if (!T_WO_old || SameNumbers(*T_WO_old, T_WO)) return;
-  const std::vector<Index3> left = Deactivate(id);
-  volume.grid = ResampleGrid(volume.grid, T_WO * T_WO_old->inverse(), config_.voxel_m,
-                             config_.back(), config_.resampling);
-  volume.revision = NewRevision();
-  Activate(id);
-  FreeEmptyLists(left);
+  std::vector<Index3> left;
+  if (!MoveValues(id, T_WO, [&] { left = index_.Deactivate(id, volumes_.at(id).grid); })) return;
+  index_.Activate(id, volumes_.at(id).grid);
+  index_.FreeEmptyLists(left);
   CheckInDebugBuilds(*this);
-}
-
-std::vector<Index3> TsdfppMap::Deactivate(InstanceId id) {
-  std::vector<Index3> blocks;
-  for (const auto& entry : volumes_.at(id).grid.entries()) {
-    ListBlock* lists = index_.Find(entry.index);
-    if (lists == nullptr) continue;
-    // Overflow may have dropped the object from some of these; Remove() knows.
-    ForEachVoxel(entry.block->cover, [&](int place) { ListOf(*lists, place).Remove(id); });
-    if (!Any(entry.block->cover)) continue;
-    blocks.push_back(entry.index);
-  }
-  return blocks;
-}
-
-bool TsdfppMap::IsEmpty(const ListBlock& lists) {
-  return std::all_of(lists.ids.begin(), lists.ids.begin() + kBlockVoxels,
-                     [](InstanceId active) { return active == kNoInstance; });
-}
-
-void TsdfppMap::FreeEmptyLists(const std::vector<Index3>& blocks) {
-  std::vector<Index3> empty;
-  for (const Index3& index : blocks) {
-    ListBlock* lists = index_.Find(index);
-    if (lists == nullptr) continue;
-    if (IsEmpty(*lists)) {
-      empty.push_back(index);
-    } else {
-      FreeEmptyLayers(*lists);
-    }
-  }
-  index_.Erase(empty);
-}
-
-void TsdfppMap::Activate(InstanceId id) {
-  const TsdfGrid& grid = volumes_.at(id).grid;
-  const auto in_parallel = [&](const auto& function) {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, grid.size(), kBlocksPerTask),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
-        },
-        tbb::simple_partitioner());
-  };
-  RenewCovers(grid);
-  std::vector<ListBlock*> lists(grid.size(), nullptr);
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    const TsdfGrid::Entry& entry = grid.entries()[i];
-    if (!Any(entry.block->cover)) continue;
-    lists[i] = &ListsOf(entry.index);
-    NoteIndexChange(entry.index);
-  }
-  in_parallel([&](std::size_t i) {
-    if (lists[i] == nullptr) return;
-    ForEachVoxel(grid.entries()[i].block->cover, [&](int place) {
-      ListWithRoom(*lists[i], place).PushFront(id, config_.moved_confidence);
-    });
-  });
 }
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
@@ -291,137 +32,80 @@ void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   const FrameFreeing freeing(volumes_);
   BlockVotes votes;
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_, &votes);
-  UpdateIndex(fused);
+  index_.Update(fused, UpdateCovers(fused, volumes_));
   freeing.FreeEmpty(fused, volumes_);
   CheckInDebugBuilds(*this);
 }
 
-void TsdfppMap::UpdateIndex(const std::vector<FusedBlock>& fused) {
-  const std::vector<CoverChange> changes = UpdateCovers(fused, volumes_);
-  Groups groups(*this, fused, changes);
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, groups.all().size(), kBlocksPerTask),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          if (i + kAhead < range.end()) groups.Prefetch(groups.all()[i + kAhead], fused);
-          Groups::Group& group = groups.all()[i];
-          ListBlock& lists = *group.lists;
-          bool lost_any = false;
-          groups.ForEachChange(group, [&](std::size_t k) {
-            ForEachVoxel(changes[k].lost, [&](int place) {
-              group.relisted = group.relisted || lists.ActiveAt(place) == changes[k].id;
-              ListOf(lists, place).Remove(changes[k].id);
-            });
-            lost_any = lost_any || Any(changes[k].lost);
-          });
-          groups.ForEachVote(group, [&](std::size_t k) {
-            const FusedBlock& from = fused[k];
-            BlockMask votes = *from.votes;
-            for (std::size_t z = 0; z < votes.size(); ++z) votes[z] &= from.block->cover[z];
-            if (Vote(lists, from.id, votes)) group.relisted = true;
-          });
-          groups.ForEachChange(group, [&](std::size_t k) {
-            ForEachVoxel(changes[k].gained, [&](int place) {
-              if (ListOf(lists, place).Lists(changes[k].id)) return;
-              group.relisted = group.relisted || lists.ActiveAt(place) == kNoInstance;
-              ListWithRoom(lists, place).Append(changes[k].id, 1);
-            });
-          });
-          group.emptied = lost_any && IsEmpty(lists);
-          if (lost_any && !group.emptied) FreeEmptyLayers(lists);
-        }
-      },
-      tbb::simple_partitioner());
-  std::vector<Index3> empty;
-  for (const Groups::Group& group : groups.all()) {
-    if (group.relisted) NoteIndexChange(group.index);
-    if (group.emptied) empty.push_back(group.index);
-  }
-  index_.Erase(empty);
-}
-
 void TsdfppMap::Remove(InstanceId id) {
-  const auto removed = volumes_.find(id);
-  if (removed == volumes_.end()) return;
-  struct Vacated {
-    Index3 block;
-    int place;
-  };
-  std::vector<Vacated> vacated;
-  for (const auto& entry : removed->second.grid.entries()) {
-    ListBlock* lists = index_.Find(entry.index);
-    if (lists == nullptr) continue;
-    ForEachVoxel(entry.block->cover, [&](int place) {
-      VoxelList list = ListOf(*lists, place);
-      if (!list.Lists(id)) return;
-      list.Remove(id);
-      vacated.push_back({entry.index, place});
-    });
-  }
-  volumes_.erase(removed);
-  std::vector<Index3> blocks;
-  for (const Vacated& voxel : vacated) {
-    if (blocks.empty() || blocks.back() != voxel.block) blocks.push_back(voxel.block);
-    if (!config_.relist_on_removal) continue;
-    ListBlock& lists = *index_.Find(voxel.block);
-    for (const auto& [other, volume] : volumes_) {
-      const TsdfBlock* block = volume.grid.Find(voxel.block);
-      if (block == nullptr || !Bit(block->cover, voxel.place)) continue;
-      if (ListOf(lists, voxel.place).Lists(other)) continue;
-      ListWithRoom(lists, voxel.place).Append(other, 1);
-    }
-  }
-  FreeEmptyLists(blocks);
+  const auto removed = volumes_.extract(id);
+  if (removed.empty()) return;
+  index_.Remove(id, removed.mapped().grid, volumes_);
   CheckInDebugBuilds(*this);
 }
 
-const InstanceId* TsdfppMap::ActiveIn(const Index3& block) const {
-  const ListBlock* lists = index_.Find(block);
-  return lists == nullptr || lists->ids.empty() ? nullptr : lists->ids.data();
+Expected<void> TsdfppMap::Rename(InstanceId from, InstanceId to) {
+  TSDFPP_RETURN_IF_ERROR(ObjectVolumeMap::Rename(from, to));
+  index_.Rename(from, to, volumes_.at(to).grid);
+  CheckInDebugBuilds(*this);
+  return {};
+}
+
+Expected<void> TsdfppMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
+                              const Pose& T_WO) {
+  TSDFPP_RETURN_IF_ERROR(ObjectVolumeMap::Add(id, volume, T_WL, T_WO));
+  index_.Activate(id, volumes_.at(id).grid);
+  CheckInDebugBuilds(*this);
+  return {};
 }
 
 std::vector<RaySurface> TsdfppMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
                                             const RayCastOptions& options) const {
-  if (!config_.relist_on_removal) return LayeredMap::CastRays(camera, T_WC, options);
+  if (!config_.relist_on_removal) return ObjectVolumeMap::CastRays(camera, T_WC, options);
   // A removal lists objects that the lists do not know of.
   RayCastOptions first = options;
   first.surfaces = 1;
-  return CastByRemoval(*this, LayeredMap::CastRays(camera, T_WC, first), camera, T_WC, options);
-}
-
-std::vector<Listing> TsdfppMap::ListAt(const Eigen::Vector3i& voxel) const {
-  std::vector<Listing> listings;
-  const ListBlock* lists = index_.Find(BlockOf(ToIndex3(voxel)));
-  if (lists == nullptr) return listings;
-  const int place = PlaceInBlock(ToIndex3(voxel));
-  for (auto i = static_cast<std::size_t>(place); i < lists->ids.size(); i += kBlockVoxels) {
-    const ListEntry entry = lists->At(i);
-    if (entry.id == kNoInstance) break;
-    listings.push_back({entry.id, entry.confidence});
-  }
-  return listings;
+  return CastByRemoval(*this, ObjectVolumeMap::CastRays(camera, T_WC, first), camera, T_WC,
+                       options);
 }
 
 std::vector<Eigen::Vector3i> TsdfppMap::ListedVoxels() const {
-  std::vector<Index3> voxels;
-  for (const auto& entry : index_.entries()) {
-    for (int place = 0; place < kBlockVoxels && !entry.block->ids.empty(); ++place) {
-      if (entry.block->ids[static_cast<std::size_t>(place)] != kNoInstance)
-        voxels.push_back(VoxelAt(entry.index, place));
-    }
-  }
-  return SortedVoxels(std::move(voxels));
+  return SortedVoxels(index_.ListedVoxels());
 }
 
 MapMemory TsdfppMap::Memory() const {
-  MapMemory memory = VolumeMemory();
-  memory.blocks += index_.size();
-  memory.bytes += index_.TableBytes();
-  for (const auto& entry : index_.entries()) {
-    memory.bytes +=
-        sizeof(ListBlock) + entry.block->ids.size() * (sizeof(InstanceId) + sizeof(std::uint8_t));
-  }
+  MapMemory memory = ObjectVolumeMap::Memory();
+  memory.blocks += index_.blocks();
+  memory.bytes += index_.Bytes();
   return memory;
+}
+
+Fault TsdfppMap::FindFault() const {
+  std::size_t blocks = index_.blocks();
+  if (Fault fault = FindVolumeFault(true, blocks)) return fault;
+  if (Fault fault = FindCountFault(*this, blocks)) return fault;
+  if (Fault fault = index_.FindFault()) return fault;
+  if (Fault fault = FindListFault(*this)) return fault;
+  return FindCoverFault(*this, false);
+}
+
+void TsdfppMap::Save(Sections& sections) const {
+  ObjectVolumeMap::Save(sections);
+  SaveLists(index_.Lists(), layers_, sections[kLists]);
+}
+
+Expected<void> TsdfppMap::Load(const Sections& sections) {
+  TSDFPP_RETURN_IF_ERROR(ObjectVolumeMap::Load(sections));
+  for (const auto& [id, volume] : volumes_) RenewCovers(volume.grid);
+  const auto covers = [this](InstanceId id, const Index3& index, int place) {
+    const auto volume = volumes_.find(id);
+    if (volume == volumes_.end()) return false;
+    const TsdfBlock* block = volume->second.grid.Find(index);
+    return block != nullptr && Bit(block->cover, place);
+  };
+  TSDFPP_ASSIGN(const auto lists, LoadAllLists(sections, kLists, layers_, config_, covers));
+  index_.SetLists(lists);
+  return {};
 }
 
 }  // namespace tsdfpp

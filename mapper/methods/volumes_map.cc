@@ -5,20 +5,17 @@
 #include <vector>
 
 #include "mapper/index/cover.h"
-#include "mapper/index/voxel_list.h"
+#include "mapper/index/grid_invariants.h"
 #include "mapper/map_reach.h"
 #include "mapper/methods/map_invariants.h"
-#include "mapper/rays/ray_pass.h"
+#include "mapper/methods/voxel_answers.h"
 #include "mapper/volume/freeing.h"
 #include "mapper/volume/pull_back.h"
 
 namespace tsdfpp {
 
 void VolumesMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
-  ObjectVolume& volume = volumes_[id];
-  volume.T_WO = T_WO;
-  if (!volume.T_WO_birth) volume.T_WO_birth = T_WO;
-  PlaceLattice(volume);
+  MoveLattice(id, T_WO, [] {});
   CheckInDebugBuilds(*this);
 }
 
@@ -87,17 +84,12 @@ std::vector<Eigen::Vector3i> VolumesMap::ListedVoxels() const {
   return SortedVoxels(std::move(voxels));
 }
 
-std::vector<RaySurface> VolumesMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
-                                             const RayCastOptions& options) const {
-  RayPass pass;
-  pass.voxel_m = config_.voxel_m;
-  pass.each_alone = true;
-  for (const auto& [id, volume] : volumes_) {
-    pass.volumes.push_back({id, &volume.grid, volume.T_WL, volume.lattice_is_world});
-  }
-  return RunRayPass(pass, camera, T_WC, options);
+Fault VolumesMap::FindFault() const {
+  std::size_t blocks = 0;
+  if (Fault fault = FindVolumeFault(false, blocks)) return fault;
+  if (Fault fault = FindCountFault(*this, blocks)) return fault;
+  if (Fault fault = FindListFault(*this)) return fault;
+  return FindCoverFault(*this, true);
 }
-
-MapMemory VolumesMap::Memory() const { return VolumeMemory(); }
 
 }  // namespace tsdfpp

@@ -34,8 +34,9 @@ ObjectPoses PclIcp::Track(const Frame& frame, const cv::Mat& labels, const MapRe
       after[id] = Pose::Identity();
       continue;
     }
-    const TrackResult result = TrackObject(SegmentPoints(frame, labels, id, config_),
-                                           map.ObjectMesh(id), map.config().voxel_m, config_);
+    const TrackResult result =
+        TrackObject(SegmentPoints(frame, labels, id, config_), mesher_.ObjectMesh(map, id),
+                    map.config().voxel_m, config_);
     after[id] = result.T_O * known->second;
   }
   return after;

@@ -5,6 +5,7 @@
 #include <set>
 #include <vector>
 
+#include "mapper/scene_mesher.h"
 #include "mapper/track/icp_registration.h"
 #include "mapper/track/tracker.h"
 
@@ -23,6 +24,7 @@ class PclIcp : public Tracker {
  private:
   IcpConfig config_;
   std::set<InstanceId> tracked_;
+  SceneMesher mesher_;  // keeps the objects' meshes from frame to frame
 };
 
 }  // namespace tsdfpp

@@ -3,7 +3,7 @@
 // Blocks are found by indices of 21 bits an axis (PackIndex). Content is kept to kFurthestBlock,
 // which leaves a margin that neighbours, boxes with margins and rounding never use up, so that no
 // index wraps and none is dropped:
-//  - Pipeline::Process and MapRepresentation::Add refuse with a sentence what would lie further
+//  - Pipeline::Process and MapEditing::Add refuse with a sentence what would lie further
 //    out, and leave the map as it was; so does the reader of map files. Fuse aborts, as it does for
 //    images of wrong sizes, and BlockGrid::Add aborts beyond kFurthestStored.
 //  - Therefore out of reach: wrapped keys in BlocksAlongRays, and in GridMesh, where neighbours are

@@ -48,6 +48,19 @@ inline ObjectMove MoveOfValues(const ObjectVolume& volume, const Pose& T_WO) {
   return move;
 }
 
+// What a new pose does where the volume stays in its object's lattice.
+inline ObjectMove MoveOfLattice(const ObjectVolume& volume, const Pose& T_WO) {
+  ObjectMove move;
+  if (!volume.T_WO_birth || SameNumbers(*volume.T_WO_birth, T_WO)) return move;
+  if (SameNumbers(*volume.T_WO, T_WO)) {
+    move.T_WL = volume.T_WL;
+    return move;
+  }
+  move.T_WL = move.T = T_WO * volume.T_WO_birth->inverse();
+  move.blocks = &volume.grid;
+  return move;
+}
+
 // Reads voxels of a grid by index through a dense table of block pointers over the grid's bounding
 // box: for many reads of one object. The grid must not change meanwhile.
 class VoxelReader {

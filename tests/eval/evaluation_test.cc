@@ -320,7 +320,8 @@ TEST(Removals, ActOnCopiesOfTheMap) {
     for (const auto& [id, T_WO] : frame.T_WO) map->SetObjectPose(id, T_WO);
     map->Fuse(frame, frame.mask);
   }
-  const SceneMeshes meshes = MeshesOf(*map, kMovers);
+  SceneMesher mesher;
+  const SceneMeshes meshes = MeshesOf(*map, kMovers, mesher);
   const auto ids = [](const TriangleMesh& mesh) {
     return std::set<InstanceId>(mesh.face_ids.begin(), mesh.face_ids.end());
   };

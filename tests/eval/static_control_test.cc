@@ -9,6 +9,7 @@
 
 #include "eval/adapters/open3d_peer.h"
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 #include "metrics/preservation.h"
 #include "metrics/truth_surface.h"
 #include "metrics/visibility.h"
@@ -207,8 +208,8 @@ TEST(StaticControl, AllMapsAndOpen3dAgree) {
 // Voxels and mesh of one object.
 std::string ObjectBytes(const MapRepresentation& map, InstanceId id) {
   std::string bytes;
-  for (const Eigen::Vector3i& v : map.ObservedVoxels(id)) {
-    const auto value = map.ValueAt(id, v);
+  for (const Eigen::Vector3i& v : VoxelsOf(map).ObservedVoxels(id)) {
+    const auto value = VoxelsOf(map).ValueAt(id, v);
     for (int a = 0; a < 3; ++a) AppendBytes(v[a], bytes);
     AppendBytes(value->distance_m, bytes);
     AppendBytes(value->weight, bytes);
@@ -234,11 +235,11 @@ TEST(StaticControl, TsdfppAndAnchoredHoldTheSameVolumes) {
   }
 
   // The same objects at every voxel; so where one object covers it, there is no order to differ in.
-  const auto listed = plain->ListedVoxels();
-  ASSERT_EQ(listed.size(), anchored->ListedVoxels().size());
+  const auto listed = VoxelsOf(*plain).ListedVoxels();
+  ASSERT_EQ(listed.size(), VoxelsOf(*anchored).ListedVoxels().size());
   const auto ids_at = [](const MapRepresentation& map, const Eigen::Vector3i& v) {
     std::vector<InstanceId> ids;
-    for (const Listing& entry : map.ListAt(v)) ids.push_back(entry.id);
+    for (const Listing& entry : VoxelsOf(map).ListAt(v)) ids.push_back(entry.id);
     return ids;
   };
   std::size_t shared = 0;

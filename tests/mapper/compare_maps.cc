@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "mapper/map_editing.h"
+#include "mapper/voxel_inspection.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -95,7 +98,7 @@ void SideBySide::Remove(InstanceId id) {
 }
 
 void SideBySide::Rename(InstanceId from, InstanceId to) {
-  const auto renamed = map_->Rename(from, to);
+  const auto renamed = EditingOf(*map_).Rename(from, to);
   EXPECT_TRUE(renamed.has_value()) << renamed.error().message;
   dense_->Rename(from, to);
   Compare(fmt::format("the renaming of {} to {}", from, to));
@@ -104,9 +107,9 @@ void SideBySide::Rename(InstanceId from, InstanceId to) {
 void SideBySide::CompareWholeBox() const {
   std::size_t different = 0;
   ForEachVoxel(box_, [&](const Eigen::Vector3i& v) {
-    bool same = map_->ListAt(v) == dense_->ListAt(v);
+    bool same = VoxelsOf(*map_).ListAt(v) == dense_->ListAt(v);
     for (const InstanceId id : ids_) {
-      same = same && SameValue(map_->ValueAt(id, v), dense_->ValueAt(id, v));
+      same = same && SameValue(VoxelsOf(*map_).ValueAt(id, v), dense_->ValueAt(id, v));
     }
     if (!same) ++different;
   });
@@ -122,7 +125,7 @@ void SideBySide::Compare(const std::string& event) {
     EXPECT_EQ(map_->ObjectLattice(id).matrix(), dense_->ObjectLattice(id).matrix()) << id;
   }
   EXPECT_TRUE(SameLists(*map_, *dense_));
-  const auto fault = map_->FindFault();
+  const auto fault = VoxelsOf(*map_).FindFault();
   EXPECT_FALSE(fault.has_value()) << *fault;
 }
 

@@ -5,9 +5,11 @@
 
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/reference/dense_map.h"
 
 namespace tsdfpp {
@@ -25,16 +27,24 @@ std::string Text(const std::vector<Listing>& list);
 ::testing::AssertionResult SameValue(const std::optional<VoxelValue>& actual,
                                      const std::optional<VoxelValue>& expected);
 
+// Of a reference, which is no MapRepresentation: itself.
+template <typename Reference,
+          typename = std::enable_if_t<!std::is_base_of_v<MapRepresentation, Reference>>>
+const Reference& VoxelsOf(const Reference& map) {
+  return map;
+}
+
 // What can be asked about the voxels of two maps; `Other` is a DenseMap or a MapRepresentation.
 template <typename Other>
 ::testing::AssertionResult SameObject(const MapRepresentation& map, const Other& other,
                                       InstanceId id) {
-  const auto observed = map.ObservedVoxels(id);
-  if (auto same = SameVoxels(observed, other.ObservedVoxels(id)); !same) {
+  const auto observed = VoxelsOf(map).ObservedVoxels(id);
+  if (auto same = SameVoxels(observed, VoxelsOf(other).ObservedVoxels(id)); !same) {
     return same << " among the observed voxels of object " << id;
   }
   for (const Eigen::Vector3i& v : observed) {
-    if (auto same = SameValue(map.ValueAt(id, v), other.ValueAt(id, v)); !same) {
+    if (auto same = SameValue(VoxelsOf(map).ValueAt(id, v), VoxelsOf(other).ValueAt(id, v));
+        !same) {
       return same << " at voxel " << Text(v) << " of object " << id;
     }
   }
@@ -43,15 +53,15 @@ template <typename Other>
 
 template <typename Other>
 ::testing::AssertionResult SameLists(const MapRepresentation& map, const Other& other) {
-  const auto listed = map.ListedVoxels();
-  if (auto same = SameVoxels(listed, other.ListedVoxels()); !same) {
+  const auto listed = VoxelsOf(map).ListedVoxels();
+  if (auto same = SameVoxels(listed, VoxelsOf(other).ListedVoxels()); !same) {
     return same << " among the listed voxels";
   }
   std::size_t different = 0;
   std::string first;
   for (const Eigen::Vector3i& v : listed) {
-    const auto actual = map.ListAt(v);
-    const auto expected = other.ListAt(v);
+    const auto actual = VoxelsOf(map).ListAt(v);
+    const auto expected = VoxelsOf(other).ListAt(v);
     if (actual == expected) continue;
     if (different++ == 0) first = Text(v) + ": " + Text(actual) + ", expected " + Text(expected);
   }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/every_method.h"
 
 namespace tsdfpp {
@@ -31,7 +32,7 @@ class CoverTest : public ::testing::TestWithParam<Method> {
       frame.depth(window) += dice.Uniform(-1, 1) * kToyVoxel_m;
       map->Fuse(frame, labels);
       for (const InstanceId id : map->Objects()) {
-        const TsdfGrid& grid = *map->GridOf(id);
+        const TsdfGrid& grid = *VoxelsOf(*map).GridOf(id);
         for (const auto& entry : grid.entries()) {
           ASSERT_EQ(entry.block->cover, FindCover(grid, entry.index)) << "window " << i;
         }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -89,25 +90,25 @@ inline ::testing::AssertionResult SameContentShifted(const MapRepresentation& ma
     return voxels;
   };
   for (const InstanceId id : ToyIds()) {
-    const auto observed = map.ObservedVoxels(id);
-    if (auto same = SameVoxels(shifted.ObservedVoxels(id), moved(observed)); !same) {
+    const auto observed = VoxelsOf(map).ObservedVoxels(id);
+    if (auto same = SameVoxels(VoxelsOf(shifted).ObservedVoxels(id), moved(observed)); !same) {
       return same << " among the observed voxels of object " << id;
     }
     for (const Eigen::Vector3i& v : observed) {
-      if (!SameBits(shifted.ValueAt(id, v + shift), map.ValueAt(id, v))) {
+      if (!SameBits(VoxelsOf(shifted).ValueAt(id, v + shift), VoxelsOf(map).ValueAt(id, v))) {
         return ::testing::AssertionFailure() << "object " << id << " at voxel " << Text(v);
       }
     }
   }
-  const auto listed = map.ListedVoxels();
-  if (auto same = SameVoxels(shifted.ListedVoxels(), moved(listed)); !same) {
+  const auto listed = VoxelsOf(map).ListedVoxels();
+  if (auto same = SameVoxels(VoxelsOf(shifted).ListedVoxels(), moved(listed)); !same) {
     return same << " among the listed voxels";
   }
   for (const Eigen::Vector3i& v : listed) {
-    if (shifted.ListAt(v + shift) != map.ListAt(v)) {
+    if (VoxelsOf(shifted).ListAt(v + shift) != VoxelsOf(map).ListAt(v)) {
       return ::testing::AssertionFailure()
-             << "voxel " << Text(v) << " lists " << Text(shifted.ListAt(v + shift)) << ", expected "
-             << Text(map.ListAt(v));
+             << "voxel " << Text(v) << " lists " << Text(VoxelsOf(shifted).ListAt(v + shift))
+             << ", expected " << Text(VoxelsOf(map).ListAt(v));
     }
   }
   return ::testing::AssertionSuccess();

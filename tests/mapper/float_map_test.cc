@@ -10,6 +10,7 @@
 #include <string>
 #include <tuple>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -272,11 +273,11 @@ INSTANTIATE_TEST_SUITE_P(Methods, FloatMapTest,
 
 void ExpectSame(const Pair& maps) {
   for (const InstanceId id : ToyIds()) {
-    const auto observed = maps.production->ObservedVoxels(id);
+    const auto observed = VoxelsOf(*maps.production).ObservedVoxels(id);
     ASSERT_TRUE(SameVoxels(maps.floats->ObservedVoxels(id), observed)) << "object " << id;
     for (const Eigen::Vector3i& v : observed) {
       const auto value = maps.floats->ValueAt(id, v);
-      const auto expected = maps.production->ValueAt(id, v);
+      const auto expected = VoxelsOf(*maps.production).ValueAt(id, v);
       ASSERT_TRUE(value) << Text(v);
       ASSERT_EQ(value->distance, expected->distance_m) << Text(v) << " of object " << id;
       ASSERT_EQ(value->weight, expected->weight) << Text(v) << " of object " << id;
@@ -290,7 +291,7 @@ void ExpectSame(const Pair& maps) {
 TEST_P(FloatMapTest, StoringAsProductionDoesItIsProduction) {
   Pair maps = Begin(true, true);
   Drive(maps);
-  ASSERT_FALSE(maps.production->ObservedVoxels(kBrick).empty());
+  ASSERT_FALSE(VoxelsOf(*maps.production).ObservedVoxels(kBrick).empty());
   ExpectSame(maps);
   maps.Remove(kBrick);
   ExpectSame(maps);
@@ -305,11 +306,11 @@ TEST_P(FloatMapTest, FloatsAreWithinTheRoundingOfProduction) {
   Pair maps = Begin(false, true);
   Drive(maps);
   for (const InstanceId id : ToyIds()) {
-    const auto observed = maps.production->ObservedVoxels(id);
+    const auto observed = VoxelsOf(*maps.production).ObservedVoxels(id);
     std::size_t different = 0;
     for (const Eigen::Vector3i& v : observed) {
       const auto value = maps.floats->ValueAt(id, v);
-      const float expected = maps.production->ValueAt(id, v)->distance_m;
+      const float expected = VoxelsOf(*maps.production).ValueAt(id, v)->distance_m;
       // A threshold between the two values would part them; here none does.
       ASSERT_TRUE(value) << Text(v) << " of object " << id;
       ASSERT_NEAR(value->distance, expected, kRoundingTolerance_m) << Text(v) << " of " << id;

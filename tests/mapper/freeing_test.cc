@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/mesh_checks.h"
 
@@ -26,15 +27,15 @@ std::size_t BlocksOf(const std::vector<Eigen::Vector3i>& voxels) {
 std::size_t BlocksNeeded(const MapRepresentation& map, Method method) {
   if (IsOneField(method)) {
     std::vector<Eigen::Vector3i> observed;
-    for (const auto& entry : map.GridOf(kBackground)->entries()) {
+    for (const auto& entry : VoxelsOf(map).GridOf(kBackground)->entries()) {
       if (entry.block->AnyObserved())
         observed.push_back(8 * Eigen::Vector3i(entry.index.x, entry.index.y, entry.index.z));
     }
     return BlocksOf(observed);
   }
   // `volumes` stores no lists.
-  std::size_t blocks = method == Method::kVolumes ? 0 : BlocksOf(map.ListedVoxels());
-  for (const InstanceId id : ToyIds()) blocks += BlocksOf(map.ObservedVoxels(id));
+  std::size_t blocks = method == Method::kVolumes ? 0 : BlocksOf(VoxelsOf(map).ListedVoxels());
+  for (const InstanceId id : ToyIds()) blocks += BlocksOf(VoxelsOf(map).ObservedVoxels(id));
   return blocks;
 }
 
@@ -53,7 +54,7 @@ TEST_P(Freeing, OnlyBlocksThatHoldSomethingAreKept) {
     ASSERT_EQ(map->Memory().blocks, BlocksNeeded(*map, GetParam()));
   }
   map->SetObjectPose(kBall, MakePose(0, Eigen::Vector3d::UnitZ(), {0.1, 0.1, 0.3}));
-  map->ListedVoxels();  // the index of anchored is made when it is asked for
+  VoxelsOf(*map).ListedVoxels();  // the index of anchored is made when it is asked for
   EXPECT_EQ(map->Memory().blocks, BlocksNeeded(*map, GetParam()));
   for (const InstanceId id : map->Objects()) map->Remove(id);
   // Free space that no observation in band ever labelled stays.

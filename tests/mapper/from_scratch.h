@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "mapper/map_representation.h"
+#include "mapper/scene_mesher.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/map_snapshot.h"
 #include "tests/mapper/toy_scene.h"
@@ -18,15 +18,15 @@ inline std::string BytesOf(const TriangleMesh& mesh) {
   return bytes;
 }
 
-// All meshes of a map against those of a copy, which starts without kept meshes.
-inline ::testing::AssertionResult SameAsFromScratch(const MapRepresentation& map) {
-  const auto copy = map.Clone();
+// All meshes that a mesher has of a map against those that the map makes.
+inline ::testing::AssertionResult SameAsFromScratch(const MapRepresentation& map,
+                                                    SceneMesher& mesher) {
   for (const InstanceId id : ToyIds()) {
-    if (BytesOf(map.ObjectMesh(id)) != BytesOf(copy->ObjectMesh(id))) {
+    if (BytesOf(mesher.ObjectMesh(map, id)) != BytesOf(map.ObjectMesh(id))) {
       return ::testing::AssertionFailure() << "mesh of object " << id;
     }
   }
-  if (BytesOf(map.SceneMesh()) != BytesOf(map.Clone()->SceneMesh())) {
+  if (BytesOf(mesher.SceneMesh(map)) != BytesOf(map.SceneMesh())) {
     return ::testing::AssertionFailure() << "scene";
   }
   return ::testing::AssertionSuccess();

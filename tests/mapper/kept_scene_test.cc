@@ -41,7 +41,8 @@ TEST_P(KeptScene, FollowsSmallChanges) {
     const auto map = MakeMap(GetParam(), config);
     Scene scene = TableWithToys();
     for (int i = 0; i < 3; ++i) SetPosesThenFuse(*map, RenderToys(scene, 2.0 * i, i));
-    map->SceneMesh();
+    SceneMesher mesher;
+    mesher.SceneMesh(*map);
     for (int event = 0; event < 24; ++event) {
       const auto id = static_cast<InstanceId>(1 + dice.Whole(3));
       const int what = dice.Whole(4);
@@ -62,9 +63,9 @@ TEST_P(KeptScene, FollowsSmallChanges) {
       }
       // Not after every event, so that changes add up.
       if (dice.Whole(3) == 0) continue;
-      const MeshWork work = map->UpdateMeshes();
+      const MeshWork work = mesher.Update(*map);
       if (work.changed > 0 && 4 * work.changed < work.blocks) ++small;
-      ASSERT_TRUE(SameAsFromScratch(*map)) << "seed " << seed << ", event " << event;
+      ASSERT_TRUE(SameAsFromScratch(*map, mesher)) << "seed " << seed << ", event " << event;
     }
     EXPECT_GT(map->SceneMesh().triangles.size(), 1000U);
   }
@@ -85,23 +86,24 @@ class KeptSceneOfLists : public ::testing::Test {
 
   void FuseAndMesh(int frames) {
     for (int i = 0; i < frames; ++i) SetPosesThenFuse(*map_, RenderToys(scene_, 0, i));
-    map_->UpdateMeshes();
+    mesher_.Update(*map_);
   }
-  std::size_t HiddenOfTable() const {
-    const TriangleMesh visible = map_->SceneMesh();
+  std::size_t HiddenOfTable() {
+    const TriangleMesh visible = mesher_.SceneMesh(*map_);
     const auto shown = std::count(visible.face_ids.begin(), visible.face_ids.end(), kBackground);
     return map_->ObjectMesh(kBackground).triangles.size() - static_cast<std::size_t>(shown);
   }
   // That so little changed that the change is followed.
-  void UpdateLittle() const {
-    const MeshWork work = map_->UpdateMeshes();
+  void UpdateLittle() {
+    const MeshWork work = mesher_.Update(*map_);
     ASSERT_GT(work.changed, 0U);
     ASSERT_LT(4 * work.changed, work.blocks);
-    ASSERT_TRUE(SameAsFromScratch(*map_));
+    ASSERT_TRUE(SameAsFromScratch(*map_, mesher_));
   }
 
   Scene scene_ = TableOnly();
   std::unique_ptr<MapRepresentation> map_;
+  SceneMesher mesher_;
 };
 
 TEST_F(KeptSceneOfLists, FollowsVotes) {
@@ -153,8 +155,9 @@ TEST(KeptSceneOfAnchored, HidesWhatMovedFarAway) {
       reference::Render(scene, reference::LookAt(birth + Eigen::Vector3d(0, 0.3, 0.4), birth), 1);
   map->SetObjectPose(kBall, scene.T_WO[kBall]);
   map->Fuse(frame, frame.mask);
+  SceneMesher mesher;
   const auto visible = [&] {
-    const TriangleMesh scene_mesh = map->SceneMesh();
+    const TriangleMesh scene_mesh = mesher.SceneMesh(*map);
     return std::count(scene_mesh.face_ids.begin(), scene_mesh.face_ids.end(), kBall);
   };
   const auto all = visible();
@@ -164,7 +167,7 @@ TEST(KeptSceneOfAnchored, HidesWhatMovedFarAway) {
   map->SetObjectPose(
       kBall, reference::MakePose(0, {0, 0, 1}, {0, 0, kTableTop_m - 0.055 - 2 * kToyVoxel_m}));
   EXPECT_LT(visible(), all);
-  EXPECT_EQ(map->SceneMesh().triangles.size(), VisibleTriangles(*map).size());
+  EXPECT_EQ(mesher.SceneMesh(*map).triangles.size(), VisibleTriangles(*map).size());
 }
 
 TEST(BlockSet, HoldsTheBlocksOfTheBoxesAndThoseNear) {

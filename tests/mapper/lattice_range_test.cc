@@ -8,13 +8,15 @@
 #include <functional>
 #include <limits>
 
+#include "mapper/map_editing.h"
 #include "mapper/map_file.h"
 #include "mapper/map_query.h"
 #include "mapper/map_reach.h"
 #include "mapper/methods/map_objects.h"
-#include "mapper/methods/volume_store.h"
 #include "mapper/store/byte_stream.h"
+#include "mapper/store/volume_store.h"
 #include "mapper/volume/pull_back.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/dyadic_scene.h"
 #include "tests/mapper/every_method.h"
 
@@ -89,7 +91,7 @@ TEST_P(LatticeEdge, JustInsideAMapIsTheOneOfTheOrigin) {
       PoseAndFuse(*far, frame);
     }
     EXPECT_TRUE(SameContentShifted(*map, *far, blocks));
-    EXPECT_EQ(far->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*far).FindFault(), std::nullopt);
     for (const InstanceId id : ToyIds()) {
       if (IsOneField(GetParam())) break;  // whose triangles go by where they are, rounded
       ExpectSameMeshShifted(map->ObjectMesh(id), far->ObjectMesh(id),
@@ -100,18 +102,19 @@ TEST_P(LatticeEdge, JustInsideAMapIsTheOneOfTheOrigin) {
     const double far_triangles = static_cast<double>(far->SceneMesh().triangles.size());
     EXPECT_NEAR(far_triangles, near_triangles, 0.1 * near_triangles);
 
-    const std::string file = MapToBytes(*far);
+    const std::string file = MapToBytes(*far).value();
     const auto loaded = MapFromBytes(file, "far.tsdf");
     ASSERT_TRUE(loaded.has_value()) << loaded.error().message;
-    EXPECT_TRUE(MapToBytes(*loaded->map) == file);
+    EXPECT_TRUE(MapToBytes(*loaded->map).value() == file);
     const Eigen::Vector3d above_table(0.2, 0.2, 0.02);
-    const auto near = MapQuery(*map).At(above_table);
-    const auto answer = MapQuery(*far).At(above_table + MetresOf(blocks, kDyadicVoxel_m));
+    const auto near = MapQuery::Of(*map).value().At(above_table);
+    const auto answer =
+        MapQuery::Of(*far).value().At(above_table + MetresOf(blocks, kDyadicVoxel_m));
     ASSERT_TRUE(near.visible.has_value());
     ASSERT_TRUE(answer.visible.has_value());
     EXPECT_NEAR(answer.visible->distance_m, near.visible->distance_m, 1e-3 * kDyadicVoxel_m);
     far->Remove(kBrick);
-    EXPECT_EQ(far->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*far).FindFault(), std::nullopt);
     EXPECT_FALSE(far->SceneMesh().triangles.empty());
   }
 }
@@ -128,10 +131,10 @@ TEST_P(LatticeEdge, AnyWorldJustInsideIsMapped) {
       ASSERT_TRUE(status.has_value()) << status.error().message;
       PoseAndFuse(*far, frame);
     }
-    EXPECT_GT(far->ListedVoxels().size(), map->ListedVoxels().size() / 2);
+    EXPECT_GT(VoxelsOf(*far).ListedVoxels().size(), VoxelsOf(*map).ListedVoxels().size() / 2);
     EXPECT_FALSE(far->SceneMesh().triangles.empty());
     EXPECT_FALSE(far->ObjectMesh(kBackground).triangles.empty());
-    EXPECT_EQ(far->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*far).FindFault(), std::nullopt);
     const auto rays = far->CastRays(reference::SmallCamera(),
                                     Shifted(DriveFrame(2), blocks, kToyVoxel_m).T_WC, {});
     EXPECT_GT(cv::countNonZero(rays.front().depth), 0);
@@ -164,7 +167,7 @@ TEST_P(LatticeEdge, JustOutsideIsRefusedAndSaysWhereThatIs) {
 TEST_P(LatticeEdge, FarFarOutIsRefused) {
   const auto map = MakeMap(GetParam(), DyadicConfig());
   PoseAndFuse(*map, DyadicFrame(0));
-  const std::string before = MapToBytes(*map);
+  const std::string before = MapToBytes(*map).value();
   for (const double metres : {1e5, -1e5, 2147483648.0 * kDyadicVoxel_m, 1e9, -1e300, 1.7e308}) {
     for (int axis = 0; axis < 3; ++axis) {
       Frame camera = DyadicFrame(7);
@@ -188,7 +191,7 @@ TEST_P(LatticeEdge, FarFarOutIsRefused) {
     frame.T_WO.at(kBall).linear() *= scale;
     ExpectRefused(Check(*map, frame), "frame 7: object 2's pose is no rigid motion");
   }
-  EXPECT_TRUE(MapToBytes(*map) == before);
+  EXPECT_TRUE(MapToBytes(*map).value() == before);
 }
 
 // A focal length so short that rays leave the range sideways.
@@ -225,7 +228,7 @@ TEST_P(LatticeEdge, APoseThatTakesAnObjectOutIsRefused) {
       return CheckReach(*map, nothing_seen, nothing_seen.mask, at(blocks));
     };
     // Its origin is still inside.
-    const std::string before = MapToBytes(*map);
+    const std::string before = MapToBytes(*map).value();
     if (direction.z < 0) {
       // Seen from above: nothing of it may be below its origin.
     } else if (poses_move) {
@@ -234,21 +237,21 @@ TEST_P(LatticeEdge, APoseThatTakesAnObjectOutIsRefused) {
       EXPECT_TRUE(check(kFurthestBlock).has_value());
     }
     ExpectBeyond(check(kFurthestBlock + 1), "frame 1: object 1 is posed at (");
-    EXPECT_TRUE(MapToBytes(*map) == before);
+    EXPECT_TRUE(MapToBytes(*map).value() == before);
     const auto status = check(kFurthestBlock - 8);
     ASSERT_TRUE(status.has_value()) << status.error().message;
     map->SetObjectPose(kBrick, at(kFurthestBlock - 8).at(kBrick));
-    EXPECT_EQ(map->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
     EXPECT_FALSE(map->SceneMesh().triangles.empty());
     // All of it, or what moved values do not lose at their rims.
     EXPECT_GT(map->ObjectMesh(kBrick).triangles.size(), triangles / 4);
-    const std::string file = MapToBytes(*map);
+    const std::string file = MapToBytes(*map).value();
     const auto loaded = MapFromBytes(file, "far.tsdf");
     ASSERT_TRUE(loaded.has_value()) << loaded.error().message;
-    EXPECT_TRUE(MapToBytes(*loaded->map) == file);
+    EXPECT_TRUE(MapToBytes(*loaded->map).value() == file);
     // And home again.
     map->SetObjectPose(kBrick, frame.T_WO.at(kBrick));
-    EXPECT_EQ(map->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
     EXPECT_FALSE(map->ObjectMesh(kBrick).triangles.empty());
   }
 }
@@ -294,10 +297,10 @@ TEST_P(LatticeEdge, AnObjectSeenAtPlacesFarApartIsMovedInNoTime) {
   map->SetObjectPose(kBrick, moved.T_WO.at(kBrick));
   EXPECT_GT(map->ObjectMesh(kBrick).triangles.size(), triangles / 4);
   EXPECT_FALSE(map->SceneMesh().triangles.empty());
-  EXPECT_FALSE(map->ListedVoxels().empty());
+  EXPECT_FALSE(VoxelsOf(*map).ListedVoxels().empty());
   map->CastRays(here.intrinsics, here.T_WC, {});
   PoseAndFuse(*map, DyadicFrame(2));
-  EXPECT_EQ(map->FindFault(), std::nullopt);
+  EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
 }
 
 TEST_P(LatticeEdge, AVolumeIsAddedInTheRangeOnly) {
@@ -306,34 +309,36 @@ TEST_P(LatticeEdge, AVolumeIsAddedInTheRangeOnly) {
   const TsdfGrid volume = CopyVolume(*from, kBall);
   ASSERT_FALSE(volume.empty());
   const auto map = DyadicMap(GetParam(), 1);
-  const std::string before = MapToBytes(*map);
+  const std::string before = MapToBytes(*map).value();
   for (const Index3& direction : Directions()) {
     const auto at = [&](int blocks) {
       Pose T = Pose::Identity();
       T.translation() = MetresOf(Times(direction, blocks), kDyadicVoxel_m);
       return T;
     };
-    ExpectBeyond(map->Add(kNew, volume, at(kFurthestBlock + 8), at(kFurthestBlock - 1)),
+    ExpectBeyond(EditingOf(*map).Add(kNew, volume, at(kFurthestBlock + 8), at(kFurthestBlock - 1)),
                  "object 7's lattice takes a part of it to (");
-    ExpectBeyond(map->Add(kNew, volume, Pose::Identity(), at(kFurthestBlock + 1)),
+    ExpectBeyond(EditingOf(*map).Add(kNew, volume, Pose::Identity(), at(kFurthestBlock + 1)),
                  "object 7 is posed at (");
-    ExpectBeyond(map->Add(kNew, volume, at(-9), at(kFurthestBlock - 1)),
+    ExpectBeyond(EditingOf(*map).Add(kNew, volume, at(-9), at(kFurthestBlock - 1)),
                  "object 7's pose in its own lattice is at (");
     Pose skew = at(1);
     skew.linear() *= 2;
-    ExpectRefused(map->Add(kNew, volume, skew, at(1)), "object 7's lattice's pose is no rigid");
-    EXPECT_TRUE(MapToBytes(*map) == before);
+    ExpectRefused(EditingOf(*map).Add(kNew, volume, skew, at(1)),
+                  "object 7's lattice's pose is no rigid");
+    EXPECT_TRUE(MapToBytes(*map).value() == before);
     const auto good = map->Clone();
-    const auto added = good->Add(kNew, volume, at(kEdgeBlocks), at(kEdgeBlocks));
+    const auto added = EditingOf(*good).Add(kNew, volume, at(kEdgeBlocks), at(kEdgeBlocks));
     ASSERT_TRUE(added.has_value()) << added.error().message;
     EXPECT_FALSE(good->ObjectMesh(kNew).triangles.empty());
-    EXPECT_EQ(good->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*good).FindFault(), std::nullopt);
   }
   // A volume that has a block out there itself.
   TsdfGrid far;
   far.Add({kFurthestBlock + 1, 0, 0}, std::make_unique<TsdfBlock>(*volume.entries()[0].block));
-  ExpectBeyond(map->Add(kNew, far, Pose::Identity(), Pose::Identity()), "object 7's volume has");
-  EXPECT_TRUE(MapToBytes(*map) == before);
+  ExpectBeyond(EditingOf(*map).Add(kNew, far, Pose::Identity(), Pose::Identity()),
+               "object 7's volume has");
+  EXPECT_TRUE(MapToBytes(*map).value() == before);
 }
 
 std::unique_ptr<TsdfBlock> BlockWithSurface() {

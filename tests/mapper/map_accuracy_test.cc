@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/toy_scene.h"
@@ -42,9 +43,9 @@ TEST(AccuracyTest, OneFrameOfAPlaneGivesTheDistanceAlongTheRay) {
     const MapConfig config = ToyConfig();
     double sum = 0;
     int count = 0;
-    for (const auto& v : map->ObservedVoxels(kBackground)) {
+    for (const auto& v : VoxelsOf(*map).ObservedVoxels(kBackground)) {
       const double s = AlongRay(T_WC.translation(), kToyVoxel_m * v.cast<double>());
-      const double stored = map->ValueAt(kBackground, v)->distance_m;
+      const double stored = VoxelsOf(*map).ValueAt(kBackground, v)->distance_m;
       ASSERT_LE(stored, config.front());
       ASSERT_GE(stored, -config.back());
       const double error = (stored - std::min<double>(s, config.front())) / kToyVoxel_m;

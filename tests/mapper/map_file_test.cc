@@ -6,9 +6,10 @@
 
 #include "core/files.h"
 #include "core/limits.h"
-#include "mapper/methods/volume_store.h"
 #include "mapper/store/byte_stream.h"
 #include "mapper/store/section_file.h"
+#include "mapper/store/volume_store.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/core/temp_folder.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/every_method.h"
@@ -47,12 +48,12 @@ TEST_P(MapFile, TheLoadedMapIsTheSavedOneAndStaysSo) {
   // A pose that is set and not yet acted on, and one of an object that nobody has seen.
   saved->SetObjectPose(kTray, MakePose(0.2, Eigen::Vector3d::UnitZ(), {0.05, 0.1, 0.03}));
   saved->SetObjectPose(9, MakePose(0.2, Eigen::Vector3d::UnitZ(), {0.05, 0.1, 0.03}));
-  const std::string file = MapToBytes(*saved);
+  const std::string file = MapToBytes(*saved).value();
   const auto loaded = Loaded(file).map;
   EXPECT_EQ(loaded->method(), GetParam());
   EXPECT_EQ(loaded->config(), config);
-  EXPECT_EQ(loaded->FindFault(), std::nullopt);
-  EXPECT_TRUE(MapToBytes(*loaded) == file);
+  EXPECT_EQ(VoxelsOf(*loaded).FindFault(), std::nullopt);
+  EXPECT_TRUE(MapToBytes(*loaded).value() == file);
   EXPECT_TRUE(SnapshotOf(*loaded, ToyIds()) == SnapshotOf(*saved, ToyIds()));
   for (int i = 3; i < 6; ++i) {
     for (const auto& map : {saved.get(), loaded.get()}) {
@@ -60,9 +61,9 @@ TEST_P(MapFile, TheLoadedMapIsTheSavedOneAndStaysSo) {
       if (i == 4) map->Remove(kBall);
       if (i == 4) map->SetObjectPose(9, Pose::Identity());
     }
-    ASSERT_TRUE(MapToBytes(*loaded) == MapToBytes(*saved)) << "frame " << i;
+    ASSERT_TRUE(MapToBytes(*loaded).value() == MapToBytes(*saved).value()) << "frame " << i;
   }
-  EXPECT_FALSE(MapToBytes(*loaded) == file);
+  EXPECT_FALSE(MapToBytes(*loaded).value() == file);
   EXPECT_TRUE(SnapshotOf(*loaded, ToyIds()) == SnapshotOf(*saved, ToyIds()));
   EXPECT_EQ(loaded->Memory().blocks, saved->Memory().blocks);
 }
@@ -70,27 +71,27 @@ TEST_P(MapFile, TheLoadedMapIsTheSavedOneAndStaysSo) {
 // The same content by another path: blocks come in another order.
 TEST_P(MapFile, TheBytesAreThoseOfTheContentAndForAnyThreads) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
-  const std::string file = MapToBytes(*map);
+  const std::string file = MapToBytes(*map).value();
   for (const std::size_t threads : {1U, 2U, 4U}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    EXPECT_TRUE(MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 2)) == file) << threads;
-    EXPECT_TRUE(MapToBytes(*Loaded(file).map) == file) << threads;
+    EXPECT_TRUE(MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 2)).value() == file) << threads;
+    EXPECT_TRUE(MapToBytes(*Loaded(file).map).value() == file) << threads;
   }
-  EXPECT_TRUE(MapToBytes(*map->Clone()) == file);
+  EXPECT_TRUE(MapToBytes(*map->Clone()).value() == file);
 }
 
 TEST_P(MapFile, AnEmptyMapIsAMap) {
   const auto map = MakeMap(GetParam(), ToyConfig());
-  const auto loaded = Loaded(MapToBytes(*map)).map;
+  const auto loaded = Loaded(MapToBytes(*map).value()).map;
   EXPECT_TRUE(loaded->Objects().empty());
   SetPosesThenFuse(*map, DriveFrame(0));
   SetPosesThenFuse(*loaded, DriveFrame(0));
-  EXPECT_TRUE(MapToBytes(*loaded) == MapToBytes(*map));
+  EXPECT_TRUE(MapToBytes(*loaded).value() == MapToBytes(*map).value());
 }
 
 TEST_P(MapFile, ARunComesBack) {
   const MappedRun run = SomeRun();
-  const auto loaded = Loaded(MapToBytes(*MakeMap(GetParam(), ToyConfig()), &run));
+  const auto loaded = Loaded(MapToBytes(*MakeMap(GetParam(), ToyConfig()), &run).value());
   ASSERT_TRUE(loaded.run.has_value());
   EXPECT_EQ(loaded.run->sequence, run.sequence);
   EXPECT_EQ(loaded.run->objects, run.objects);
@@ -101,7 +102,7 @@ TEST_P(MapFile, ARunComesBack) {
     EXPECT_EQ(loaded.run->trajectories.at(kBrick).at(frame).matrix(),
               run.trajectories.at(kBrick).at(frame).matrix());
   }
-  EXPECT_FALSE(Loaded(MapToBytes(*loaded.map)).run.has_value());
+  EXPECT_FALSE(Loaded(MapToBytes(*loaded.map).value()).run.has_value());
 }
 
 // Names become file names of what is written; the checksums of such a file are right.
@@ -110,7 +111,7 @@ TEST(MapFileNames, ObjectsWithNamesThatEscapeAreRefused) {
   const auto sentence = [&](const std::vector<ObjectInfo>& objects) {
     MappedRun run = SomeRun();
     run.objects = objects;
-    const auto loaded = MapFromBytes(MapToBytes(*map, &run), "map.tsdf");
+    const auto loaded = MapFromBytes(MapToBytes(*map, &run).value(), "map.tsdf");
     return loaded ? std::string() : loaded.error().message;
   };
   EXPECT_EQ(sentence({{1, "brick", "toy"}}), "");
@@ -134,9 +135,9 @@ TEST(MapFileNames, ARunNamesAllObjectsInPlainText) {
   for (const InstanceId id : map->Objects()) {
     if (id != kBackground && id != kBrick) run.objects.push_back({id, fmt::format("o{}", id), ""});
   }
-  ASSERT_TRUE(MapFromBytes(MapToBytes(*map, &run), "map.tsdf").has_value());
+  ASSERT_TRUE(MapFromBytes(MapToBytes(*map, &run).value(), "map.tsdf").has_value());
   const auto sentence = [&](const MappedRun& wrong) {
-    const auto loaded = MapFromBytes(MapToBytes(*map, &wrong), "map.tsdf");
+    const auto loaded = MapFromBytes(MapToBytes(*map, &wrong).value(), "map.tsdf");
     return loaded ? std::string() : loaded.error().message;
   };
   MappedRun wrong = run;
@@ -183,7 +184,7 @@ TEST(MapFileSize, BlocksAreCountedBeforeTheyAreMade) {
   }
   const auto map = MakeMap(Method::kVolumes, ToyConfig());
   SetPosesThenFuse(*map, frame);
-  const std::string file = MapToBytes(*map);
+  const std::string file = MapToBytes(*map).value();
   Limits limits;
   std::int64_t raw = 0;
   const auto sections = UnpackSections(file, "map.tsdf").value();
@@ -203,7 +204,7 @@ TEST(MapFileSize, BlocksAreCountedBeforeTheyAreMade) {
 
 // Every byte of a file is under a checksum, so a file that differs in one is refused.
 TEST_P(MapFile, EveryFlippedByteIsRefused) {
-  const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1));
+  const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1)).value();
   Dice dice(17);
   constexpr int kFlips = 2000;
   for (int i = 0; i < kFlips; ++i) {
@@ -222,7 +223,7 @@ TEST_P(MapFile, EveryFlippedByteIsRefused) {
 // Where parts begin and end, within their headers and contents, and everywhere near both ends.
 TEST_P(MapFile, EveryTruncationIsRefused) {
   const MappedRun run = SomeRun();
-  const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1), &run);
+  const std::string file = MapToBytes(*DrivenMap(GetParam(), ToyConfig(), 1), &run).value();
   std::vector<std::size_t> lengths;
   for (std::size_t length = 0; length < 300; ++length) lengths.push_back(length);
   for (std::size_t back = 1; back < 100; ++back) lengths.push_back(file.size() - back);
@@ -251,7 +252,7 @@ TEST_P(MapFile, EveryTruncationIsRefused) {
 TEST_P(MapFile, MadeUpContentIsRefusedOrInOrder) {
   const MappedRun run = SomeRun();
   auto map = DrivenMap(GetParam(), ToyConfig(), 1);
-  const std::string file = MapToBytes(*map, &run);
+  const std::string file = MapToBytes(*map, &run).value();
   const auto sections = UnpackSections(file, "map.tsdf");
   ASSERT_TRUE(sections.has_value());
   Dice dice(29);
@@ -280,7 +281,7 @@ TEST_P(MapFile, MadeUpContentIsRefusedOrInOrder) {
       ASSERT_EQ(loaded.error().kind, ErrorKind::kData) << loaded.error().message;
       continue;
     }
-    ASSERT_EQ(loaded->map->FindFault(), std::nullopt) << "round " << i;
+    ASSERT_EQ(VoxelsOf(*loaded->map).FindFault(), std::nullopt) << "round " << i;
     SetPosesThenFuse(*loaded->map, DriveFrame(1));
     EXPECT_FALSE(loaded->map->SceneMesh().triangles.empty());
   }
@@ -293,7 +294,7 @@ TEST(MapFileErrors, ALatticeThatIsNotTheOneAtBirthIsRefused) {
   const Pose moved = MakePose(0.4, Eigen::Vector3d::UnitZ(), {0.3, 0, 0});
   const auto error_of = [&](Method method, const std::optional<Pose>& birth) {
     const auto map = DrivenMap(method, ToyConfig(), 2);
-    Sections sections = UnpackSections(MapToBytes(*map), "map.tsdf").value();
+    Sections sections = UnpackSections(MapToBytes(*map).value(), "map.tsdf").value();
     ByteReader bytes(sections.at("VOLS"));
     ObjectVolumes volumes = LoadVolumes(bytes, ToyConfig()).value();
     volumes.at(kBrick).T_WO_birth = birth;
@@ -336,7 +337,7 @@ TEST(MapFileErrors, EachIsOneSentenceThatNamesTheFile) {
     EXPECT_EQ(loaded.error().message.find('\n'), std::string::npos) << loaded.error().message;
     return loaded.error().message.substr(path.string().size());
   };
-  const std::string file = MapToBytes(*MakeMap(Method::kTsdfpp, ToyConfig()));
+  const std::string file = MapToBytes(*MakeMap(Method::kTsdfpp, ToyConfig())).value();
   EXPECT_EQ(error_of(""), ": is not a map file");
   EXPECT_EQ(error_of("ply\nformat binary_little_endian 1.0\n"), ": is not a map file");
   EXPECT_EQ(error_of(file.substr(0, 20)), ": is cut short, within its header");

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "mapper/index/cover.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/every_method.h"
 
 namespace tsdfpp {
@@ -23,7 +24,7 @@ class Invariants : public EveryMethodTest {
     std::size_t unobserved = 0;
   };
   static Place FindPlace(const MapRepresentation& map) {
-    for (const auto& entry : map.GridOf(kBrick)->entries()) {
+    for (const auto& entry : VoxelsOf(map).GridOf(kBrick)->entries()) {
       Place place{entry.block.get(), kBlockVoxels, kBlockVoxels};
       for (std::size_t i = 0; i < kBlockVoxels; ++i) {
         (entry.block->weight[i] > 0 ? place.observed : place.unobserved) = i;
@@ -35,11 +36,11 @@ class Invariants : public EveryMethodTest {
 
   void ExpectFault(const std::string& words, const std::function<void(Place&)>& tamper) {
     const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
-    ASSERT_EQ(map->FindFault(), std::nullopt);
+    ASSERT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
     Place place = FindPlace(*map);
     ASSERT_NE(place.block, nullptr);
     tamper(place);
-    const auto fault = map->FindFault();
+    const auto fault = VoxelsOf(*map).FindFault();
     ASSERT_TRUE(fault.has_value()) << words;
     EXPECT_NE(fault->find(words), std::string::npos) << *fault;
   }
@@ -104,14 +105,14 @@ TEST_P(Invariants, AnEmptyBlockIsNoticed) {
 TEST_P(ListInvariants, AListThatDoesNotFitTheValuesIsNoticed) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
   const InstanceId id = IsOneField(GetParam()) ? kBackground : kBrick;
-  for (const auto& entry : map->GridOf(id)->entries()) {
+  for (const auto& entry : VoxelsOf(*map).GridOf(id)->entries()) {
     for (int place = 0; place < kBlockVoxels; ++place) entry.block->Clear(place);
     entry.block->weight[0] = 1;
     entry.block->distance[0] = ToyConfig().front();
     entry.block->UpdateMasks(ToyConfig().back());
   }
-  RenewCovers(*map->GridOf(id));
-  const auto fault = map->FindFault();
+  RenewCovers(*VoxelsOf(*map).GridOf(id));
+  const auto fault = VoxelsOf(*map).FindFault();
   ASSERT_TRUE(fault.has_value());
   EXPECT_TRUE(fault->find("is listed at voxel") != std::string::npos ||
               fault->find("the label of voxel") != std::string::npos)
@@ -120,28 +121,28 @@ TEST_P(ListInvariants, AListThatDoesNotFitTheValuesIsNoticed) {
 
 TEST(AnchoredInvariants, AnOrderThatIsNotByDistanceAndAStaleIndexAreNoticed) {
   const auto map = DrivenMap(Method::kTsdfppAnchored, ToyConfig(), 2);
-  ASSERT_EQ(map->FindFault(), std::nullopt);
+  ASSERT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
   // Where the tray lies on the table both are listed; the second one is made the nearer one.
   bool swapped = false;
-  for (const auto& v : map->ListedVoxels()) {
-    const auto list = map->ListAt(v);
+  for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
+    const auto list = VoxelsOf(*map).ListAt(v);
     if (list.size() < 2 || swapped) continue;
     const Index3 voxel = ToIndex3(v);
     const auto i = static_cast<std::size_t>(PlaceInBlock(voxel));
-    TsdfBlock* block = map->GridOf(list[1].id)->Find(BlockOf(voxel));
+    TsdfBlock* block = VoxelsOf(*map).GridOf(list[1].id)->Find(BlockOf(voxel));
     if (block == nullptr || map->ObjectLattice(list[1].id).matrix() != Pose::Identity().matrix() ||
         map->ObjectLattice(list[0].id).matrix() != Pose::Identity().matrix() ||
         !Bit(block->band, PlaceInBlock(voxel))) {
       continue;
     }
-    const float other = map->ValueAt(list[0].id, v)->distance_m;
+    const float other = VoxelsOf(*map).ValueAt(list[0].id, v)->distance_m;
     const float nearer = 0.5F * (other - ToyConfig().back());
     if (!(nearer < other && nearer >= -ToyConfig().back())) continue;
     block->distance[i] = nearer;
     swapped = true;
   }
   ASSERT_TRUE(swapped);
-  const auto fault = map->FindFault();
+  const auto fault = VoxelsOf(*map).FindFault();
   ASSERT_TRUE(fault.has_value());
   EXPECT_NE(fault->find("which is less near"), std::string::npos) << *fault;
 }

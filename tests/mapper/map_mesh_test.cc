@@ -6,6 +6,7 @@
 #include <functional>
 #include <set>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/toy_scene.h"
@@ -172,7 +173,7 @@ TEST(SceneMeshTest, OfAStaticSceneWithRoomBetweenObjectsLosesNoTriangle) {
 
 bool IsCubeObserved(const MapRepresentation& map, InstanceId id, const Eigen::Vector3i& cube) {
   for (int i = 0; i < 8; ++i) {
-    if (!map.ValueAt(id, reference::CubeCorner(cube, i))) return false;
+    if (!VoxelsOf(map).ValueAt(id, reference::CubeCorner(cube, i))) return false;
   }
   return true;
 }

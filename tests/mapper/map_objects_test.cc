@@ -5,7 +5,9 @@
 
 #include <algorithm>
 
+#include "mapper/map_editing.h"
 #include "mapper/volume/object_volume.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/map_snapshot.h"
@@ -57,10 +59,10 @@ TEST_P(MapObjects, ARenamedObjectIsTheSameObject) {
 TEST_P(MapObjects, RenamingThereAndBackChangesNothing) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 3);
   const std::string before = SnapshotOf(*map, ToyIds());
-  ASSERT_TRUE(map->Rename(kBrick, kNew).has_value());
+  ASSERT_TRUE(EditingOf(*map).Rename(kBrick, kNew).has_value());
   EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kBackground, kBall, kTray, kNew}));
   EXPECT_FALSE(SnapshotOf(*map, ToyIds()) == before);
-  ASSERT_TRUE(map->Rename(kNew, kBrick).has_value());
+  ASSERT_TRUE(EditingOf(*map).Rename(kNew, kBrick).has_value());
   EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
 }
 
@@ -73,20 +75,21 @@ TEST_P(MapObjects, WhatCannotBeRenamedOrAddedIsRefused) {
     EXPECT_EQ(status.error().kind, ErrorKind::kUsage);
     return status.error().message;
   };
-  EXPECT_EQ(message(map->Rename(17, kNew)), "object 17 is not in the map");
-  EXPECT_EQ(message(map->Rename(kBrick, kBall)),
+  EXPECT_EQ(message(EditingOf(*map).Rename(17, kNew)), "object 17 is not in the map");
+  EXPECT_EQ(message(EditingOf(*map).Rename(kBrick, kBall)),
             "object 2 is in the map already, expected a new id");
-  EXPECT_EQ(message(map->Rename(kBrick, kBrick)),
+  EXPECT_EQ(message(EditingOf(*map).Rename(kBrick, kBrick)),
             "object 1 is in the map already, expected a new id");
-  EXPECT_EQ(message(map->Rename(kBrick, 9)), "object 9 is in the map already, expected a new id");
-  EXPECT_EQ(message(map->Rename(kBackground, kNew)),
+  EXPECT_EQ(message(EditingOf(*map).Rename(kBrick, 9)),
+            "object 9 is in the map already, expected a new id");
+  EXPECT_EQ(message(EditingOf(*map).Rename(kBackground, kNew)),
             "id 0 is the background, expected an object's");
-  EXPECT_EQ(message(map->Rename(kBrick, kNoInstance)),
+  EXPECT_EQ(message(EditingOf(*map).Rename(kBrick, kNoInstance)),
             "id 65535 is kept for 'no object', expected an object's");
   const Pose here = Pose::Identity();
-  EXPECT_EQ(message(map->Add(kBall, {}, here, here)),
+  EXPECT_EQ(message(EditingOf(*map).Add(kBall, {}, here, here)),
             "object 2 is in the map already, expected a new id");
-  EXPECT_EQ(message(map->Add(kBackground, {}, here, here)),
+  EXPECT_EQ(message(EditingOf(*map).Add(kBackground, {}, here, here)),
             "id 0 is the background, expected an object's");
   EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
 }
@@ -101,22 +104,23 @@ TEST_P(MapObjects, AnObjectThatIsAddedHasTheVolumeThatItWasGiven) {
   const auto before = map->Clone();
   map->Remove(kBrick);
   const Pose T_WO = DriveFrame(1).T_WO.at(kBrick);
-  ASSERT_TRUE(map->Add(kNew, volume, T_WL, T_WO).has_value());
-  EXPECT_EQ(map->FindFault(), std::nullopt);
+  ASSERT_TRUE(EditingOf(*map).Add(kNew, volume, T_WL, T_WO).has_value());
+  EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
   std::size_t compared = 0;
-  for (const auto& v : before->ObservedVoxels(kBrick)) {
-    const auto expected = before->ValueAt(kBrick, v);
-    ASSERT_TRUE(SameValue(map->ValueAt(kNew, v), expected)) << Text(v);
+  for (const auto& v : VoxelsOf(*before).ObservedVoxels(kBrick)) {
+    const auto expected = VoxelsOf(*before).ValueAt(kBrick, v);
+    ASSERT_TRUE(SameValue(VoxelsOf(*map).ValueAt(kNew, v), expected)) << Text(v);
     ++compared;
   }
   EXPECT_GT(compared, 150U);
-  EXPECT_TRUE(SameVoxels(map->ObservedVoxels(kNew), before->ObservedVoxels(kBrick)));
+  EXPECT_TRUE(
+      SameVoxels(VoxelsOf(*map).ObservedVoxels(kNew), VoxelsOf(*before).ObservedVoxels(kBrick)));
   if (IsAnchored(GetParam())) {
     // The product of the poses is rounded.
     EXPECT_LT((map->ObjectLattice(kNew).matrix() - T_WL.matrix()).cwiseAbs().maxCoeff(), 1e-14);
   } else if (!IsOneField(GetParam())) {
-    for (const auto& v : map->ListedVoxels()) {
-      const auto list = map->ListAt(v);
+    for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
+      const auto list = VoxelsOf(*map).ListAt(v);
       for (std::size_t i = 0; i < list.size(); ++i) {
         if (list[i].id != kNew) continue;
         ASSERT_EQ(i, 0U) << Text(v) << Text(list);
@@ -127,10 +131,10 @@ TEST_P(MapObjects, AnObjectThatIsAddedHasTheVolumeThatItWasGiven) {
   // It is an object like the others: it moves by its pose, and can be saved, seen and removed.
   map->SetObjectPose(kNew, T_WO);
   map->SetObjectPose(kNew, MakePose(0, Eigen::Vector3d::UnitZ(), {0.0, 0.0, 0.1}) * T_WO);
-  EXPECT_EQ(map->FindFault(), std::nullopt);
+  EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
   EXPECT_FALSE(map->ObjectMesh(kNew).triangles.empty());
   map->Remove(kNew);
-  EXPECT_EQ(map->FindFault(), std::nullopt);
+  EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
 }
 
 // Into an empty map of each method, from an anchored one that has turned the object.
@@ -139,8 +143,9 @@ TEST_P(MapObjects, AnObjectComesFromAnotherMapAtItsPlace) {
   const auto map = MakeMap(GetParam(), ToyConfig());
   const Pose T_WL = other->ObjectLattice(kBrick);
   ASSERT_FALSE(SameNumbers(T_WL, Pose::Identity()));
-  ASSERT_TRUE(map->Add(kNew, *other->GridOf(kBrick), T_WL, DriveFrame(3).T_WO.at(kBrick)));
-  EXPECT_EQ(map->FindFault(), std::nullopt);
+  ASSERT_TRUE(EditingOf(*map).Add(kNew, *VoxelsOf(*other).GridOf(kBrick), T_WL,
+                                  DriveFrame(3).T_WO.at(kBrick)));
+  EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
   EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kNew}));
   const TriangleMesh mesh = map->ObjectMesh(kNew);
   const TriangleMesh expected = other->ObjectMesh(kBrick);

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <set>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/map_snapshot.h"
 #include "tests/mapper/mesh_checks.h"
@@ -59,8 +60,8 @@ TEST_P(EveryMethod, ListsHoldNoObjectTwiceAndNoneTooMany) {
   const auto layers = static_cast<std::size_t>(LayersOf(GetParam(), ToyConfig()));
   const auto map = MakeMap(GetParam(), ToyConfig());
   Drive(*map, 5, [&] {
-    for (const auto& v : map->ListedVoxels()) {
-      const auto list = map->ListAt(v);
+    for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
+      const auto list = VoxelsOf(*map).ListAt(v);
       std::set<InstanceId> ids;
       for (const Listing& entry : list) ids.insert(entry.id);
       ASSERT_EQ(ids.size(), list.size()) << Text(v) << Text(list);
@@ -96,8 +97,8 @@ TEST_P(EveryMethod, ObjectsAreListedInOrderAndLeaveWhenRemoved) {
   map->Remove(kBall);
   EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kBackground, kBrick, kTray}));
   EXPECT_TRUE(map->ObjectMesh(kBall).triangles.empty());
-  for (const auto& v : map->ListedVoxels()) {
-    for (const Listing& entry : map->ListAt(v)) ASSERT_NE(entry.id, kBall) << Text(v);
+  for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
+    for (const Listing& entry : VoxelsOf(*map).ListAt(v)) ASSERT_NE(entry.id, kBall) << Text(v);
   }
 }
 
@@ -148,7 +149,7 @@ TEST_P(EveryMethod, MemoryCountsBlocks) {
   Drive(*map, 1);
   const MapMemory memory = map->Memory();
   std::set<VoxelKey> blocks;
-  for (const auto& v : map->ObservedVoxels(kBackground)) {
+  for (const auto& v : VoxelsOf(*map).ObservedVoxels(kBackground)) {
     blocks.insert({v.x() >> 3, v.y() >> 3, v.z() >> 3});
   }
   EXPECT_GE(memory.blocks, blocks.size());
@@ -159,8 +160,8 @@ TEST_P(EveryMethod, MemoryCountsBlocks) {
 TEST(TsdfppProperties, TheBackgroundIsNeverDropped) {
   const auto map = MappedToys(Method::kTsdfpp, ToyConfig(), 2);
   std::vector<Eigen::Vector3i> table;
-  for (const auto& v : map->ListedVoxels()) {
-    for (const Listing& entry : map->ListAt(v)) {
+  for (const auto& v : VoxelsOf(*map).ListedVoxels()) {
+    for (const Listing& entry : VoxelsOf(*map).ListAt(v)) {
       if (entry.id == kBackground) table.push_back(v);
     }
   }
@@ -169,10 +170,10 @@ TEST(TsdfppProperties, TheBackgroundIsNeverDropped) {
   std::size_t overflowed = 0;
   for (const InstanceId id : {kBrick, kBall, kTray}) {
     std::map<VoxelKey, std::size_t> lengths;
-    for (const auto& v : table) lengths[{v.x(), v.y(), v.z()}] = map->ListAt(v).size();
+    for (const auto& v : table) lengths[{v.x(), v.y(), v.z()}] = VoxelsOf(*map).ListAt(v).size();
     map->SetObjectPose(id, MakePose(0.4 * id, Eigen::Vector3d::UnitZ(), place));
     for (const auto& v : table) {
-      const auto list = map->ListAt(v);
+      const auto list = VoxelsOf(*map).ListAt(v);
       const bool listed = std::any_of(list.begin(), list.end(),
                                       [](const Listing& e) { return e.id == kBackground; });
       ASSERT_TRUE(listed) << Text(v) << Text(list);
@@ -236,7 +237,7 @@ TEST(AnchoredProperties, TenThousandSmallMovesLeaveTheIndexOfOneMove) {
                         .toRotationMatrix();
     walked->SetObjectPose(id, T_WO);
     if (i % kMovesBetweenQueries == 0) {
-      ASSERT_FALSE(walked->ListedVoxels().empty());
+      ASSERT_FALSE(VoxelsOf(*walked).ListedVoxels().empty());
     }
   }
   for (const InstanceId id : {kBrick, kBall}) {
@@ -269,12 +270,12 @@ TEST(TsdfppProperties, OnAStaticSceneItsVolumesAreAnchoreds) {
     EXPECT_TRUE(a == b) << "mesh of " << id;
   }
   // Who is listed is the same too; only the order may differ.
-  ASSERT_TRUE(SameVoxels(tsdfpp->ListedVoxels(), anchored->ListedVoxels()));
-  for (const auto& v : tsdfpp->ListedVoxels()) {
+  ASSERT_TRUE(SameVoxels(VoxelsOf(*tsdfpp).ListedVoxels(), VoxelsOf(*anchored).ListedVoxels()));
+  for (const auto& v : VoxelsOf(*tsdfpp).ListedVoxels()) {
     std::set<InstanceId> a;
     std::set<InstanceId> b;
-    for (const Listing& entry : tsdfpp->ListAt(v)) a.insert(entry.id);
-    for (const Listing& entry : anchored->ListAt(v)) b.insert(entry.id);
+    for (const Listing& entry : VoxelsOf(*tsdfpp).ListAt(v)) a.insert(entry.id);
+    for (const Listing& entry : VoxelsOf(*anchored).ListAt(v)) b.insert(entry.id);
     ASSERT_EQ(a, b) << Text(v);
   }
 }
@@ -306,17 +307,19 @@ TEST(TsdfppProperties, ObservedResamplingKeepsTheRimAndTheSameInside) {
   const auto all = MappedToys(Method::kTsdfpp, config, 3);
   config.resampling = Resampling::kObserved;
   const auto observed = MappedToys(Method::kTsdfpp, config, 3);
-  const std::size_t at_first = all->ObservedVoxels(kBrick).size();
+  const std::size_t at_first = VoxelsOf(*all).ObservedVoxels(kBrick).size();
   const Pose pose = MakePose(0.45, Eigen::Vector3d::UnitZ(), {-0.13, 0.04, kTableTop_m + 0.045});
   all->SetObjectPose(kBrick, pose);
   observed->SetObjectPose(kBrick, pose);
-  for (const auto& v : all->ObservedVoxels(kBrick)) {
-    ASSERT_TRUE(SameValue(observed->ValueAt(kBrick, v), all->ValueAt(kBrick, v))) << Text(v);
+  for (const auto& v : VoxelsOf(*all).ObservedVoxels(kBrick)) {
+    ASSERT_TRUE(
+        SameValue(VoxelsOf(*observed).ValueAt(kBrick, v), VoxelsOf(*all).ValueAt(kBrick, v)))
+        << Text(v);
   }
   // A tenth: rounding gives and takes at the rim alike, so that the volume stays about as large.
-  EXPECT_LT(all->ObservedVoxels(kBrick).size(), at_first * 9 / 10);
-  EXPECT_GT(observed->ObservedVoxels(kBrick).size(), at_first * 9 / 10);
-  EXPECT_LT(observed->ObservedVoxels(kBrick).size(), at_first * 11 / 10);
+  EXPECT_LT(VoxelsOf(*all).ObservedVoxels(kBrick).size(), at_first * 9 / 10);
+  EXPECT_GT(VoxelsOf(*observed).ObservedVoxels(kBrick).size(), at_first * 9 / 10);
+  EXPECT_LT(VoxelsOf(*observed).ObservedVoxels(kBrick).size(), at_first * 11 / 10);
 }
 
 // The table is mapped bare, then the tray, flat enough for its band to reach through to the table,

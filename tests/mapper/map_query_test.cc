@@ -6,6 +6,7 @@
 
 #include <limits>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/every_method.h"
 
@@ -44,7 +45,7 @@ TEST_P(Query, DistanceAndGradientOfAPlane) {
   const auto map = MakeMap(GetParam(), ToyConfig());
   for (int i = 0; i < 3; ++i)
     SetPosesThenFuse(*map, reference::Render(scene, FromAbove(kHeight_m)));
-  const MapQuery query(*map);
+  const MapQuery query = MapQuery::Of(*map).value();
   Dice dice(1);
   for (int i = 0; i < 500; ++i) {
     const double d = dice.Uniform(-0.03, 0.03);
@@ -82,7 +83,7 @@ TEST_P(Query, DistanceAndGradientOfASphere) {
   const auto map = MakeMap(GetParam(), ToyConfig());
   map->Fuse(reference::Render(scene, FromAbove(0.8), 1, camera),
             reference::Render(scene, FromAbove(0.8), 1, camera).mask);
-  const MapQuery query(*map);
+  const MapQuery query = MapQuery::Of(*map).value();
   Dice dice(2);
   int asked = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -136,7 +137,7 @@ TEST_P(LayeredQuery, AgreesWithTheDenseReference) {
   SideBySide maps(GetParam(), ToyConfig(), ToyBox(), ToyIds());
   for (int i = 0; i < 3; ++i) maps.SetPosesAndFuse(DriveFrame(i));
   maps.SetObjectPose(kTray, MakePose(0.7, {0.1, 0.2, 1}, {-0.05, 0.0, kTableTop_m + 0.03}));
-  const MapQuery query(maps.map());
+  const MapQuery query = MapQuery::Of(maps.map()).value();
   Dice dice(3);
   std::map<InstanceId, int> answered;
   int hidden = 0;
@@ -191,7 +192,7 @@ TEST_P(LayeredQuery, AgreesWithTheDenseReference) {
 
 TEST(QueryOfOneField, AnswersWithTheLabelOfTheNearestVoxel) {
   const auto map = DrivenMap(Method::kTsdf, ToyConfig(), 2);
-  const MapQuery query(*map);
+  const MapQuery query = MapQuery::Of(*map).value();
   Dice dice(4);
   std::map<InstanceId, int> answered;
   for (int i = 0; i < 6000; ++i) {
@@ -202,7 +203,7 @@ TEST(QueryOfOneField, AnswersWithTheLabelOfTheNearestVoxel) {
     ASSERT_EQ(answer.objects.size(), 1U);
     const Eigen::Vector3i nearest =
         (p / kToyVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor().matrix().cast<int>();
-    const auto list = map->ListAt(nearest);
+    const auto list = VoxelsOf(*map).ListAt(nearest);
     ASSERT_EQ(answer.visible->id, list.empty() ? kBackground : list[0].id);
     ++answered[answer.visible->id];
   }
@@ -217,7 +218,7 @@ bool Same(const SurfaceDistance& a, const SurfaceDistance& b) {
 TEST_P(Query, ManyPointsAtOnceAreAnsweredAsOneByOne) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 3);
   map->SetObjectPose(kBall, MakePose(1, Eigen::Vector3d::UnitZ(), {0, 0, 0.1}));
-  const MapQuery query(*map);
+  const MapQuery query = MapQuery::Of(*map).value();
   std::vector<Eigen::Vector3d> points;
   Dice dice(5);
   for (int i = 0; i < 3000; ++i) {
@@ -245,7 +246,7 @@ TEST_P(Query, WhereNothingIsKnown) {
   const auto empty = MakeMap(GetParam(), ToyConfig());
   const auto map = DrivenMap(GetParam(), ToyConfig(), 1);
   for (const auto* of : {empty.get(), map.get()}) {
-    const MapQuery query(*of);
+    const MapQuery query = MapQuery::Of(*of).value();
     for (const Eigen::Vector3d& p :
          {Eigen::Vector3d(nan, 0, 0), Eigen::Vector3d(0, infinity, 0), Eigen::Vector3d(1e300, 0, 0),
           Eigen::Vector3d(-1e9, 1e9, 0), Eigen::Vector3d(0, 0, 3)}) {
@@ -254,7 +255,7 @@ TEST_P(Query, WhereNothingIsKnown) {
     }
     EXPECT_TRUE(query.At(std::vector<Eigen::Vector3d>{}).empty());
   }
-  EXPECT_FALSE(MapQuery(*empty).At(Eigen::Vector3d(0, 0, 0)).visible.has_value());
+  EXPECT_FALSE(MapQuery::Of(*empty).value().At(Eigen::Vector3d(0, 0, 0)).visible.has_value());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
 
@@ -26,8 +27,8 @@ inline void AppendMesh(const TriangleMesh& mesh, std::string& bytes) {
 inline std::string SnapshotOf(const MapRepresentation& map, const std::vector<InstanceId>& ids) {
   std::string bytes;
   for (const InstanceId id : ids) {
-    for (const Eigen::Vector3i& v : map.ObservedVoxels(id)) {
-      const auto value = map.ValueAt(id, v);
+    for (const Eigen::Vector3i& v : VoxelsOf(map).ObservedVoxels(id)) {
+      const auto value = VoxelsOf(map).ValueAt(id, v);
       for (int a = 0; a < 3; ++a) AppendBytes(v[a], bytes);
       AppendBytes(value->distance_m, bytes);
       AppendBytes(value->weight, bytes);
@@ -35,9 +36,9 @@ inline std::string SnapshotOf(const MapRepresentation& map, const std::vector<In
     }
     AppendMesh(map.ObjectMesh(id), bytes);
   }
-  for (const Eigen::Vector3i& v : map.ListedVoxels()) {
+  for (const Eigen::Vector3i& v : VoxelsOf(map).ListedVoxels()) {
     for (int a = 0; a < 3; ++a) AppendBytes(v[a], bytes);
-    for (const Listing& entry : map.ListAt(v)) {
+    for (const Listing& entry : VoxelsOf(map).ListAt(v)) {
       AppendBytes(entry.id, bytes);
       AppendBytes(entry.confidence, bytes);
     }

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "mapper/map_file.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/dyadic_scene.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/map_snapshot.h"
@@ -26,7 +27,7 @@ TSDFPP_FOR_EVERY_METHOD(MapSymmetries);
 TEST_P(MapSymmetries, AWorldShiftedByBlocksIsTheSameBitForBit) {
   constexpr int kFrames = 4;
   const auto map = DyadicMap(GetParam(), kFrames);
-  ASSERT_GT(map->ListedVoxels().size(), 1000U);
+  ASSERT_GT(VoxelsOf(*map).ListedVoxels().size(), 1000U);
   for (const Index3& blocks : {Index3{1, 0, 0}, Index3{-1000, 2000, 37}, Index3{3, -4096, -513}}) {
     const auto shifted = DyadicMap(GetParam(), kFrames, blocks);
     EXPECT_TRUE(SameContentShifted(*map, *shifted, blocks));
@@ -53,13 +54,13 @@ Difference DifferenceOf(const MapRepresentation& a, const MapRepresentation& b,
   Difference difference;
   std::size_t both = 0;
   for (const InstanceId id : ToyIds()) {
-    std::vector<Eigen::Vector3i> voxels = a.ObservedVoxels(id);
-    for (const Eigen::Vector3i& v : b.ObservedVoxels(id)) {
-      if (!a.ValueAt(id, v - shift)) voxels.emplace_back(v - shift);
+    std::vector<Eigen::Vector3i> voxels = VoxelsOf(a).ObservedVoxels(id);
+    for (const Eigen::Vector3i& v : VoxelsOf(b).ObservedVoxels(id)) {
+      if (!VoxelsOf(a).ValueAt(id, v - shift)) voxels.emplace_back(v - shift);
     }
     for (const Eigen::Vector3i& v : voxels) {
-      const auto in_a = a.ValueAt(id, v);
-      const auto in_b = b.ValueAt(id, v + shift);
+      const auto in_a = VoxelsOf(a).ValueAt(id, v);
+      const auto in_b = VoxelsOf(b).ValueAt(id, v + shift);
       ++difference.voxels;
       if (!in_a || !in_b) {
         ++difference.other;
@@ -127,14 +128,14 @@ TEST_P(MapSymmetries, PermutedIdsPermuteLabels) {
   std::size_t voxels = 0;
   std::size_t tied = 0;
   for (const auto& [from, to] : kOtherNames) {
-    const auto observed = map->ObservedVoxels(from);
+    const auto observed = VoxelsOf(*map).ObservedVoxels(from);
     EXPECT_FALSE(observed.empty());
     voxels += observed.size();
     for (const Eigen::Vector3i& v : observed) {
-      if (!SameBits(renamed->ValueAt(to, v), map->ValueAt(from, v))) ++tied;
+      if (!SameBits(VoxelsOf(*renamed).ValueAt(to, v), VoxelsOf(*map).ValueAt(from, v))) ++tied;
     }
-    const auto missed =
-        std::ptrdiff_t(renamed->ObservedVoxels(to).size()) - std::ptrdiff_t(observed.size());
+    const auto missed = std::ptrdiff_t(VoxelsOf(*renamed).ObservedVoxels(to).size()) -
+                        std::ptrdiff_t(observed.size());
     tied += static_cast<std::size_t>(std::abs(missed));
   }
   EXPECT_LE(static_cast<double>(tied), kTiedShare * static_cast<double>(voxels));
@@ -143,16 +144,17 @@ TEST_P(MapSymmetries, PermutedIdsPermuteLabels) {
     EXPECT_EQ(tied, 0U);
   }
 
-  const auto listed = map->ListedVoxels();
+  const auto listed = VoxelsOf(*map).ListedVoxels();
   std::size_t different = 0;
   for (const Eigen::Vector3i& v : listed) {
-    std::vector<Listing> expected = map->ListAt(v);
+    std::vector<Listing> expected = VoxelsOf(*map).ListAt(v);
     for (Listing& listing : expected) listing.id = kOtherNames.at(listing.id);
-    const std::vector<Listing> actual = renamed->ListAt(v);
+    const std::vector<Listing> actual = VoxelsOf(*renamed).ListAt(v);
     if (actual != expected) ++different;
   }
   EXPECT_LE(static_cast<double>(different), kTiedShare * static_cast<double>(listed.size()));
-  EXPECT_EQ(map->ObservedVoxels(kBackground).size(), renamed->ObservedVoxels(kBackground).size());
+  EXPECT_EQ(VoxelsOf(*map).ObservedVoxels(kBackground).size(),
+            VoxelsOf(*renamed).ObservedVoxels(kBackground).size());
 }
 
 TEST_P(MapSymmetries, APoseThatComesBackLeavesTheSameBytes) {
@@ -160,7 +162,7 @@ TEST_P(MapSymmetries, APoseThatComesBackLeavesTheSameBytes) {
   // Not at its birth any more.
   for (int i = 0; i < 3; ++i) PoseAndFuse(*map, DriveFrame(i));
   const Frame last = DriveFrame(2);
-  const std::string file = MapToBytes(*map);
+  const std::string file = MapToBytes(*map).value();
   const std::string seen = SnapshotOf(*map, ToyIds());
   Dice dice(23);
   for (int i = 0; i < 7; ++i) {
@@ -170,11 +172,11 @@ TEST_P(MapSymmetries, APoseThatComesBackLeavesTheSameBytes) {
     }
     if (i % 3 == 0) map->SceneMesh();  // what is kept between must not show
   }
-  EXPECT_FALSE(MapToBytes(*map) == file);
+  EXPECT_FALSE(MapToBytes(*map).value() == file);
   for (const InstanceId id : {kBrick, kTray}) map->SetObjectPose(id, last.T_WO.at(id));
   // Where values move, each move loses some; where poses move nothing, none does.
   const bool same = KeepsLattices(GetParam()) || GetParam() == Method::kTsdfStatic;
-  EXPECT_EQ(MapToBytes(*map) == file, same);
+  EXPECT_EQ(MapToBytes(*map).value() == file, same);
   EXPECT_EQ(SnapshotOf(*map, ToyIds()) == seen, same);
 }
 
@@ -241,18 +243,18 @@ TEST_P(MapSymmetries, FramesOfAStillWorldInAnotherOrderAgreeWithinABound) {
 
 TEST_P(MapSymmetries, RemovingTwiceIsRemovingOnce) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 3);
-  const std::string whole = MapToBytes(*map);
+  const std::string whole = MapToBytes(*map).value();
   map->Remove(kNoInstance - 1);
-  EXPECT_TRUE(MapToBytes(*map) == whole) << "an unknown object was removed";
+  EXPECT_TRUE(MapToBytes(*map).value() == whole) << "an unknown object was removed";
   for (const InstanceId id : {kBrick, kBackground, kTray}) {
     map->Remove(id);
-    const std::string once = MapToBytes(*map);
+    const std::string once = MapToBytes(*map).value();
     const std::string seen = SnapshotOf(*map, ToyIds());
     EXPECT_FALSE(once == whole);
     map->Remove(id);
-    EXPECT_TRUE(MapToBytes(*map) == once) << "object " << id;
+    EXPECT_TRUE(MapToBytes(*map).value() == once) << "object " << id;
     EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == seen) << "object " << id;
-    EXPECT_EQ(map->FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
   }
   // And leaves nothing behind that shows later.
   const auto once = DrivenMap(GetParam(), ToyConfig(), 3);
@@ -260,7 +262,7 @@ TEST_P(MapSymmetries, RemovingTwiceIsRemovingOnce) {
   once->Remove(kBrick);
   for (int i = 0; i < 2; ++i) twice->Remove(kBrick);
   for (const auto& of : {once.get(), twice.get()}) PoseAndFuse(*of, DriveFrame(3));
-  EXPECT_TRUE(MapToBytes(*twice) == MapToBytes(*once));
+  EXPECT_TRUE(MapToBytes(*twice).value() == MapToBytes(*once).value());
 }
 
 }  // namespace

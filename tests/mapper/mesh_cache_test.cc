@@ -272,6 +272,7 @@ TEST_P(KeptMeshes, AreThoseFromScratchAfterAnyEvents) {
   for (const std::uint64_t seed : {11U, 12U, 13U}) {
     Dice dice(seed);
     const auto map = MakeMap(GetParam(), ToyConfig(dice.Whole(2) == 0 ? 2 : 4));
+    SceneMesher mesher;
     Scene scene = TableWithToys();
     const auto some_pose = [&](double reach_m) {
       return MakePose(dice.Uniform(-1, 1), {0.1, dice.Uniform(-0.3, 0.3), 1},
@@ -292,16 +293,16 @@ TEST_P(KeptMeshes, AreThoseFromScratchAfterAnyEvents) {
         map->Fuse(frame, frame.mask);
       }
       // Not after every event, so that changes add up; sometimes one object alone was asked for.
-      if (dice.Whole(3) == 0) map->ObjectMesh(id);
+      if (dice.Whole(3) == 0) mesher.ObjectMesh(*map, id);
       if (dice.Whole(2) == 0) {
-        ASSERT_TRUE(SameAsFromScratch(*map)) << "seed " << seed << ", event " << event;
+        ASSERT_TRUE(SameAsFromScratch(*map, mesher)) << "seed " << seed << ", event " << event;
       }
     }
-    ASSERT_TRUE(SameAsFromScratch(*map)) << "seed " << seed;
+    ASSERT_TRUE(SameAsFromScratch(*map, mesher)) << "seed " << seed;
     if (GetParam() == Method::kTsdfpp || GetParam() == Method::kTsdfppAnchored) {
-      EXPECT_TRUE(TrianglesOf(map->SceneMesh()) == VisibleTriangles(*map)) << "seed " << seed;
+      EXPECT_TRUE(TrianglesOf(mesher.SceneMesh(*map)) == VisibleTriangles(*map)) << "seed " << seed;
     }
-    EXPECT_GT(map->SceneMesh().triangles.size(), 100U);
+    EXPECT_GT(mesher.SceneMesh(*map).triangles.size(), 100U);
   }
 }
 
@@ -318,25 +319,28 @@ TEST(HiddenTriangles, AreThoseOfWhereAnObjectStandsNow) {
     map->Fuse(frame, frame.mask);
   }
   map->SetObjectPose(kBall, MakePose(0.4, {0, 0.3, 1}, {0.02, 0.01, kTableTop_m - 0.03}));
-  const std::size_t shown = map->SceneMesh().triangles.size();
+  SceneMesher mesher;
+  const std::size_t shown = mesher.SceneMesh(*map).triangles.size();
   EXPECT_LT(shown, AllObjectsMesh(*map).triangles.size()) << "nothing is hidden";
-  EXPECT_TRUE(TrianglesOf(map->SceneMesh()) == VisibleTriangles(*map));
+  EXPECT_TRUE(TrianglesOf(mesher.SceneMesh(*map)) == VisibleTriangles(*map));
   map->SetObjectPose(kBall, scene.T_WO.at(kBall));
-  EXPECT_GT(map->SceneMesh().triangles.size(), shown);
-  EXPECT_TRUE(TrianglesOf(map->SceneMesh()) == VisibleTriangles(*map));
+  EXPECT_GT(mesher.SceneMesh(*map).triangles.size(), shown);
+  EXPECT_TRUE(TrianglesOf(mesher.SceneMesh(*map)) == VisibleTriangles(*map));
 }
 
-TEST_P(KeptMeshes, AreCountedAndNotCopied) {
+TEST_P(KeptMeshes, AreCounted) {
   const auto map = MakeMap(GetParam(), ToyConfig());
   const Frame frame = RenderToys(TableWithToys(), 0.2);
   map->Fuse(frame, frame.mask);
-  EXPECT_EQ(map->Memory().mesh_bytes, 0U);
-  const MeshWork all = map->UpdateMeshes();
+  SceneMesher mesher;
+  EXPECT_EQ(mesher.Bytes(), 0U);
+  const std::size_t bytes = map->Memory().bytes;
+  const MeshWork all = mesher.Update(*map);
   EXPECT_GT(all.blocks, 20U);
   EXPECT_EQ(all.changed, all.blocks);
-  EXPECT_EQ(map->UpdateMeshes().changed, 0U);
-  EXPECT_GT(map->Memory().mesh_bytes, 10000U);
-  EXPECT_EQ(map->Clone()->Memory().mesh_bytes, 0U);
+  EXPECT_EQ(mesher.Update(*map).changed, 0U);
+  EXPECT_GT(mesher.Bytes(), 10000U);
+  EXPECT_EQ(map->Memory().bytes, bytes) << "the map is as it was";
 }
 
 TEST(AllObjects, AreTheirMeshesOneAfterTheOther) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <tuple>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/compare_maps.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -61,7 +62,8 @@ TEST_P(ReferenceTest, StaticScene) {
   SideBySide maps = Begin();
   for (int i = 0; i < 4; ++i) maps.SetPosesAndFuse(RenderToys(scene, 0.1 + 1.5 * i, i));
   for (const InstanceId id : ToyIds()) {
-    EXPECT_GT(maps.map().ObservedVoxels(id).size(), 200U) << "the scene shows too little of " << id;
+    EXPECT_GT(VoxelsOf(maps.map()).ObservedVoxels(id).size(), 200U)
+        << "the scene shows too little of " << id;
   }
   maps.CompareWholeBox();
 }
@@ -177,7 +179,7 @@ TEST_P(ReferenceTest, SettingsOfOneField) {
     maps.SetPosesAndFuse(RenderToys(scene, 0.2 + 0.3 * i, i));
   }
   maps.Remove(kBrick);
-  EXPECT_FALSE(maps.map().ObservedVoxels(kBrick).empty());
+  EXPECT_FALSE(VoxelsOf(maps.map()).ObservedVoxels(kBrick).empty());
   maps.CompareWholeBox();
 }
 
@@ -191,7 +193,7 @@ TEST_P(ReferenceTest, ReturnBeforeItsFirstPose) {
   Frame frame = RenderToys(scene, 0.4);
   frame.T_WO.erase(kBrick);
   maps.SetPosesAndFuse(frame);
-  ASSERT_FALSE(maps.map().ObservedVoxels(kBrick).empty());
+  ASSERT_FALSE(VoxelsOf(maps.map()).ObservedVoxels(kBrick).empty());
   maps.SetObjectPose(kBrick, scene.T_WO[kBrick]);
 }
 
@@ -235,8 +237,8 @@ TEST_P(ReferenceTest, ThreeObjectsAtOnePlace) {
   scene.T_WO[kBrick] = MakePose(1.1, Eigen::Vector3d::UnitZ(), {0.035, 0.025, kTableTop_m + 0.03});
   maps.SetPosesAndFuse(RenderToys(scene, 1.2));
   std::size_t longest = 0;
-  for (const auto& v : maps.map().ListedVoxels()) {
-    longest = std::max(longest, maps.map().ListAt(v).size());
+  for (const auto& v : VoxelsOf(maps.map()).ListedVoxels()) {
+    longest = std::max(longest, VoxelsOf(maps.map()).ListAt(v).size());
   }
   // A thin band does not reach from the brick's top through all that is below it.
   const int together = std::get<1>(GetParam()) < 4 ? 3 : 4;

@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -112,7 +113,7 @@ TEST_P(Rims, AnImageAtTheCameraItselfEnds) {
   frame.T_WO[kHides] = Pose::Identity();
   Map(frame, *map);
   Map(frame, *map);
-  EXPECT_FALSE(map->FindFault().has_value());
+  EXPECT_FALSE(VoxelsOf(*map).FindFault().has_value());
 }
 
 TEST_P(Rims, InventNoTable) {
@@ -152,8 +153,10 @@ TEST_P(LayeredRims, LeaveWhatWasSeenBefore) {
   reference::Scene bare = TableThatEndsBehind();
   bare.Erase(kHides);
   for (int i = 0; i < 6; ++i) Map(SeenFrom(bare, -0.1 + 0.04 * i, i + 1), *map);
-  const auto before = map->ObservedVoxels(kBackground);
-  const auto value_at = [&](const Eigen::Vector3i& v) { return map->ValueAt(kBackground, v); };
+  const auto before = VoxelsOf(*map).ObservedVoxels(kBackground);
+  const auto value_at = [&](const Eigen::Vector3i& v) {
+    return VoxelsOf(*map).ValueAt(kBackground, v);
+  };
   std::vector<VoxelValue> values;
   const auto is_hidden = [](const Eigen::Vector3i& v) {
     const Eigen::Vector3d p = v.cast<double>() * kRimVoxel_m;

@@ -5,7 +5,8 @@
 #include <set>
 #include <utility>
 
-#include "mapper/map_representation.h"
+#include "mapper/map_editing.h"
+#include "mapper/scene_mesher.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/from_scratch.h"
 
@@ -21,7 +22,7 @@ class Follower {
   // False where what it is told is not in order, or tells of nothing.
   ::testing::AssertionResult Take(const MapRepresentation& map) {
     last_.clear();
-    std::vector<ScenePiece> changes = map.TakeSceneChanges().parts;
+    std::vector<ScenePiece> changes = mesher_.TakeSceneChanges(map).parts;
     for (ScenePiece& part : changes) {
       const auto key = std::make_pair(part.id, part.block);
       if (!last_.empty() && !(*last_.rbegin() < key)) {
@@ -57,6 +58,8 @@ class Follower {
   std::size_t told() const { return last_.size(); }
   std::size_t size() const { return parts_.size(); }
 
+  SceneMesher& mesher() { return mesher_; }
+
  private:
   static void Append(const TriangleMesh& mesh, std::string& bytes) {
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -71,6 +74,7 @@ class Follower {
     }
   }
 
+  SceneMesher mesher_;
   std::map<std::pair<InstanceId, Index3>, TriangleMesh> parts_;
   std::set<std::pair<InstanceId, Index3>> last_;
 };
@@ -113,18 +117,18 @@ TEST_P(SceneChanges, LeadToTheWholeMesh) {
       } else if (what == 4) {
         // And back, so that the same id is another volume, or the same one in other hands.
         constexpr InstanceId kOther = 9;
-        if (map->Rename(id, kOther)) {
+        if (EditingOf(*map).Rename(id, kOther)) {
           const int told = dice.Whole(3);
           if (told == 0) {
             ASSERT_TRUE(follower.Take(*map)) << "seed " << seed << ", event " << event;
           } else if (told == 1) {
-            map->UpdateMeshes();  // has seen that the id is gone when it is back
+            follower.mesher().Update(*map);  // has seen that the id is gone when it is back
           }
         }
-        static_cast<void>(map->Rename(kOther, id));
+        static_cast<void>(EditingOf(*map).Rename(kOther, id));
       } else if (what == 5) {
-        map->ObjectMesh(
-            id);  // brings a part of what is kept up to date, behind the follower's back
+        // Brings a part of what is kept up to date, behind the follower's back.
+        follower.mesher().ObjectMesh(*map, id);
       }
       if (what >= 2) {
         const Frame frame = RenderToys(scene, dice.Uniform(0, 6), event);
@@ -142,7 +146,7 @@ TEST_P(SceneChanges, LeadToTheWholeMesh) {
       ASSERT_EQ(follower.told(), 0U) << "nothing has happened";
     }
     EXPECT_GT(map->SceneMesh().triangles.size(), 1000U);
-    // A copy tells everything to another one.
+    // Another one is told everything.
     Follower other;
     const auto copy = map->Clone();
     ASSERT_TRUE(other.Take(*copy));

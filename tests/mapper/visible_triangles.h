@@ -6,6 +6,7 @@
 #include <set>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -19,7 +20,7 @@ inline std::optional<float> DistanceAtGlobal(const MapRepresentation& map, Insta
   std::array<float, 8> distances{};
   for (int i = 0; i < 8; ++i) {
     if (place.Coefficient(i) == 0) continue;
-    const auto value = map.ValueAt(id, reference::CubeCorner(place.base, i));
+    const auto value = VoxelsOf(map).ValueAt(id, reference::CubeCorner(place.base, i));
     if (!value) return std::nullopt;
     distances[i] = value->distance_m;
   }
@@ -45,7 +46,7 @@ inline std::multiset<Triangle> VisibleTriangles(const MapRepresentation& map) {
       const Eigen::Vector3d nearest =
           (p / kToyVoxel_m + Eigen::Vector3d::Constant(0.5)).array().floor();
       const Eigen::Vector3i v = nearest.cast<int>();
-      const auto list = map.ListAt(v);
+      const auto list = VoxelsOf(map).ListAt(v);
       const bool other = !list.empty() && list[0].id != id;
       const bool hidden = other && DistanceAtGlobal(map, list[0].id, p).value_or(0) < -kToyVoxel_m;
       if (!hidden) visible.insert(AsTriangle(mesh, t, id));

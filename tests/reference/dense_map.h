@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/reference/dense_volume.h"
 
 namespace tsdfpp::reference {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/reference/float_voxel.h"
 
 namespace tsdfpp::reference {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapper/voxel_inspection.h"
 #include "tests/reference/dense_volume.h"
 
 namespace tsdfpp::reference {
@@ -51,12 +52,12 @@ RayReference::RayReference(const MapRepresentation& map, Method method, const Ma
     auto field =
         fields_.try_emplace(key, Field{DenseGrid<DenseVoxel>(box), Pose::Identity()}).first;
     if (!one_field_) field->second.T_LW = map.ObjectLattice(id).inverse();
-    for (const Eigen::Vector3i& v : map.ObservedVoxels(id)) {
+    for (const Eigen::Vector3i& v : VoxelsOf(map).ObservedVoxels(id)) {
       if (one_field_) {
-        const auto list = map.ListAt(v);
+        const auto list = VoxelsOf(map).ListAt(v);
         if (list.empty() || list.front().id != id) continue;
       }
-      const VoxelValue value = map.ValueAt(id, v).value();
+      const VoxelValue value = VoxelsOf(map).ValueAt(id, v).value();
       field->second.grid.At(v).distance = value.distance_m;
       field->second.grid.At(v).weight = value.weight;
     }
@@ -68,7 +69,7 @@ bool RayReference::Hidden(InstanceId id, const RayHit& hit, const Eigen::Vector3
   const double h = config_.voxel_m;
   const Eigen::Vector3d look_up_W = p_W + 0.5 * h * hit.normal_W;
   const Eigen::Vector3i v = (look_up_W / h).array().round().matrix().cast<int>();
-  for (const Listing& entry : map_.ListAt(v)) {
+  for (const Listing& entry : VoxelsOf(map_).ListAt(v)) {
     if (std::find(without.begin(), without.end(), entry.id) != without.end()) continue;
     if (entry.id == id) return false;
     const Field& active = fields_.at(entry.id);
@@ -123,7 +124,7 @@ std::optional<RayHit> RayReference::Cast(const Intrinsics& camera, const Pose& T
         hit.normal_W = field.T_LW.linear().transpose() * Gradient(field.grid, q).normalized();
         hit.id = id;
         if (one_field_) {
-          const auto list = map_.ListAt((p_W / h).array().round().matrix().cast<int>());
+          const auto list = VoxelsOf(map_).ListAt((p_W / h).array().round().matrix().cast<int>());
           hit.id = list.empty() ? kBackground : list.front().id;
         }
         if (!has_index_ || !Hidden(id, hit, p_W, without)) {

@@ -1,9 +1,9 @@
-// Rays through the maps of object volumes (docs/map.md, "Ray casting").
+#include "mapper/rays/volume_rays.h"
+
 #include <algorithm>
 #include <limits>
 
 #include "mapper/mesh/mesh_tools.h"
-#include "mapper/methods/layered_map.h"
 #include "mapper/rays/ray_pass.h"
 
 namespace tsdfpp {
@@ -107,25 +107,43 @@ InstanceId FirstOf(const std::vector<Listing>& list, std::span<const InstanceId>
   return kNoInstance;
 }
 
+std::vector<RaySurface> CastEachAlone(const ObjectVolumes& volumes, double voxel_m,
+                                      const Intrinsics& camera, const Pose& T_WC,
+                                      const RayCastOptions& options) {
+  RayPass pass;
+  pass.voxel_m = voxel_m;
+  pass.each_alone = true;
+  for (const auto& [id, volume] : volumes) {
+    pass.volumes.push_back({id, &volume.grid, volume.T_WL, volume.lattice_is_world});
+  }
+  return RunRayPass(pass, camera, T_WC, options);
+}
+
 }  // namespace
 
-std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
-                                             const RayCastOptions& options) const {
+std::vector<RaySurface> CastThroughVolumes(const VolumeSurfaces& surfaces, double voxel_m,
+                                           const Intrinsics& camera, const Pose& T_WC,
+                                           const RayCastOptions& options) {
+  const ObjectVolumes& volumes = *surfaces.volumes;
+  if (surfaces.index == nullptr) {
+    return CastEachAlone(volumes, voxel_m, camera, T_WC, options);
+  }
+  const GlobalIndex& index = *surfaces.index;
   struct Reader {
     VoxelReader reader;
     bool lattice_is_world;
     Pose T_LW;
   };
   RayPass pass;
-  pass.voxel_m = config_.voxel_m;
+  pass.voxel_m = voxel_m;
   std::map<InstanceId, Reader> readers;
-  for (const auto& [id, volume] : volumes_) {
+  for (const auto& [id, volume] : volumes) {
     if (volume.grid.empty()) continue;
     pass.volumes.push_back({id, &volume.grid, volume.T_WL, volume.lattice_is_world});
     readers.emplace(
         id, Reader{VoxelReader(volume.grid), volume.lattice_is_world, volume.T_WL.inverse()});
   }
-  const Claims claims(volumes_, config_.voxel_m);
+  const Claims claims(volumes, voxel_m);
   if (pass.volumes.size() > 1) {
     pass.contested = [&](const RayVolume& volume, const Index3& low, const Index3& high) {
       return claims.Contested(volume, low, high);
@@ -135,10 +153,10 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
   const auto distance_at = [&](InstanceId id, const Eigen::Vector3f& p_W) {
     const Reader& of = readers.at(id);
     const Eigen::Vector3d p = p_W.cast<double>();
-    return DistanceAt(FindCorners(
-        of.reader, (of.lattice_is_world ? p : Eigen::Vector3d(of.T_LW * p)) / config_.voxel_m));
+    return DistanceAt(
+        FindCorners(of.reader, (of.lattice_is_world ? p : Eigen::Vector3d(of.T_LW * p)) / voxel_m));
   };
-  const float voxel_m = config_.voxel();
+  const auto voxel = static_cast<float>(voxel_m);
   pass.make_hidden = [&]() -> RayPass::Hidden {
     return [&, looked_up = std::vector<LookUp>()](std::span<HiddenQuery> queries,
                                                   std::span<const InstanceId> without) mutable {
@@ -146,12 +164,12 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
       // in the same block.
       looked_up.clear();
       Index3 block;
-      const InstanceId* ids = ActiveIn(block);
+      const InstanceId* ids = index.ActiveIn(block);
       for (const HiddenQuery& query : queries) {
-        const Index3 v = NearestVoxel(query.look_up_W, voxel_m);
+        const Index3 v = NearestVoxel(query.look_up_W, voxel);
         if (BlockOf(v) != block) {
           block = BlockOf(v);
-          ids = ActiveIn(block);
+          ids = index.ActiveIn(block);
         }
         const InstanceId* place = ids == nullptr ? nullptr : ids + PlaceInBlock(v);
         __builtin_prefetch(place);
@@ -160,11 +178,10 @@ std::vector<RaySurface> LayeredMap::CastRays(const Intrinsics& camera, const Pos
       for (std::size_t i = 0; i < queries.size(); ++i) {
         const auto& [v, place] = looked_up[i];
         if (place == nullptr) continue;
-        const InstanceId active =
-            without.empty() ? *place : FirstOf(ListAt({v.x, v.y, v.z}), without);
+        const InstanceId active = without.empty() ? *place : FirstOf(index.ListedAt(v), without);
         if (active == kNoInstance || active == queries[i].id) continue;
         const auto distance = distance_at(active, queries[i].look_up_W);
-        queries[i].hidden = distance && *distance < -voxel_m;
+        queries[i].hidden = distance && *distance < -voxel;
       }
     };
   };

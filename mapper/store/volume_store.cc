@@ -1,4 +1,4 @@
-#include "mapper/methods/volume_store.h"
+#include "mapper/store/volume_store.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -323,6 +323,48 @@ Expected<std::vector<ListsOfBlock>> LoadLists(ByteReader& bytes, int layers, int
     if (!any) return DataError("a block of lists is empty");
   }
   return blocks;
+}
+
+Expected<ObjectVolumes> LoadAllVolumes(const Sections& sections, const char* name,
+                                       const MapConfig& config) {
+  ByteReader bytes(sections.at(name));
+  TSDFPP_ASSIGN(ObjectVolumes volumes, LoadVolumes(bytes, config));
+  if (!bytes.AtEnd()) return DataError("its volumes have another length than they say");
+  return volumes;
+}
+
+Expected<void> CheckWorldLattices(const ObjectVolumes& volumes) {
+  for (const auto& [id, volume] : volumes) {
+    if (volume.T_WO_birth) {
+      return DataError("object {} has a lattice of its own, expected the world's", id);
+    }
+  }
+  return {};
+}
+
+Expected<void> CheckOwnLattices(const ObjectVolumes& volumes) {
+  for (const auto& [id, volume] : volumes) {
+    if (volume.T_WO && !volume.T_WO_birth) {
+      return DataError("object {} has a pose and none at birth, so its lattice is nowhere", id);
+    }
+  }
+  return {};
+}
+
+Expected<std::vector<ListsOfBlock>> LoadAllLists(
+    const Sections& sections, const char* name, int layers, const MapConfig& config,
+    const std::function<bool(InstanceId, const Index3&, int)>& holds) {
+  ByteReader bytes(sections.at(name));
+  TSDFPP_ASSIGN(std::vector<ListsOfBlock> lists, LoadLists(bytes, layers, config.confidence_cap));
+  if (!bytes.AtEnd()) return DataError("its lists have another length than they say");
+  for (const ListsOfBlock& of : lists) {
+    for (std::size_t i = 0; i < of.entries.size(); ++i) {
+      const InstanceId id = of.entries[i].id;
+      if (id == kNoInstance || holds(id, of.index, static_cast<int>(i) / layers)) continue;
+      return DataError("object {} is listed where it is not", id);
+    }
+  }
+  return lists;
 }
 
 }  // namespace tsdfpp

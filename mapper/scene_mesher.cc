@@ -1,0 +1,111 @@
+#include "mapper/scene_mesher.h"
+
+#include <cstdlib>
+#include <set>
+#include <utility>
+
+#include "mapper/block_surfaces.h"
+#include "mapper/mesh/mesh_tools.h"
+
+namespace tsdfpp {
+namespace {
+
+std::optional<SurfacesInBlocks> SurfacesOf(const MapRepresentation& map) {
+  const BlockSurfaces* surfaces = map.block_surfaces();
+  if (surfaces == nullptr) return std::nullopt;
+  return surfaces->Surfaces();
+}
+
+// The triangles of one id.
+TriangleMesh FacesOf(const TriangleMesh& scene, InstanceId id) {
+  std::vector<std::uint8_t> keep(scene.triangles.size());
+  for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = scene.face_ids[i] == id ? 1 : 0;
+  return KeepFaces(scene, keep);
+}
+
+bool SameMeshes(const TriangleMesh& a, const TriangleMesh& b) {
+  return a.vertices == b.vertices && a.colours == b.colours && a.triangles == b.triangles &&
+         a.face_ids == b.face_ids;
+}
+
+}  // namespace
+
+void SceneMesher::CheckMethod(const MapRepresentation& map) {
+  if (!method_) method_ = map.method();
+  if (*method_ != map.method()) std::abort();
+}
+
+MeshWork SceneMesher::Update(const MapRepresentation& map) {
+  CheckMethod(map);
+  const auto surfaces = SurfacesOf(map);
+  if (!surfaces) return {};
+  if (surfaces->field) {
+    return field_.Update(*surfaces->field, static_cast<float>(surfaces->voxel_m));
+  }
+  return volumes_.Update(*surfaces->objects, surfaces->voxel_m);
+}
+
+TriangleMesh SceneMesher::SceneMesh(const MapRepresentation& map) {
+  CheckMethod(map);
+  const auto surfaces = SurfacesOf(map);
+  if (!surfaces) return map.SceneMesh();
+  Update(map);
+  return surfaces->field ? field_.Scene() : volumes_.Scene();
+}
+
+TriangleMesh SceneMesher::ObjectMesh(const MapRepresentation& map, InstanceId id) {
+  CheckMethod(map);
+  const auto surfaces = SurfacesOf(map);
+  if (!surfaces) return map.ObjectMesh(id);
+  if (surfaces->objects) return volumes_.Object(*surfaces->objects, surfaces->voxel_m, id);
+  TriangleMesh mesh = FacesOf(SceneMesh(map), id);
+  mesh.face_ids.clear();
+  return mesh;
+}
+
+SceneChanges SceneMesher::TakeSceneChanges(const MapRepresentation& map) {
+  CheckMethod(map);
+  const auto surfaces = SurfacesOf(map);
+  if (!surfaces) return {TakeWholeObjects(map), {}};
+  const MeshWork work = Update(map);
+  return {surfaces->field ? field_.TakeChanges() : volumes_.TakeChanges(), work};
+}
+
+std::vector<ScenePiece> SceneMesher::TakeWholeObjects(const MapRepresentation& map) {
+  const TriangleMesh scene = map.SceneMesh();
+  std::set<InstanceId> ids(scene.face_ids.begin(), scene.face_ids.end());
+  for (const auto& [id, mesh] : told_) ids.insert(id);
+  std::vector<ScenePiece> parts;
+  for (const InstanceId id : ids) {
+    TriangleMesh mesh = FacesOf(scene, id);
+    const auto told = told_.find(id);
+    if (told != told_.end() && SameMeshes(told->second, mesh)) continue;
+    parts.push_back({id, {}, mesh});
+    if (mesh.triangles.empty()) {
+      told_.erase(id);
+    } else {
+      told_.insert_or_assign(id, std::move(mesh));
+    }
+  }
+  return parts;
+}
+
+std::size_t SceneMesher::Bytes() const {
+  std::size_t bytes = volumes_.Bytes() + field_.Bytes();
+  for (const auto& [id, mesh] : told_) {
+    bytes += mesh.vertices.size() * sizeof(mesh.vertices[0]) +
+             mesh.colours.size() * sizeof(mesh.colours[0]) +
+             mesh.triangles.size() * sizeof(mesh.triangles[0]) +
+             mesh.face_ids.size() * sizeof(mesh.face_ids[0]);
+  }
+  return bytes;
+}
+
+TriangleMesh AllObjectsMesh(const MapRepresentation& map) {
+  TriangleMesh all;
+  SceneMesher mesher;
+  for (const InstanceId id : map.Objects()) Append(all, mesher.ObjectMesh(map, id), id);
+  return all;
+}
+
+}  // namespace tsdfpp
