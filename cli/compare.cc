@@ -174,7 +174,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();
-  app.add_option("--poses", options->poses, "Object poses: gt (given), icp (tracked)")
+  app.add_option("--poses", options->poses,
+                 "Object poses: gt (given), icp or track (tracked, docs/tracking.md)")
       ->capture_default_str();
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();

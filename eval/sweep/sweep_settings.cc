@@ -107,7 +107,7 @@ Expected<void> SetProfile(Settings& settings, const AxisValue& value) {
 }
 
 Expected<void> SetPoses(Settings& settings, const AxisValue& value) {
-  TSDFPP_ASSIGN(settings.poses, Text(value, "gt or icp"));
+  TSDFPP_ASSIGN(settings.poses, Text(value, "gt, icp or track"));
   const auto known = PoseSourceFromName(settings.poses);
   return known ? Expected<void>{} : Because(value, known.error());
 }
