@@ -96,6 +96,9 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   config.poses.clear();
   for (const std::string& name : SplitList(options.poses)) {
     TSDFPP_ASSIGN(const PoseSource poses, PoseSourceFromName(name));
+    for (const Method method : config.methods) {
+      TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
+    }
     config.poses.push_back(poses);
   }
   if ((config.methods.empty() && config.adapters.empty()) || config.profiles.empty() ||
@@ -174,7 +177,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();
-  app.add_option("--poses", options->poses, "Object poses: gt (given), icp (tracked)")
+  app.add_option("--poses", options->poses,
+                 "Object poses: gt (given), icp or track (tracked, docs/tracking.md)")
       ->capture_default_str();
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();

@@ -27,6 +27,8 @@ struct MapArguments {
   std::string method = "tsdf++/anchored";
   std::string segmentation;
   std::string poses = "gt";
+  std::string track = "auto";
+  std::string track_config;
   std::string profile = "close";
   std::string remove;
   std::string out;
@@ -44,10 +46,28 @@ struct MapArguments {
 constexpr std::array<const char*, 7> kSettingsOfTheMap = {
     "--method", "--profile", "--trunc-front", "--trunc-back", "--layers", "--voxel", "--poses"};
 
+// What is tracked, and how.
+Expected<void> ReadTracking(const MapArguments& options, PipelineConfig& config) {
+  TSDFPP_ASSIGN(config.tracked, TrackChoiceFromName(options.track));
+  if (config.poses == PoseSource::kGiven && config.tracked != TrackChoice::kAuto) {
+    return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
+                      options.track);
+  }
+  if (options.track_config.empty()) return {};
+  if (config.poses != PoseSource::kTrack) {
+    return UsageError("--track-config needs --poses track");
+  }
+  TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.track_config));
+  TSDFPP_ASSIGN(config.track, SdfTrackConfig::FromToml(table, options.track_config));
+  return {};
+}
+
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
+  TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
+  TSDFPP_RETURN_IF_ERROR(ReadTracking(options, config));
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -137,6 +157,25 @@ Expected<void> CheckOutputs(const MapArguments& options) {
   return save.has_parent_path() ? MakeWritableFolder(save.parent_path()) : Expected<void>{};
 }
 
+// What was tracked, from when to when.
+nlohmann::json TrackingJson(const Pipeline& pipeline, const SequenceInfo& info) {
+  nlohmann::json objects = nlohmann::json::array();
+  for (const auto& [id, span] : pipeline.track_log().objects()) {
+    std::string name;
+    for (const ObjectInfo& object : info.objects) {
+      if (object.id == id) name = object.name;
+    }
+    objects.push_back({{"id", id},
+                       {"name", name},
+                       {"first_frame", span.first},
+                       {"last_frame", span.last},
+                       {"tracked_frames", span.tracked},
+                       {"stayed_frames", span.stayed},
+                       {"frozen_frames", span.frozen}});
+  }
+  return {{"which", TrackChoiceName(pipeline.tracked().choice())}, {"objects", objects}};
+}
+
 Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app) {
   TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   TSDFPP_ASSIGN(const MapStart start, Start(options, app));
@@ -149,6 +188,11 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   }
   if (!options.save.empty()) TSDFPP_RETURN_IF_ERROR(CheckCanBeSaved(pipeline.map()));
   if (!start.mask_remark.empty()) spdlog::warn("{}", start.mask_remark);
+  if (config.poses != PoseSource::kGiven) {
+    const bool all = pipeline.tracked().choice() == TrackChoice::kAll;
+    spdlog::info("{}: tracked is {}", info.name,
+                 all ? "all that is not background" : "what has a class");
+  }
   const int frames = start.last - start.first + 1;
   if (options.views > 0 && frames == 0) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
@@ -203,6 +247,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
       {"times", times.ToJson()},
       {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
   };
+  if (config.poses != PoseSource::kGiven) stats["tracking"] = TrackingJson(pipeline, info);
   if (!start.mask_remark.empty()) stats["remarks"] = {start.mask_remark};
   for (const std::string& remark : remarks) stats["remarks"].push_back(remark);
   if (!options.load.empty()) stats["loaded"] = options.load;
@@ -237,8 +282,19 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "Where masks come from: gt (the sequence) or none (all is background); by default "
                  "gt where the sequence has masks")
       ->check(OneOf({"gt", "none"}));
-  app.add_option("--poses", options->poses, "Object poses: gt (given) or icp (tracked)")
+  app.add_option(
+         "--poses", options->poses,
+         "Object poses: gt (given), icp (tracked as in the paper), track (tracked by signed "
+         "distances, docs/tracking.md)")
       ->capture_default_str();
+  app.add_option("--track", options->track,
+                 "Which objects are tracked: classified (those with a class), all (whatever is not "
+                 "background), auto (classified where the sequence knows a class)")
+      ->check(OneOf({"auto", "classified", "all"}))
+      ->capture_default_str();
+  app.add_option("--track-config", options->track_config,
+                 "Settings of --poses track, a TOML file (docs/tracking.md)")
+      ->check(NotEmpty("a file"));
   app.add_option("--profile", options->profile,
                  "Truncation: paper (10 voxels in front, 10 behind) or close (10, 3)")
       ->capture_default_str();

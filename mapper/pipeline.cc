@@ -9,6 +9,7 @@
 #include "mapper/map_reach.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/pcl_icp.h"
+#include "mapper/track/sdf_tracker.h"
 
 namespace tsdfpp {
 namespace {
@@ -31,13 +32,37 @@ class StopWatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config,
-                                     const std::vector<ObjectInfo>& objects) {
-  if (config.poses == PoseSource::kIcp) return std::make_unique<PclIcp>(config.icp, objects);
-  return std::make_unique<GivenPoses>();
+std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config, const TrackedObjects& tracked) {
+  switch (config.poses) {
+    case PoseSource::kGiven:
+      return std::make_unique<GivenPoses>();
+    case PoseSource::kIcp:
+      return std::make_unique<PclIcp>(config.icp, tracked);
+    case PoseSource::kTrack:
+      return std::make_unique<SdfTracker>(config.track, tracked);
+  }
+  std::abort();
+}
+
+// The labels without those of frozen objects, of which nothing is to be fused.
+cv::Mat WithoutFrozen(const cv::Mat& labels, const TrackedPoses& tracked) {
+  cv::Mat fused = labels;
+  for (const auto& [id, status] : tracked.seen) {
+    if (status != TrackStatus::kFrozen) continue;
+    if (fused.data == labels.data) fused = labels.clone();
+    fused.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
+  }
+  return fused;
 }
 
 }  // namespace
+
+Expected<void> CheckPoses(Method method, PoseSource poses) {
+  if (poses != PoseSource::kTrack || InfoOf(method).has_voxels) return {};
+  return UsageError(
+      "poses '{}' are tracked by signed distances, which method '{}' has not, expected gt or icp",
+      PoseSourceName(poses), MethodName(method));
+}
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
     : Pipeline(config, objects, MakeMap(config.method, config.map), {}) {}
@@ -46,9 +71,10 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
                    std::unique_ptr<MapRepresentation> map,
                    std::map<InstanceId, std::map<int, Pose>> trajectories)
     : config_(config),
+      tracked_(config.tracked, objects),
       segmenter_(MakeSegmenter(config.segmentation)),
       associator_(std::make_unique<GivenIds>()),
-      tracker_(MakeTracker(config, objects)),
+      tracker_(MakeTracker(config, tracked_)),
       map_(std::move(map)),
       trajectories_(std::move(trajectories)) {
   is_empty_ = map_->Memory().blocks == 0;
@@ -63,12 +89,14 @@ Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   TSDFPP_ASSIGN(const cv::Mat segments, segmenter_->Segment(frame));
   TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments));
   times.segment_s = watch.Lap();
-  const cv::Mat labels = associator_->Associate(frame, segments, *map_);
+  const cv::Mat associated = associator_->Associate(frame, segments, *map_);
   times.associate_s = watch.Lap();
-  ObjectPoses T_WO = tracker_->Track(frame, labels, *map_, T_WO_);
-  TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, T_WO));
+  TrackedPoses tracked = tracker_->Track(frame, associated, *map_, T_WO_);
+  const cv::Mat labels = WithoutFrozen(associated, tracked);
+  TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, tracked.T_WO));
   times.track_s = watch.Lap();
-  UpdatePoses(frame.index, std::move(T_WO));
+  if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);
+  UpdatePoses(frame.index, std::move(tracked.T_WO));
   times.update_poses_s = watch.Lap();
   map_->Fuse(frame, labels);
   times.fuse_s = watch.Lap();
@@ -100,6 +128,13 @@ std::vector<std::string> Pipeline::Remarks() const {
         "the camera is up to {:.6g} m from the origin along an axis, where single precision rounds "
         "by up to {:.2g} voxels, which blurs surfaces; poses nearer to the origin would help",
         farthest_m_, voxels * std::numeric_limits<float>::epsilon() / 2));
+  }
+  if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
+    remarks.push_back(
+        fmt::format("objects were to be tracked (--poses {}) and none was: no frame shows one of "
+                    "those that are "
+                    "({})",
+                    PoseSourceName(config_.poses), TrackChoiceName(tracked_.choice())));
   }
   return remarks;
 }

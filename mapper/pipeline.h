@@ -13,6 +13,9 @@
 #include "mapper/map_representation.h"
 #include "mapper/segment/segmenter.h"
 #include "mapper/track/icp_registration.h"
+#include "mapper/track/sdf_track_config.h"
+#include "mapper/track/track_log.h"
+#include "mapper/track/tracked_objects.h"
 #include "mapper/track/tracker.h"
 
 namespace tsdfpp {
@@ -22,8 +25,13 @@ struct PipelineConfig {
   MapConfig map{};
   Segmentation segmentation = Segmentation::kGiven;
   PoseSource poses = PoseSource::kGiven;
+  TrackChoice tracked = TrackChoice::kAuto;  // which objects, where poses are not given
   IcpConfig icp{};
+  SdfTrackConfig track{};
 };
+
+// Errors: kUsage, a sentence, where the method's maps have not what the poses are tracked by.
+Expected<void> CheckPoses(Method method, PoseSource poses);
 
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
@@ -37,8 +45,8 @@ struct StepTimes {
 
 class Pipeline {
  public:
-  // `objects` are those of the sequence; only those with a semantic class are tracked (paper
-  // III-D). The config must be valid.
+  // `objects` are those of the sequence; config.tracked says which are tracked (paper III-D). The
+  // config must be valid.
   Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects);
 
   // Goes on from a map, which must have the config's method and settings, and T_WO of its objects
@@ -56,12 +64,18 @@ class Pipeline {
 
   // What whoever asked for the map should know, a sentence each: that no frame has put anything
   // into it, with counts of what the frames held; that it is so far from the origin that rounding
-  // shows.
+  // shows; that objects were to be tracked and none was.
   std::vector<std::string> Remarks() const;
 
-  // T_WO of each object as the map has it, by frame index. With ICP the object's frame O is its
+  // T_WO of each object as the map has it, by frame index. Tracked, the object's frame O is its
   // lattice: the identity where it was first seen.
   const std::map<InstanceId, std::map<int, Pose>>& trajectories() const { return trajectories_; }
+
+  // What was tracked, and when; empty with given poses.
+  const TrackLog& track_log() const { return track_log_; }
+
+  // Which objects are tracked where poses are not given.
+  const TrackedObjects& tracked() const { return tracked_; }
 
  private:
   // Moves the objects to where they are after the frame, and writes it down.
@@ -70,12 +84,14 @@ class Pipeline {
   void CountWhileEmpty(const Frame& frame, const cv::Mat& labels);
 
   PipelineConfig config_;
+  TrackedObjects tracked_;
   std::unique_ptr<Segmenter> segmenter_;
   std::unique_ptr<Associator> associator_;
   std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<MapRepresentation> map_;
   ObjectPoses T_WO_;
   std::map<InstanceId, std::map<int, Pose>> trajectories_;
+  TrackLog track_log_;
   bool is_empty_ = true;   // no block has been in the map yet
   FrameCounts in_vain_;    // of the frames until then
   double farthest_m_ = 0;  // along an axis, of the cameras

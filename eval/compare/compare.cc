@@ -140,7 +140,7 @@ CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profil
 
 std::string CompareRun::Title() const {
   return fmt::format("{}, {}, {}", MethodName(config.method), profile,
-                     config.poses == PoseSource::kGiven ? "given poses" : "ICP");
+                     PoseSourceTitle(config.poses));
 }
 
 std::string CompareRun::FolderName() const {

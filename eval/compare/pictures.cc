@@ -179,8 +179,9 @@ Expected<void> PictureMaker::Finish() {
       const std::string file = fmt::format("figure-{}-{}.png", profile, PoseSourceName(poses));
       TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Figure(rows)));
       files_.push_back(
-          {file, fmt::format("Reconstructions over time and after the removal, profile {}, {}",
-                             profile, poses == PoseSource::kGiven ? "given object poses" : "ICP")});
+          {file, fmt::format(
+                     "Reconstructions over time and after the removal, profile {}, {}", profile,
+                     poses == PoseSource::kGiven ? "given object poses" : PoseSourceTitle(poses))});
     }
     const std::string file = fmt::format("table-{}.png", PoseSourceName(poses));
     TSDFPP_RETURN_IF_ERROR(SavePng(out_ / file, Grid(TitlesOf(result_), table_rows, table_cells)));

@@ -15,7 +15,8 @@ constexpr std::array<std::string_view, 16> kNames{
     "gates.json", "gates.md",  "gates.junit.xml", "sequence.json"};
 constexpr std::array<std::string_view, 3> kBeginnings{".", "figure-", "table-"};
 constexpr std::array<std::string_view, 2> kProfiles{"_paper", "_close"};
-constexpr std::array<PoseSource, 2> kPoseSources{PoseSource::kGiven, PoseSource::kIcp};
+constexpr std::array<PoseSource, 3> kPoseSources{PoseSource::kGiven, PoseSource::kIcp,
+                                                 PoseSource::kTrack};
 
 }  // namespace
 

@@ -107,7 +107,7 @@ Expected<void> SetProfile(Settings& settings, const AxisValue& value) {
 }
 
 Expected<void> SetPoses(Settings& settings, const AxisValue& value) {
-  TSDFPP_ASSIGN(settings.poses, Text(value, "gt or icp"));
+  TSDFPP_ASSIGN(settings.poses, Text(value, "gt, icp or track"));
   const auto known = PoseSourceFromName(settings.poses);
   return known ? Expected<void>{} : Because(value, known.error());
 }
@@ -233,6 +233,7 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   TSDFPP_ASSIGN(config.map.removed_voxels, RemovedVoxelsFromName(removed_voxels));
   config.map.vote_band_voxels = vote_band;
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(poses));
+  TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
   SabotageMap(sabotage, config);
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
   return config;

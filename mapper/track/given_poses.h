@@ -9,8 +9,8 @@ namespace tsdfpp {
 class GivenPoses : public Tracker {
  public:
   // The frame's poses; of objects of which it says nothing, those before it.
-  ObjectPoses Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
-                    const ObjectPoses& before) override;
+  TrackedPoses Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
+                     const ObjectPoses& before) override;
 };
 
 }  // namespace tsdfpp

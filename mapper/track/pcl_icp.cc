@@ -1,5 +1,7 @@
 #include "mapper/track/pcl_icp.h"
 
+#include <set>
+
 namespace tsdfpp {
 namespace {
 
@@ -18,26 +20,22 @@ std::set<InstanceId> LabelsIn(const cv::Mat& labels) {
 
 }  // namespace
 
-PclIcp::PclIcp(const IcpConfig& config, const std::vector<ObjectInfo>& objects) : config_(config) {
-  for (const ObjectInfo& object : objects) {
-    if (object.id != kBackground && !object.semantic_class.empty()) tracked_.insert(object.id);
-  }
-}
-
-ObjectPoses PclIcp::Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
-                          const ObjectPoses& before) {
-  ObjectPoses after = before;
+TrackedPoses PclIcp::Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
+                           const ObjectPoses& before) {
+  TrackedPoses after{before};
   for (const InstanceId id : LabelsIn(labels)) {
-    if (!tracked_.contains(id)) continue;
+    if (!tracked_.Contains(id)) continue;
     const auto known = before.find(id);
     if (known == before.end()) {
-      after[id] = Pose::Identity();
+      after.T_WO[id] = Pose::Identity();
+      after.seen[id] = TrackStatus::kBegun;
       continue;
     }
     const TrackResult result =
         TrackObject(SegmentPoints(frame, labels, id, config_), mesher_.ObjectMesh(map, id),
                     map.config().voxel_m, config_);
-    after[id] = result.T_O * known->second;
+    after.T_WO[id] = result.T_O * known->second;
+    after.seen[id] = result.converged ? TrackStatus::kTracked : TrackStatus::kStayed;
   }
   return after;
 }

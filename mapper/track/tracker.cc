@@ -1,15 +1,38 @@
 #include "mapper/track/tracker.h"
 
+#include <cstdlib>
+
 namespace tsdfpp {
 
 Expected<PoseSource> PoseSourceFromName(std::string_view name) {
   if (name == "gt") return PoseSource::kGiven;
   if (name == "icp") return PoseSource::kIcp;
-  return UsageError("pose source '{}' is unknown, expected gt or icp", name);
+  if (name == "track") return PoseSource::kTrack;
+  return UsageError("pose source '{}' is unknown, expected gt, icp or track", name);
 }
 
 std::string_view PoseSourceName(PoseSource source) {
-  return source == PoseSource::kGiven ? "gt" : "icp";
+  switch (source) {
+    case PoseSource::kGiven:
+      return "gt";
+    case PoseSource::kIcp:
+      return "icp";
+    case PoseSource::kTrack:
+      return "track";
+  }
+  std::abort();
+}
+
+std::string_view PoseSourceTitle(PoseSource source) {
+  switch (source) {
+    case PoseSource::kGiven:
+      return "given poses";
+    case PoseSource::kIcp:
+      return "ICP";
+    case PoseSource::kTrack:
+      return "tracked";
+  }
+  std::abort();
 }
 
 }  // namespace tsdfpp

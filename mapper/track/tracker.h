@@ -13,6 +13,20 @@ namespace tsdfpp {
 // T_WO by object.
 using ObjectPoses = std::map<InstanceId, Pose>;
 
+// What became of an object that a frame shows.
+enum class TrackStatus {
+  kBegun,    // it had no pose yet
+  kTracked,  // it was registered
+  kStayed,   // it was not, and is taken to be where it was
+  kFrozen,   // it was not, and may be elsewhere: nothing of the frame may be fused into it
+};
+
+// What a tracker says of a frame.
+struct TrackedPoses {
+  ObjectPoses T_WO;                          // of all objects that have had a pose
+  std::map<InstanceId, TrackStatus> seen{};  // of those that are tracked and that the frame shows
+};
+
 class Tracker {
  public:
   virtual ~Tracker() = default;
@@ -20,17 +34,20 @@ class Tracker {
   // The objects' poses after the frame, of all that have had one, by their poses before it.
   // `labels` is the frame's objects as associated with the map, which holds what was fused before
   // the frame.
-  virtual ObjectPoses Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
-                            const ObjectPoses& before) = 0;
+  virtual TrackedPoses Track(const Frame& frame, const cv::Mat& labels,
+                             const MapRepresentation& map, const ObjectPoses& before) = 0;
 };
 
 enum class PoseSource {
   kGiven,  // Frame::T_WO
-  kIcp,    // tracked; Frame::T_WO is not read
+  kIcp,    // tracked as in the paper; Frame::T_WO is not read
+  kTrack,  // tracked by signed distances (mapper/track/sdf_tracker.h); neither
 };
 
-// "gt" or "icp". Errors: kUsage.
+// "gt", "icp" or "track". Errors: kUsage.
 Expected<PoseSource> PoseSourceFromName(std::string_view name);
 std::string_view PoseSourceName(PoseSource source);
+// As titles say it: "given poses", "ICP" or "tracked".
+std::string_view PoseSourceTitle(PoseSource source);
 
 }  // namespace tsdfpp

@@ -55,8 +55,10 @@ TEST(PipelineVerbs, GivenPosesStayWhereAFrameSaysNothing) {
   const Frame frame = SmallFrame();
   const auto map = MakeMap(Method::kTsdfppAnchored, MapConfig());
   const Pose elsewhere(Eigen::Translation3d(5, 5, 5));
-  const ObjectPoses after =
+  const TrackedPoses tracked =
       GivenPoses().Track(frame, frame.mask, *map, {{3, elsewhere}, {7, elsewhere}});
+  EXPECT_TRUE(tracked.seen.empty());
+  const ObjectPoses& after = tracked.T_WO;
   ASSERT_EQ(after.size(), 2U);
   EXPECT_EQ(after.at(3).matrix(), elsewhere.matrix());
   EXPECT_EQ(after.at(7).matrix(), frame.T_WO.at(7).matrix());
@@ -67,13 +69,16 @@ TEST(PipelineVerbs, IcpBeginsWhereAnObjectIsFirstSeen) {
   Frame frame = SmallFrame();
   frame.mask(cv::Rect(0, 0, 1, 4)) = 8;
   const auto map = MakeMap(Method::kTsdfppAnchored, MapConfig());
-  PclIcp icp(IcpConfig(), {{0, "background", "room"}, {7, "car", "car"}, {8, "thing", ""}});
-  const ObjectPoses first = icp.Track(frame, frame.mask, *map, {});
-  ASSERT_EQ(first.size(), 1U);
-  EXPECT_EQ(first.at(7).matrix(), Pose::Identity().matrix());
+  const std::vector<ObjectInfo> objects{{0, "background", "room"}, {7, "car", "car"}, {8, "x", ""}};
+  PclIcp icp(IcpConfig(), TrackedObjects(TrackChoice::kAuto, objects));
+  const TrackedPoses first = icp.Track(frame, frame.mask, *map, {});
+  ASSERT_EQ(first.T_WO.size(), 1U);
+  EXPECT_EQ(first.T_WO.at(7).matrix(), Pose::Identity().matrix());
+  EXPECT_EQ(first.seen.at(7), TrackStatus::kBegun);
   const Pose elsewhere(Eigen::Translation3d(5, 5, 5));
-  const ObjectPoses lost = icp.Track(frame, frame.mask, *map, {{7, elsewhere}});
-  EXPECT_EQ(lost.at(7).matrix(), elsewhere.matrix()) << "it has no mesh to be registered to";
+  const TrackedPoses lost = icp.Track(frame, frame.mask, *map, {{7, elsewhere}});
+  EXPECT_EQ(lost.T_WO.at(7).matrix(), elsewhere.matrix()) << "it has no mesh to be registered to";
+  EXPECT_EQ(lost.seen.at(7), TrackStatus::kStayed);
 }
 
 // Of the mapper's files; tests/eval/stripped_truth_test.cc shows that a map does not notice.

@@ -1,0 +1,99 @@
+// The term of a tracker that compares a segment's points with an object's signed distances
+// (docs/tracking.md; after Bylow et al., RSS 2013).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mapper/track/pose_least_squares.h"
+#include "mapper/track/sdf_track_config.h"
+#include "mapper/track/segment_points.h"
+#include "mapper/volume/object_volume.h"
+
+namespace tsdfpp {
+
+// Where a point stands to a model's surface.
+struct SurfaceSample {
+  bool is_observed = false;  // the eight voxels around the point are
+  bool has_slope = false;    // and their distances tell where the surface is
+  // The distance over the length of its gradient, metres: distances in a map are along the rays
+  // that saw them, up to 1 / cos of the angle of incidence too long.
+  float distance_m = 0;
+  Eigen::Vector3f normal_L = Eigen::Vector3f::Zero();  // the gradient's direction
+  float weight = 0;  // the least number of observations of the eight
+};
+
+// Reads an object's distances. The grid must not change meanwhile.
+class SurfaceReader {
+ public:
+  SurfaceReader(const TsdfGrid& grid, double voxel_m);
+
+  // At a point of the lattice's frame, metres; any point that is not finite is unobserved. `sag_m`
+  // is taken off the distance first.
+  SurfaceSample At(const Eigen::Vector3d& p_L, float sag_m = 0) const;
+
+  // By how much the trilinear interpolation of the voxels around a point lies above a function
+  // whose second differences along the axes are those of the voxels: f (1 - f) / 2 times each, f
+  // the point's place between two voxels, which is exact for any quadratic one. Distances along
+  // rays bend where a surface does, upwards over convex ones, and the more the flatter the rays
+  // fall; without this the interpolated surface of a mug lies some 0.5 mm inside it
+  // (docs/tracking.md). Lines of voxels that go on on neither side count as straight. 0 where a
+  // corner is unobserved.
+  float SagAt(const Eigen::Vector3d& p_L) const;
+
+ private:
+  VoxelReader voxels_;
+  double per_voxel_;
+  float voxel_m_;
+};
+
+// What the points say at a pose.
+struct DistanceCounts {
+  int points = 0;
+  int observed = 0;  // with eight observed voxels around them
+  int inliers = 0;   // of these, nearer to the surface than inlier_voxels
+};
+
+class DistanceTerm {
+ public:
+  // All are read while the term lives. `stride` > 1 takes every stride-th point alone.
+  DistanceTerm(const SurfaceReader& model, std::span<const SegmentPoint> points,
+               const MotionFrame& frame, double voxel_m, const Intrinsics& camera,
+               const SdfTrackConfig& config, std::size_t stride = 1);
+
+  // Beyond this a residual counts linearly, metres.
+  void SetHuber(double huber_m) { huber_m_ = huber_m; }
+
+  // Takes the sags at the points y = T p off their distances from now on.
+  void SetSags(const Pose& T_LC);
+
+  // The terms' sums over the points y = T p, with weights of at most 1 and so in units of a point:
+  // of the least deviation that the config's noise knows. A point without a distance counts as if
+  // it were as far from the surface as an outlier may be. In parallel, in fixed chunks.
+  NormalEquations Sums(const Pose& T_LC) const;
+
+  DistanceCounts Count(const Pose& T_LC) const;
+
+  // 1.4826 times the median of the absolute residuals, metres; `at_least_m` where there are none
+  // or it is smaller.
+  double RobustDeviation_m(const Pose& T_LC, double at_least_m) const;
+
+ private:
+  std::size_t Taken() const { return (points_.size() + stride_ - 1) / stride_; }
+  SurfaceSample SampleAt(const Pose& T_LC, std::size_t i) const {
+    return model_->At(T_LC * points_[i].p_C.cast<double>(), sags_m_.empty() ? 0 : sags_m_[i]);
+  }
+  void AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end, NormalEquations& sums) const;
+
+  const SurfaceReader* model_;
+  std::span<const SegmentPoint> points_;
+  MotionFrame frame_;
+  SdfTrackConfig config_;
+  double voxel_m_;
+  double lateral_per_m_;  // the deviation across the axis, by depth
+  std::size_t stride_;
+  double huber_m_;
+  std::vector<float> sags_m_;  // a point each, or empty
+};
+
+}  // namespace tsdfpp

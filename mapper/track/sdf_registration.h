@@ -1,0 +1,52 @@
+// Where an object is after a frame: its segment registered to its signed distances, by one
+// Levenberg-Marquardt search over six numbers and without matching points (docs/tracking.md).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mapper/track/distance_term.h"
+
+namespace tsdfpp {
+
+// A segment of one frame and what to register it to. T_LC takes the camera's frame to the object's
+// lattice, in which the search is done.
+struct SdfRegistration {
+  const SurfaceReader* model = nullptr;
+  std::span<const SegmentPoint> points{};
+  double voxel_m = 0;
+  Intrinsics camera{};
+  // Where the motion that the object is expected to go on with would bring it.
+  Pose T_LC_expected = Pose::Identity();
+  // Further places to begin at.
+  std::vector<Pose> T_LC_seeds{};
+  // The expected place is as good as right: no coarse pass.
+  bool is_near = false;
+};
+
+struct SdfRegistrationResult {
+  Pose T_LC = Pose::Identity();
+  bool converged = false;
+  int iterations = 0;  // of all passes
+  DistanceCounts counts;
+  double deviation_m = 0;  // robust, of the points' distances to the surface
+  // What the terms know, without the expectation: over the six lengths of `frame`, in points.
+  MotionFrame frame;
+  Matrix6 information = Matrix6::Zero();
+  // The eigenvalues of that, increasing, as shares of the points' weights, and their directions.
+  Vector6 shares = Vector6::Zero();
+  Matrix6 directions = Matrix6::Identity();
+  // Of the six lengths, square metres, if the points' errors were independent of each other and of
+  // `deviation_m`; the expectation counts in it as if it were data.
+  Matrix6 covariance = Matrix6::Zero();
+};
+
+// Registers in two passes: few points and a wide Huber function from every seed, then all points
+// from where the cost was least. Along directions of which less than config.weak_share of the
+// points' information speaks, a prior pulls towards the expected pose, up to that share. Points
+// that are not finite, and a model or segment without anything in it, give converged = false.
+// Deterministic for any number of threads; `config` must be valid.
+SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
+                                          const SdfTrackConfig& config);
+
+}  // namespace tsdfpp

@@ -1,0 +1,103 @@
+#include "mapper/track/sdf_track_config.h"
+
+#include <Eigen/Core>
+#include <cmath>
+
+namespace tsdfpp {
+namespace {
+
+Expected<void> InRange(std::string_view field, double value, double lowest, double highest) {
+  if (std::isfinite(value) && value >= lowest && value <= highest) return {};
+  return UsageError("tracking setting '{}' is {}, expected {} to {}", field, value, lowest,
+                    highest);
+}
+
+}  // namespace
+
+Expected<void> SdfTrackConfig::Validate() const {
+  TSDFPP_RETURN_IF_ERROR(InRange("mask_erosion_px", mask_erosion_px, 0, 50));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_step_voxels", max_step_voxels, 0.01, 1000));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_points", max_points, 10, 1000000));
+  TSDFPP_RETURN_IF_ERROR(InRange("min_points", min_points, 6, max_points));
+  TSDFPP_RETURN_IF_ERROR(InRange("axial_m", axial_m, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("axial_growth", axial_growth, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("lateral_px", lateral_px, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("model_voxels", model_voxels, 0.001, 10));
+  TSDFPP_RETURN_IF_ERROR(InRange("huber_voxels", huber_voxels, 0.001, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("huber_deviations", huber_deviations, 0.1, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("coarse_points", coarse_points, 10, 1000000));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_iterations", max_iterations, 1, 1000));
+  TSDFPP_RETURN_IF_ERROR(InRange("settled_voxels", settled_voxels, 1e-6, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("weak_share", weak_share, 0, 0.1));
+  TSDFPP_RETURN_IF_ERROR(InRange("keyframe_turn_rad", keyframe_turn_rad, 0, EIGEN_PI));
+  TSDFPP_RETURN_IF_ERROR(InRange("keyframe_points", keyframe_points, 10, 1000000));
+  TSDFPP_RETURN_IF_ERROR(InRange("inlier_voxels", inlier_voxels, 0.01, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("min_inlier_share", min_inlier_share, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("min_observed_share", min_observed_share, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_translation_voxels", max_translation_voxels, 0, 1000));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_rotation_rad", max_rotation_rad, 0, EIGEN_PI));
+  TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
+  return {};
+}
+
+Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
+                                                  const std::string& where) {
+  SdfTrackConfig config;
+  TomlReader reader(table, where);
+  reader.Get("mask_erosion_px", config.mask_erosion_px)
+      .Get("max_step_voxels", config.max_step_voxels)
+      .Get("max_points", config.max_points)
+      .Get("min_points", config.min_points)
+      .Get("axial_m", config.axial_m)
+      .Get("axial_growth", config.axial_growth)
+      .Get("lateral_px", config.lateral_px)
+      .Get("model_voxels", config.model_voxels)
+      .Get("curved", config.curved)
+      .Get("huber_voxels", config.huber_voxels)
+      .Get("huber_deviations", config.huber_deviations)
+      .Get("coarse_points", config.coarse_points)
+      .Get("max_iterations", config.max_iterations)
+      .Get("settled_voxels", config.settled_voxels)
+      .Get("weak_share", config.weak_share)
+      .Get("keyframe_turn_rad", config.keyframe_turn_rad)
+      .Get("keyframe_points", config.keyframe_points)
+      .Get("inlier_voxels", config.inlier_voxels)
+      .Get("min_inlier_share", config.min_inlier_share)
+      .Get("min_observed_share", config.min_observed_share)
+      .Get("max_translation_voxels", config.max_translation_voxels)
+      .Get("max_rotation_rad", config.max_rotation_rad)
+      .Get("rest_voxels", config.rest_voxels);
+  TSDFPP_RETURN_IF_ERROR(reader.Finish());
+  if (auto valid = config.Validate(); !valid) {
+    return UsageError("{}: {}", where, valid.error().message);
+  }
+  return config;
+}
+
+toml::table SdfTrackConfig::ToToml() const {
+  return toml::table{{"mask_erosion_px", mask_erosion_px},
+                     {"max_step_voxels", max_step_voxels},
+                     {"max_points", max_points},
+                     {"min_points", min_points},
+                     {"axial_m", axial_m},
+                     {"axial_growth", axial_growth},
+                     {"lateral_px", lateral_px},
+                     {"model_voxels", model_voxels},
+                     {"curved", curved},
+                     {"huber_voxels", huber_voxels},
+                     {"huber_deviations", huber_deviations},
+                     {"coarse_points", coarse_points},
+                     {"max_iterations", max_iterations},
+                     {"settled_voxels", settled_voxels},
+                     {"weak_share", weak_share},
+                     {"keyframe_turn_rad", keyframe_turn_rad},
+                     {"keyframe_points", keyframe_points},
+                     {"inlier_voxels", inlier_voxels},
+                     {"min_inlier_share", min_inlier_share},
+                     {"min_observed_share", min_observed_share},
+                     {"max_translation_voxels", max_translation_voxels},
+                     {"max_rotation_rad", max_rotation_rad},
+                     {"rest_voxels", rest_voxels}};
+}
+
+}  // namespace tsdfpp

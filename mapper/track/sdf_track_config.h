@@ -1,0 +1,65 @@
+// Settings of the tracker that registers an object's segment to the object's signed distances.
+#pragma once
+
+#include <string>
+
+#include "core/error.h"
+#include "core/toml_reader.h"
+
+namespace tsdfpp {
+
+struct SdfTrackConfig {
+  // The segment.
+  int mask_erosion_px = 1;     // taken off its outline, where depth is mixed
+  double max_step_voxels = 2;  // of depth to a pixel beside; more is an edge, which is left out
+  int max_points = 5000;       // more are thinned evenly
+  int min_points = 30;         // with fewer an object is neither begun nor tracked
+
+  // By what points are weighted, standard deviations: axial + axial_growth (z - 0.4)^2 along the
+  // optical axis (metres, z in metres), `lateral_px` across it, as Nguyen, Izadi and Lovell 2012
+  // measured for Kinect (0.0012, 0.0019, 0.8), and `model_voxels` of the model's surface. The first
+  // three are off because the points that they take weight from, at grazing incidence, are those
+  // that hold an object along its length (docs/tracking.md).
+  double axial_m = 0;
+  double axial_growth = 0;  // per metre
+  double lateral_px = 0;
+  double model_voxels = 0.1;
+
+  // Point to signed distance.
+  bool curved = true;       // distances without their sag between voxels (SurfaceReader::SagAt)
+  double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
+  double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
+  int coarse_points = 400;        // of the first pass
+  int max_iterations = 15;        // of each pass
+  double settled_voxels = 0.002;  // settled: an iteration moves no point by more than this
+
+  // Along a direction of which less than this share of the points' information speaks, the object
+  // is expected to move on as it did; 0 switches this off.
+  double weak_share = 0.02;
+
+  // A segment is kept, at most so many points of it, and registered along with each later one until
+  // the object has turned by so much before the camera: what the model adds to both is taken off.
+  // 0 switches this off.
+  double keyframe_turn_rad = 0.15;
+  int keyframe_points = 1500;
+
+  // Gates; an object that fails one is frozen for the frame.
+  double inlier_voxels = 1;         // a point nearer than this to the model's surface is an inlier
+  double min_inlier_share = 0.6;    // of the points at which the model is observed
+  double min_observed_share = 0.3;  // of all points
+  double max_translation_voxels = 10;  // of the segment's centre, for each frame since the last
+  double max_rotation_rad = 0.35;      // for each frame since the last
+
+  // A motion that moves no point by more than this is none: the pose keeps its numbers, so that a
+  // map that resamples what moves does not blur what stands still.
+  double rest_voxels = 0.02;
+
+  // Errors: kUsage, naming the field, what was found and what was expected.
+  Expected<void> Validate() const;
+  // Reads one table strictly; `where` names the file in errors.
+  static Expected<SdfTrackConfig> FromToml(const toml::table& table, const std::string& where);
+  toml::table ToToml() const;
+  bool operator==(const SdfTrackConfig&) const = default;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,180 @@
+#include "mapper/track/sdf_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tsdfpp {
+namespace {
+
+// A seed nearer than this to another begins in the same valley.
+constexpr double kSameSeed_voxels = 0.5;
+// Motions that were not measured for longer than this are not extrapolated.
+constexpr int kLongestExtrapolation_frames = 5;
+
+// With a rotation again after a product of many, whose rounding would else grow.
+Pose AsRigid(Pose T) {
+  T.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
+  return T;
+}
+
+Eigen::Vector3d CentreOf(const std::vector<SegmentPoint>& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const SegmentPoint& point : points) sum += point.p_C.cast<double>();
+  return sum / static_cast<double>(points.size());
+}
+
+// The motion done `times` times.
+Pose Repeated(const Pose& motion, int times) {
+  Pose all = Pose::Identity();
+  for (int i = 0; i < times; ++i) all = all * motion;
+  return all;
+}
+
+// The motion since the frame before, T_WL(before)^-1 * T_WL(after), from T_WL(before).
+Pose MotionOf(const Pose& T_WL, const Pose& T_WC, const Pose& T_LC) {
+  return T_WL.inverse() * T_WC * T_LC.inverse();
+}
+
+// The motion without what it has along directions of which too little is known.
+Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double weak_share) {
+  if (weak_share <= 0) return motion_L;
+  const Vector6 x = found.frame.LengthsOf(motion_L);
+  Vector6 known = Vector6::Zero();
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const Vector6 direction = found.directions.col(i);
+    known += std::min(1.0, found.shares[i] / weak_share) * direction.dot(x) * direction;
+  }
+  return found.frame.MotionOf(known);
+}
+
+}  // namespace
+
+TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
+                               const MapRepresentation& map, const ObjectPoses& before) {
+  TrackedPoses after{before};
+  const double voxel_m = map.config().voxel_m;
+  for (const auto& [id, box] : BoxesOf(labels)) {
+    if (!tracked_.Contains(id)) continue;
+    const auto points = SegmentPointsOf(frame, labels, id, box, voxel_m, config_);
+    TrackStatus& status = after.seen[id];
+    status = TrackStatus::kFrozen;
+    if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
+    Memory& memory = memory_[id];
+    const auto known = before.find(id);
+    if (known == before.end()) {
+      status = TrackStatus::kBegun;
+      after.T_WO[id] = Pose::Identity();
+      memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), std::nullopt};
+      if (config_.keyframe_turn_rad > 0) {
+        memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
+      }
+      continue;
+    }
+    const std::optional<ObjectModel> model = ModelOf(map, id);
+    if (!model) continue;
+    const auto T_WL = Register(frame, points, *model, voxel_m, known->second, memory);
+    if (!T_WL) continue;
+    status = TrackStatus::kTracked;
+    if (SameNumbers(*T_WL, model->T_WL)) continue;  // at rest
+    after.T_WO[id] = AsRigid(*T_WL * model->T_WL.inverse() * known->second);
+  }
+  return after;
+}
+
+std::optional<Pose> SdfTracker::Register(const Frame& frame,
+                                         const std::vector<SegmentPoint>& points,
+                                         const ObjectModel& model, double voxel_m, const Pose& T_WO,
+                                         Memory& memory) const {
+  const SurfaceReader reader(*model.grid, voxel_m);
+  Sight sight{&frame,  &points,    CentreOf(points),           &reader,
+              voxel_m, model.T_WL, model.T_WL.inverse() * T_WO};
+  // An object from a map's file has no memory yet.
+  if (memory.centre_L) sight.passed = std::max(1, frame.index - memory.frame);
+
+  SdfRegistrationResult found = RegisterToDistances(TaskOf(sight, memory), config_);
+  if (!found.converged) return std::nullopt;
+  Calibrate(sight, memory, found);
+  if (!PassesGates(sight, found)) return std::nullopt;
+  Remember(sight, found, memory);
+
+  const Vector6 way = found.frame.LengthsOf(MotionOf(model.T_WL, frame.T_WC, found.T_LC));
+  // Points lie up to some two radii from the centre.
+  const double longest_m = way.head<3>().norm() + 2 * way.tail<3>().norm();
+  if (longest_m <= config_.rest_voxels * voxel_m) return model.T_WL;
+  return AsRigid(frame.T_WC * found.T_LC.inverse());
+}
+
+SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) const {
+  SdfRegistration task{sight.model, *sight.points, sight.voxel_m, sight.frame->intrinsics};
+  const int times = std::min(sight.passed, kLongestExtrapolation_frames);
+  const Pose T_LC_stay = sight.T_WL.inverse() * sight.frame->T_WC;
+  task.T_LC_expected = Repeated(memory.motion_L, times).inverse() * T_LC_stay;
+  const Eigen::Vector3d expected_L = task.T_LC_expected * sight.centre_C;
+  const auto add_seed = [&](const Pose& seed) {
+    if ((seed * sight.centre_C - expected_L).norm() > kSameSeed_voxels * sight.voxel_m) {
+      task.T_LC_seeds.push_back(seed);
+    }
+  };
+  add_seed(T_LC_stay);
+  // As if the same part of it were in sight.
+  if (memory.centre_L) {
+    add_seed(Eigen::Translation3d(*memory.centre_L - expected_L) * task.T_LC_expected);
+  }
+  return task;
+}
+
+void SdfTracker::Calibrate(const Sight& sight, const Memory& memory,
+                           SdfRegistrationResult& found) const {
+  if (!memory.keyframe) return;
+  const Keyframe& keyframe = *memory.keyframe;
+  SdfRegistration task{sight.model, keyframe.points, sight.voxel_m, keyframe.camera};
+  task.T_LC_expected = sight.T_LO * keyframe.T_OC;
+  task.is_near = true;
+  const SdfRegistrationResult apparent = RegisterToDistances(task, config_);
+  if (!apparent.converged) return;
+  found.T_LC = task.T_LC_expected * apparent.T_LC.inverse() * found.T_LC;
+}
+
+bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& found) const {
+  const Vector6 way = found.frame.LengthsOf(MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC));
+  if (!way.allFinite()) return false;
+  const double turn_rad = way.tail<3>().norm() / found.frame.radius_m;
+  const DistanceCounts& counts = found.counts;
+  return way.head<3>().norm() <= config_.max_translation_voxels * sight.voxel_m * sight.passed &&
+         turn_rad <= config_.max_rotation_rad * sight.passed &&
+         counts.observed >= config_.min_observed_share * counts.points &&
+         counts.inliers >= config_.min_inlier_share * counts.observed &&
+         counts.inliers >= config_.min_points;
+}
+
+void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found,
+                          Memory& memory) const {
+  if (memory.keyframe) {
+    const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
+    const Eigen::Matrix3d turn = memory.keyframe->T_OC.linear().transpose() * T_OC.linear();
+    if (Eigen::AngleAxisd(turn).angle() > config_.keyframe_turn_rad) {
+      memory.keyframe = KeyframeOf(*sight.points, T_OC, sight.frame->intrinsics);
+    }
+  }
+  memory.frame = sight.frame->index;
+  memory.centre_L = found.T_LC * sight.centre_C;
+  const Pose motion_L = MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC);
+  memory.motion_L = KnownPart(motion_L, found, config_.weak_share);
+  if (sight.passed > 1) {
+    memory.motion_L = found.frame.MotionOf(found.frame.LengthsOf(memory.motion_L) / sight.passed);
+  }
+}
+
+SdfTracker::Keyframe SdfTracker::KeyframeOf(const std::vector<SegmentPoint>& points,
+                                            const Pose& T_OC, const Intrinsics& camera) const {
+  const std::size_t count =
+      std::min(points.size(), static_cast<std::size_t>(config_.keyframe_points));
+  Keyframe keyframe{{}, T_OC, camera};
+  keyframe.points.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    keyframe.points.push_back(points[i * points.size() / count]);
+  }
+  return keyframe;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,74 @@
+// The pipeline's tracker `track`: registers each object's segment to its signed distances, from
+// where its last motion would bring it, and freezes what it cannot register (docs/tracking.md).
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "mapper/track/object_model.h"
+#include "mapper/track/sdf_registration.h"
+#include "mapper/track/tracked_objects.h"
+#include "mapper/track/tracker.h"
+
+namespace tsdfpp {
+
+class SdfTracker : public Tracker {
+ public:
+  // The config must be valid.
+  SdfTracker(const SdfTrackConfig& config, const TrackedObjects& tracked)
+      : config_(config), tracked_(tracked) {}
+
+  // An object's frame O is its lattice: its pose is the identity where it is first seen with enough
+  // points. Frozen are objects that have too few points, are not registered, or fail a gate: they
+  // stay where they were.
+  TrackedPoses Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
+                     const ObjectPoses& before) override;
+
+ private:
+  // A segment whose place on the object is known: how far off it is when it is registered to the
+  // model as it is now says how far off the model makes others.
+  struct Keyframe {
+    std::vector<SegmentPoint> points;
+    Pose T_OC = Pose::Identity();
+    Intrinsics camera;
+  };
+
+  // What is remembered of an object beside its pose.
+  struct Memory {
+    int frame = 0;                            // the last at which it was tracked
+    Pose motion_L = Pose::Identity();         // a frame: T_WL(before)^-1 * T_WL(after)
+    std::optional<Eigen::Vector3d> centre_L;  // of its segment then
+    std::optional<Keyframe> keyframe;
+  };
+
+  // A frame's segment of an object, and the object as the map has it.
+  struct Sight {
+    const Frame* frame = nullptr;
+    const std::vector<SegmentPoint>* points = nullptr;
+    Eigen::Vector3d centre_C = Eigen::Vector3d::Zero();  // of the points
+    const SurfaceReader* model = nullptr;
+    double voxel_m = 0;
+    Pose T_WL = Pose::Identity();
+    Pose T_LO = Pose::Identity();
+    int passed = 1;  // frames since it was last tracked
+  };
+
+  // The object's T_WL after the frame; nothing where it is frozen. T_WO is that before it.
+  std::optional<Pose> Register(const Frame& frame, const std::vector<SegmentPoint>& points,
+                               const ObjectModel& model, double voxel_m, const Pose& T_WO,
+                               Memory& memory) const;
+  SdfRegistration TaskOf(const Sight& sight, const Memory& memory) const;
+  // Takes off `found` what the keyframe says that the model adds.
+  void Calibrate(const Sight& sight, const Memory& memory, SdfRegistrationResult& found) const;
+  bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
+  void Remember(const Sight& sight, const SdfRegistrationResult& found, Memory& memory) const;
+  Keyframe KeyframeOf(const std::vector<SegmentPoint>& points, const Pose& T_OC,
+                      const Intrinsics& camera) const;
+
+  SdfTrackConfig config_;
+  TrackedObjects tracked_;
+  std::map<InstanceId, Memory> memory_;
+};
+
+}  // namespace tsdfpp

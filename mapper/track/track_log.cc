@@ -1,0 +1,34 @@
+#include "mapper/track/track_log.h"
+
+#include <algorithm>
+
+namespace tsdfpp {
+
+void TrackLog::Add(int frame, const TrackedPoses& tracked) {
+  ++frames_;
+  for (const auto& [id, status] : tracked.seen) {
+    TrackSpan& span = objects_.try_emplace(id, TrackSpan{frame, frame, 0, 0, 0}).first->second;
+    switch (status) {
+      case TrackStatus::kBegun:
+        span.first = span.last = frame;
+        break;
+      case TrackStatus::kTracked:
+        span.last = frame;
+        ++span.tracked;
+        break;
+      case TrackStatus::kStayed:
+        ++span.stayed;
+        break;
+      case TrackStatus::kFrozen:
+        ++span.frozen;
+        break;
+    }
+  }
+}
+
+bool TrackLog::IsEmpty() const {
+  return std::all_of(objects_.begin(), objects_.end(),
+                     [](const auto& object) { return object.second.tracked == 0; });
+}
+
+}  // namespace tsdfpp

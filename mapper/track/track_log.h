@@ -1,0 +1,35 @@
+// What was tracked in a run, and when.
+#pragma once
+
+#include <map>
+
+#include "mapper/track/tracker.h"
+
+namespace tsdfpp {
+
+// Of one object.
+struct TrackSpan {
+  int first = 0;    // the frame at which it began, or of a map that was loaded the first with it
+  int last = 0;     // the last one at which it was registered, or began
+  int tracked = 0;  // frames at which it was registered
+  int stayed = 0;   // that showed it, but not where it is, and were fused
+  int frozen = 0;   // and were not
+  bool operator==(const TrackSpan&) const = default;
+};
+
+class TrackLog {
+ public:
+  void Add(int frame, const TrackedPoses& tracked);
+
+  // Frames that were added.
+  int frames() const { return frames_; }
+  // No object was registered in any frame.
+  bool IsEmpty() const;
+  const std::map<InstanceId, TrackSpan>& objects() const { return objects_; }
+
+ private:
+  int frames_ = 0;
+  std::map<InstanceId, TrackSpan> objects_;
+};
+
+}  // namespace tsdfpp
