@@ -6,9 +6,13 @@ set(_tsdfpp_package ${CMAKE_INSTALL_LIBDIR}/cmake/tsdfpp)
 foreach(room core mapper)
   set_target_properties(tsdfpp_${room} PROPERTIES EXPORT_NAME ${room})
   target_compile_features(tsdfpp_${room} PUBLIC cxx_std_20)
-  # Headers include each other as "core/types.h", whatever folder holds the rooms.
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${room} DESTINATION include/tsdfpp
-          FILES_MATCHING PATTERN "*.h")
+endforeach()
+# Headers include each other as "core/types.h", whatever folder holds the rooms.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core DESTINATION include/tsdfpp FILES_MATCHING PATTERN "*.h")
+file(STRINGS ${PROJECT_SOURCE_DIR}/mapper/public_headers.txt _tsdfpp_public REGEX "^[^#]")
+foreach(header ${_tsdfpp_public})
+  get_filename_component(_tsdfpp_folder ${header} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION include/tsdfpp/${_tsdfpp_folder})
 endforeach()
 install(TARGETS tsdfpp_core tsdfpp_mapper EXPORT tsdfppTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT tsdfppTargets NAMESPACE tsdfpp:: DESTINATION ${_tsdfpp_package})

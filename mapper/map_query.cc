@@ -5,6 +5,9 @@
 
 #include <algorithm>
 
+#include "mapper/volume/object_volume.h"
+#include "mapper/voxel_inspection.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -34,6 +37,13 @@ Eigen::Vector3d TrilinearGradient(const std::array<float, 8>& corner,
 
 }  // namespace
 
+struct MapQuery::Object {
+  InstanceId id;
+  VoxelReader reader;
+  Pose T_LW;
+  Eigen::Matrix3d R_WL;
+};
+
 Expected<MapQuery> MapQuery::Of(const MapRepresentation& map) {
   TSDFPP_ASSIGN(const VoxelInspection* voxels, AskForVoxels(map, "a question about a point"));
   return MapQuery(map, *voxels);
@@ -43,10 +53,12 @@ MapQuery::MapQuery(const MapRepresentation& map, const VoxelInspection& voxels)
     : voxels_(&voxels), voxel_m_(map.config().voxel_m), one_field_(IsOneField(map.method())) {
   const std::vector<InstanceId> ids =
       one_field_ ? std::vector<InstanceId>{kBackground} : map.Objects();
+  std::vector<Object> objects;
   for (const InstanceId id : ids) {
     const Pose T_WL = map.ObjectLattice(id);
-    objects_.push_back({id, VoxelReader(*voxels.GridOf(id)), T_WL.inverse(), T_WL.linear()});
+    objects.push_back({id, VoxelReader(*voxels.GridOf(id)), T_WL.inverse(), T_WL.linear()});
   }
+  objects_ = std::make_shared<const std::vector<Object>>(std::move(objects));
 }
 
 std::optional<SurfaceDistance> MapQuery::Ask(const Object& object,
@@ -76,7 +88,7 @@ std::optional<SurfaceDistance> MapQuery::Ask(const Object& object,
 PointAnswer MapQuery::At(const Eigen::Vector3d& p_W) const {
   PointAnswer answer;
   if (!p_W.allFinite()) return answer;
-  for (const Object& object : objects_) {
+  for (const Object& object : *objects_) {
     if (auto surface = Ask(object, p_W)) answer.objects.push_back(*surface);
   }
   if (answer.objects.empty()) return answer;

@@ -2,14 +2,15 @@
 // and how sure is the map.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "mapper/map_representation.h"
-#include "mapper/volume/object_volume.h"
-#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp {
+
+class VoxelInspection;
 
 // One surface as seen from a point, interpolated trilinearly between the eight voxel centres around
 // the point in the object's own lattice.
@@ -51,19 +52,14 @@ class MapQuery {
  private:
   MapQuery(const MapRepresentation& map, const VoxelInspection& voxels);
 
-  struct Object {
-    InstanceId id;
-    VoxelReader reader;
-    Pose T_LW;
-    Eigen::Matrix3d R_WL;
-  };
+  struct Object;
 
   std::optional<SurfaceDistance> Ask(const Object& object, const Eigen::Vector3d& p_W) const;
 
   const VoxelInspection* voxels_;
   double voxel_m_;
   bool one_field_;
-  std::vector<Object> objects_;
+  std::shared_ptr<const std::vector<Object>> objects_;  // copies ask the same
 };
 
 }  // namespace tsdfpp

@@ -1,11 +1,15 @@
 #include "mapper/scene_mesher.h"
 
 #include <cstdlib>
+#include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "mapper/block_surfaces.h"
+#include "mapper/mesh/field_mesh.h"
 #include "mapper/mesh/mesh_tools.h"
+#include "mapper/mesh/volume_meshes.h"
 
 namespace tsdfpp {
 namespace {
@@ -30,69 +34,85 @@ bool SameMeshes(const TriangleMesh& a, const TriangleMesh& b) {
 
 }  // namespace
 
-void SceneMesher::CheckMethod(const MapRepresentation& map) {
-  if (!method_) method_ = map.method();
-  if (*method_ != map.method()) std::abort();
+struct SceneMesher::Kept {
+  // Aborts where it is another method's map than before.
+  void CheckMethod(const MapRepresentation& map);
+  std::vector<ScenePiece> TakeWholeObjects(const MapRepresentation& map);
+
+  std::optional<Method> method;
+  VolumeMeshes volumes;
+  FieldMesh field;
+  std::map<InstanceId, TriangleMesh> told;  // of a map without blocks
+};
+
+SceneMesher::SceneMesher() : kept_(std::make_unique<Kept>()) {}
+SceneMesher::SceneMesher(SceneMesher&&) noexcept = default;
+SceneMesher& SceneMesher::operator=(SceneMesher&&) noexcept = default;
+SceneMesher::~SceneMesher() = default;
+
+void SceneMesher::Kept::CheckMethod(const MapRepresentation& map) {
+  if (!method) method = map.method();
+  if (*method != map.method()) std::abort();
 }
 
 MeshWork SceneMesher::Update(const MapRepresentation& map) {
-  CheckMethod(map);
+  kept_->CheckMethod(map);
   const auto surfaces = SurfacesOf(map);
   if (!surfaces) return {};
   if (surfaces->field) {
-    return field_.Update(*surfaces->field, static_cast<float>(surfaces->voxel_m));
+    return kept_->field.Update(*surfaces->field, static_cast<float>(surfaces->voxel_m));
   }
-  return volumes_.Update(*surfaces->objects, surfaces->voxel_m);
+  return kept_->volumes.Update(*surfaces->objects, surfaces->voxel_m);
 }
 
 TriangleMesh SceneMesher::SceneMesh(const MapRepresentation& map) {
-  CheckMethod(map);
+  kept_->CheckMethod(map);
   const auto surfaces = SurfacesOf(map);
   if (!surfaces) return map.SceneMesh();
   Update(map);
-  return surfaces->field ? field_.Scene() : volumes_.Scene();
+  return surfaces->field ? kept_->field.Scene() : kept_->volumes.Scene();
 }
 
 TriangleMesh SceneMesher::ObjectMesh(const MapRepresentation& map, InstanceId id) {
-  CheckMethod(map);
+  kept_->CheckMethod(map);
   const auto surfaces = SurfacesOf(map);
   if (!surfaces) return map.ObjectMesh(id);
-  if (surfaces->objects) return volumes_.Object(*surfaces->objects, surfaces->voxel_m, id);
+  if (surfaces->objects) return kept_->volumes.Object(*surfaces->objects, surfaces->voxel_m, id);
   TriangleMesh mesh = FacesOf(SceneMesh(map), id);
   mesh.face_ids.clear();
   return mesh;
 }
 
 SceneChanges SceneMesher::TakeSceneChanges(const MapRepresentation& map) {
-  CheckMethod(map);
+  kept_->CheckMethod(map);
   const auto surfaces = SurfacesOf(map);
-  if (!surfaces) return {TakeWholeObjects(map), {}};
+  if (!surfaces) return {kept_->TakeWholeObjects(map), {}};
   const MeshWork work = Update(map);
-  return {surfaces->field ? field_.TakeChanges() : volumes_.TakeChanges(), work};
+  return {surfaces->field ? kept_->field.TakeChanges() : kept_->volumes.TakeChanges(), work};
 }
 
-std::vector<ScenePiece> SceneMesher::TakeWholeObjects(const MapRepresentation& map) {
+std::vector<ScenePiece> SceneMesher::Kept::TakeWholeObjects(const MapRepresentation& map) {
   const TriangleMesh scene = map.SceneMesh();
   std::set<InstanceId> ids(scene.face_ids.begin(), scene.face_ids.end());
-  for (const auto& [id, mesh] : told_) ids.insert(id);
+  for (const auto& [id, mesh] : told) ids.insert(id);
   std::vector<ScenePiece> parts;
   for (const InstanceId id : ids) {
     TriangleMesh mesh = FacesOf(scene, id);
-    const auto told = told_.find(id);
-    if (told != told_.end() && SameMeshes(told->second, mesh)) continue;
+    const auto before = told.find(id);
+    if (before != told.end() && SameMeshes(before->second, mesh)) continue;
     parts.push_back({id, {}, mesh});
     if (mesh.triangles.empty()) {
-      told_.erase(id);
+      told.erase(id);
     } else {
-      told_.insert_or_assign(id, std::move(mesh));
+      told.insert_or_assign(id, std::move(mesh));
     }
   }
   return parts;
 }
 
 std::size_t SceneMesher::Bytes() const {
-  std::size_t bytes = volumes_.Bytes() + field_.Bytes();
-  for (const auto& [id, mesh] : told_) {
+  std::size_t bytes = kept_->volumes.Bytes() + kept_->field.Bytes();
+  for (const auto& [id, mesh] : kept_->told) {
     bytes += mesh.vertices.size() * sizeof(mesh.vertices[0]) +
              mesh.colours.size() * sizeof(mesh.colours[0]) +
              mesh.triangles.size() * sizeof(mesh.triangles[0]) +

@@ -2,20 +2,13 @@
 // meshed again only after a change in it or next to it (docs/meshes.md).
 #pragma once
 
-#include <map>
-#include <optional>
+#include <memory>
+#include <vector>
 
 #include "mapper/map_representation.h"
-#include "mapper/mesh/field_mesh.h"
-#include "mapper/mesh/volume_meshes.h"
+#include "mapper/mesh/scene_changes.h"
 
 namespace tsdfpp {
-
-// What changed of the visible scene.
-struct SceneChanges {
-  std::vector<ScenePiece> parts;
-  MeshWork work;  // of bringing the kept meshes up to date
-};
 
 // Whoever asks owns one; the map is only read. It is given the same map each time, or another one
 // of the same method and settings, such as a copy: what it gives is what the map gives from
@@ -23,12 +16,12 @@ struct SceneChanges {
 // map whose surfaces do not lie in blocks is asked for its meshes each time.
 class SceneMesher {
  public:
-  SceneMesher() = default;
-  SceneMesher(SceneMesher&&) = default;
-  SceneMesher& operator=(SceneMesher&&) = default;
+  SceneMesher();
+  SceneMesher(SceneMesher&&) noexcept;
+  SceneMesher& operator=(SceneMesher&&) noexcept;
   SceneMesher(const SceneMesher&) = delete;
   SceneMesher& operator=(const SceneMesher&) = delete;
-  ~SceneMesher() = default;
+  ~SceneMesher();
 
   // Brings the kept meshes in line with the map, as SceneMesh() does before it puts them together;
   // says how much there was to do.
@@ -50,14 +43,8 @@ class SceneMesher {
   std::size_t Bytes() const;
 
  private:
-  // Aborts where it is another method's map than before.
-  void CheckMethod(const MapRepresentation& map);
-  std::vector<ScenePiece> TakeWholeObjects(const MapRepresentation& map);
-
-  std::optional<Method> method_;
-  VolumeMeshes volumes_;
-  FieldMesh field_;
-  std::map<InstanceId, TriangleMesh> told_;  // of a map without blocks
+  struct Kept;
+  std::unique_ptr<Kept> kept_;
 };
 
 // All objects with their hidden parts, by increasing id: ObjectMesh of each, with face_ids.

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The mapper installs on its own: builds core and mapper alone, installs them to a prefix that is thrown away, builds
-# examples/ against that prefix and runs it.
+# examples/ and a file that includes every public header against that prefix, and runs the example.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=build/mapper-only
@@ -12,6 +12,17 @@ run() { # its output only where it fails
 run cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release "-DTSDFPP_ROOMS=core;mapper"
 run cmake --build "$build"
 run cmake --install "$build" --prefix "$work/prefix"
+mkdir "$work/headers"
+sed -nE 's/^(mapper\/.*)$/#include "\1"/p' mapper/public_headers.txt >"$work/headers/all.cc"
+cat >"$work/headers/CMakeLists.txt" <<'END'
+cmake_minimum_required(VERSION 3.25)
+project(headers LANGUAGES C CXX)
+find_package(tsdfpp 0.1 REQUIRED)
+add_library(headers OBJECT all.cc)
+target_link_libraries(headers PRIVATE tsdfpp::mapper)
+END
+run cmake -S "$work/headers" -B "$work/headers/build" -G Ninja "-DCMAKE_PREFIX_PATH=$work/prefix"
+run cmake --build "$work/headers/build"
 run cmake -S examples -B "$work/example" -G Ninja -DCMAKE_BUILD_TYPE=Release "-DCMAKE_PREFIX_PATH=$work/prefix"
 run cmake --build "$work/example"
 (cd "$work" && example/move_a_ball)

@@ -8,22 +8,9 @@
 #include <vector>
 
 #include "mapper/mesh/mesh_part.h"
+#include "mapper/mesh/scene_changes.h"
 
 namespace tsdfpp {
-
-// What an update of cached meshes had to do, in blocks.
-struct MeshWork {
-  std::size_t blocks = 0;   // that there are
-  std::size_t changed = 0;  // whose values changed since the last update, new and erased ones too
-  std::size_t remade = 0;   // whose vertices or triangles were made again
-
-  MeshWork& operator+=(const MeshWork& other) {
-    blocks += other.blocks;
-    changed += other.changed;
-    remade += other.remade;
-    return *this;
-  }
-};
 
 class GridMesh {
  public:

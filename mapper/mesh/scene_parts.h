@@ -9,18 +9,10 @@
 
 #include "mapper/index/voxel_labels.h"
 #include "mapper/mesh/mesh_cache.h"
+#include "mapper/mesh/scene_changes.h"
 #include "mapper/volume/object_volume.h"
 
 namespace tsdfpp {
-
-// What one block of one volume adds to the visible scene.
-struct ScenePiece {
-  InstanceId id = kNoInstance;  // of the volume; kNoInstance where the map has one field for all
-  Index3 block;                 // of the volume's lattice
-  // In the world, with face_ids, the triangles of the cubes that the block's voxels name and the
-  // vertices that they use. Vertices at a border are in the parts on both sides.
-  TriangleMesh mesh;
-};
 
 // The mesh of an object's volume and where it stands.
 struct PlacedMesh {
