@@ -77,6 +77,19 @@ void ResampleBox(benchmark::State& state) {
 }
 BENCHMARK(ResampleBox)->Unit(benchmark::kMillisecond)->UseRealTime();
 
+// Depth, normals and ids of the first surface, seen from where the frame was.
+void CastRays(benchmark::State& state) {
+  const Frame frame = WallAndBox();
+  const auto map = MakeMap(Method::kTsdfpp, PaperConfig());
+  map->Fuse(frame, frame.mask);
+  RayCastOptions options;
+  options.colour = false;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(map->CastRays(frame.intrinsics, frame.T_WC, options));
+  }
+}
+BENCHMARK(CastRays)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 // A whole frame of a map whose box moves to and fro.
 void MapFrame(benchmark::State& state, Method method) {
   const Frame frame = WallAndBox();

@@ -13,10 +13,11 @@
 
 namespace tsdfpp {
 
-// Options that every subcommand has.
+// Options that every subcommand has, and one that those have which map.
 struct CommonOptions {
-  bool json = false;  // the result as JSON on stdout; the log goes to stderr always
-  int threads = 0;    // 0 is all cores
+  bool json = false;             // the result as JSON on stdout; the log goes to stderr always
+  int threads = 0;               // 0 is all cores
+  std::string kernels = "simd";  // of the mapper: a name of mapper/kernels.h
 };
 
 // A subcommand's result: what --json prints, and the text printed without it.

@@ -17,6 +17,7 @@
 #include "core/guard.h"
 #include "core/json_text.h"
 #include "core/one_line.h"
+#include "mapper/kernels.h"
 
 namespace {
 
@@ -46,24 +47,35 @@ int RunCommand(int argc, char** argv) {
     command->add_option("--threads", common.threads, "Worker threads; all cores by default")
         ->check(tsdfpp::WholeBetween(1, 1024));
     runs[command] = function(*command, common);
+    return command;
+  };
+  const auto add_that_maps = [&](const char* name, const char* help, const auto& function) {
+    add(name, help, function)
+        ->add_option("--kernels", common.kernels,
+                     "The mapper's inner loops: simd (vectors) or plain (voxel by voxel, slower); "
+                     "the results are the same")
+        ->check(tsdfpp::OneOf({"simd", "plain"}))
+        ->capture_default_str();
   };
   add("doctor", "Say what this machine has and what is missing", tsdfpp::AddDoctor);
   add("generate", "Render a scene to a sequence on disk", tsdfpp::AddGenerate);
   add("verify", "Check a sequence of ours against itself and against rays", tsdfpp::AddVerify);
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
-  add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
+  add_that_maps("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
   add("methods", "List the methods that map knows", tsdfpp::AddMethods);
-  add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
+  add_that_maps("compare", "Run the paper's experiment on a scene or a sequence",
+                tsdfpp::AddCompare);
   add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
       tsdfpp::AddEvaluate);
   add("report", "Make a page of what compare wrote, in one HTML file", tsdfpp::AddReport);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
-  add("sweep", "Run an experiment: methods, scenes, seeds and settings, paired", tsdfpp::AddSweep);
-  add("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
-  add("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
-      tsdfpp::AddBenchSet);
-  add("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
+  add_that_maps("sweep", "Run an experiment: methods, scenes, seeds and settings, paired",
+                tsdfpp::AddSweep);
+  add_that_maps("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
+  add_that_maps("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
+                tsdfpp::AddBenchSet);
+  add_that_maps("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
 
   try {
     app.parse(argc, argv);
@@ -85,6 +97,7 @@ int RunCommand(int argc, char** argv) {
                                              tsdfpp::OneLine(what, kMostOfAnOption), command));
     return static_cast<int>(ErrorKind::kUsage);
   }
+  tsdfpp::UseKernels(tsdfpp::KernelsFromName(common.kernels).value());
   std::unique_ptr<tbb::global_control> limit;
   if (common.threads > 0) {
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,

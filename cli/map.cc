@@ -16,6 +16,7 @@
 #include "eval/run/open_source.h"
 #include "eval/run/run_folder.h"
 #include "mapper/index/voxel_list.h"
+#include "mapper/kernels.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -192,6 +193,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
       {"trunc_front_voxels", config.map.trunc_front_voxels},
       {"trunc_back_voxels", config.map.trunc_back_voxels},
       {"layers", LayersOf(config.method, config.map)},
+      {"kernels", KernelsName(UsedKernels())},
       {"times", times.ToJson()},
       {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
   };

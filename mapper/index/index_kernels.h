@@ -33,4 +33,11 @@ struct OrderedLists {
 void InsertByDistance(const BlockMask& covered, const float* distance, InstanceId id,
                       const OrderedLists& lists);
 
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::VoteForActive) VoteForActive;
+decltype(tsdfpp::ListAlone) ListAlone;
+decltype(tsdfpp::InsertByDistance) InsertByDistance;
+}  // namespace plain
+
 }  // namespace tsdfpp

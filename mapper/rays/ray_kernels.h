@@ -6,23 +6,11 @@
 #include <cstdint>
 
 #include "mapper/rays/ray_blocks.h"
+#include "mapper/rays/tile_order.h"
 
 namespace tsdfpp {
 
-inline constexpr int kTileSide = 16;
-inline constexpr int kTilePixels = kTileSide * kTileSide;
 using TileValues = std::array<float, kTilePixels>;
-
-// Column and row of a tile's i-th pixel: squares of 4x4 pixels, these in squares of squares, so
-// that neighbours in the order are neighbours in the image, and pixels 4 k ... 4 k + 3 one after
-// another in a row of it.
-struct TileOrder {
-  TileOrder();
-  std::array<std::uint8_t, kTilePixels> x{};
-  std::array<std::uint8_t, kTilePixels> y{};
-  std::array<std::uint8_t, kTilePixels> place{};  // i of column x and row y, at 16 y + x
-};
-const TileOrder& OrderOfTile();
 
 // Directions of a tile's rays in a lattice, voxels per metre of depth, and 1 / them. A component
 // near 0 is kept off it.
@@ -63,5 +51,12 @@ void PrefetchBlock(const RayBlock& block);
 // depth in `hits`.
 float CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
                        const TileRays& rays, float voxel, const TileValues& from, TileHits& hits);
+
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::FillTileRays) FillTileRays;
+decltype(tsdfpp::CopyCorners) CopyCorners;
+decltype(tsdfpp::CastThroughBlock) CastThroughBlock;
+}  // namespace plain
 
 }  // namespace tsdfpp

@@ -45,4 +45,11 @@ BlockMask CornersOfCubes(const LowerMasks& cubes);
 BlockMask ChangedSigns(const BlockMask& old_observed, const BlockMask& old_negative,
                        const BlockMask& observed, const BlockMask& negative);
 
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::FindCubeMasks) FindCubeMasks;
+decltype(tsdfpp::CornersOfCubes) CornersOfCubes;
+decltype(tsdfpp::ChangedSigns) ChangedSigns;
+}  // namespace plain
+
 }  // namespace tsdfpp

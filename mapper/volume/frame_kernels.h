@@ -59,4 +59,10 @@ inline constexpr std::size_t kKeysPerStep = 8;
 std::size_t BlocksAtPoints(const CameraInLattice& camera, const RayPoints& where,
                            const RayBatch& rays, std::uint64_t* keys);
 
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::SummariseTiles) SummariseTiles;
+decltype(tsdfpp::BlocksAtPoints) BlocksAtPoints;
+}  // namespace plain
+
 }  // namespace tsdfpp

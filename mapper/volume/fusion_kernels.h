@@ -82,4 +82,10 @@ struct LabelVotes {
 FusionResult FuseVoxels(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                         TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes = nullptr);
 
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::ObserveVoxels) ObserveVoxels;
+decltype(tsdfpp::FuseVoxels) FuseVoxels;
+}  // namespace plain
+
 }  // namespace tsdfpp

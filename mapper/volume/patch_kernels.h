@@ -43,7 +43,7 @@ struct PatchCubes {
   PatchRows any_negative;
   PatchRows crossed;  // all are observed, and of both signs
 };
-void CubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes);
+void PatchCubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes);
 
 // The points whose lowest corner is marked.
 BlockMask MarkedAt(const PatchRows& rows, const PulledPoints& points);
@@ -61,5 +61,15 @@ enum class PatchField { kDistance, kWeight, kColourCount, kRed, kGreen, kBlue };
 // voxel is not observed; those beyond `high` mean nothing.
 void PatchValuesOf(const PatchBlocks& blocks, const PulledPoints& points, PatchField field,
                    PatchValues& values);
+
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::PatchBits) PatchBits;
+decltype(tsdfpp::PatchCubesOf) PatchCubesOf;
+decltype(tsdfpp::MarkedAt) MarkedAt;
+decltype(tsdfpp::MarkedNearest) MarkedNearest;
+decltype(tsdfpp::InMarkedCube) InMarkedCube;
+decltype(tsdfpp::PatchValuesOf) PatchValuesOf;
+}  // namespace plain
 
 }  // namespace tsdfpp

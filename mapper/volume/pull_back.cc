@@ -65,7 +65,7 @@ bool CoverOfBlock(const VoxelReader& reader, const std::array<double, 12>& T_LW,
   PatchBits(blocks, points, &TsdfBlock::observed, observed);
   PatchBits(blocks, points, &TsdfBlock::negative, negative);
   PatchCubes cubes;
-  CubesOf(observed, negative, cubes);
+  PatchCubesOf(observed, negative, cubes);
   // Both conditions of a cover need a negative corner, in the point's own cube unless the point
   // lies on a plane: then one of the cubes around it, and its own cube's lower corners are among
   // theirs.
@@ -97,7 +97,7 @@ bool ResampleBlock(const VoxelReader& reader, const std::array<double, 12>& T_in
   BlockMask wanted;
   if (all_count) {
     PatchCubes cubes;
-    CubesOf(observed, PatchRows{}, cubes);
+    PatchCubesOf(observed, PatchRows{}, cubes);
     wanted = MarkedAt(cubes.all_observed, points);
   } else {
     wanted = MarkedNearest(observed, points);

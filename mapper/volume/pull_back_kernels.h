@@ -44,4 +44,15 @@ void PutColours(const std::array<PatchValues, 3>& channels, const PatchValues& c
                 const PulledPoints& points, const BlockMask& wanted, const float* points_count,
                 TsdfBlock& block);
 
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::PullBackPoints) PullBackPoints;
+decltype(tsdfpp::InterpolateCounted) InterpolateCounted;
+decltype(tsdfpp::InterpolateAll) InterpolateAll;
+decltype(tsdfpp::InterpolateObserved) InterpolateObserved;
+decltype(tsdfpp::Covered) Covered;
+decltype(tsdfpp::PutValues) PutValues;
+decltype(tsdfpp::PutColours) PutColours;
+}  // namespace plain
+
 }  // namespace tsdfpp

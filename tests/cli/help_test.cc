@@ -146,6 +146,35 @@ TEST(CommandMap, GoesOnFromAFileAsIfItHadNotStopped) {
   EXPECT_FALSE(std::filesystem::exists(folder / "none"));
 }
 
+// The plain kernels leave the same files as those of vectors; only what maps takes the option.
+TEST(CommandMap, KernelsChangeNoByte) {
+  const TempFolder folder;
+  for (const std::string kernels : {"simd", "plain"}) {
+    const CommandOutput output =
+        RunTsdfpp({"map", kMini, "--until", "2", "--views", "1", "--kernels", kernels, "--save",
+                   folder / (kernels + ".map"), "--out", folder / kernels},
+                  folder.path());
+    ASSERT_EQ(output.exit_code, 0) << output.err;
+    const auto stats = nlohmann::json::parse(ReadFile(folder / kernels / "stats.json").value());
+    EXPECT_EQ(stats.at("kernels"), kernels);
+  }
+  const auto files = FilesOf(folder / "simd");
+  EXPECT_GE(files.size(), 8U);
+  EXPECT_TRUE(FilesOf(folder / "plain") == files);
+  EXPECT_TRUE(ReadFile(folder / "plain.map").value() == ReadFile(folder / "simd.map").value());
+
+  for (const char* command : {"map", "compare", "sweep", "replay", "bench-set", "gate"}) {
+    const CommandOutput help = RunTsdfpp({command, "--help"}, folder.path());
+    EXPECT_NE(help.out.find("--kernels"), std::string::npos) << command;
+  }
+  const CommandOutput unknown =
+      RunTsdfpp({"map", kMini, "--kernels", "fast", "--out", folder / "none"}, folder.path());
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_NE(unknown.err.find("--kernels"), std::string::npos) << unknown.err;
+  const CommandOutput elsewhere = RunTsdfpp({"doctor", "--kernels", "plain"}, folder.path());
+  EXPECT_EQ(elsewhere.exit_code, 2);
+}
+
 TEST(CommandMap, WritesGltfWithANodeAnObject) {
   const TempFolder folder;
   const std::vector<std::string> arguments{"map",           kMini, "--until", "2",

@@ -1,10 +1,11 @@
-#include "mapper/rays/ray_kernels.h"
-
 #include <hwy/cache_control.h>
 
-// One pass of this file an instruction set, as fusion_kernels.cc.
+#include "mapper/kernels.h"
+#include "mapper/rays/ray_kernels.h"
+
+// One pass of this file an instruction set, as fusion_kernels_simd.cc.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/rays/ray_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/rays/ray_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -339,28 +340,14 @@ HWY_EXPORT(FillRays);
 HWY_EXPORT(Cast);
 HWY_EXPORT(FillCorners);
 
-TileOrder::TileOrder() {
-  for (unsigned i = 0; i < kTilePixels; ++i) {
-    const unsigned square = i / 16;
-    const unsigned column = 4 * ((square & 1U) | (square >> 1U & 2U)) + i % 4;
-    const unsigned row = 4 * ((square >> 1U & 1U) | (square >> 2U & 2U)) + i / 4 % 4;
-    x[i] = static_cast<std::uint8_t>(column);
-    y[i] = static_cast<std::uint8_t>(row);
-    place[kTileSide * row + column] = static_cast<std::uint8_t>(i);
-  }
-}
-
-const TileOrder& OrderOfTile() {
-  static const TileOrder order;
-  return order;
-}
-
 void FillTileRays(const LatticeRays& lattice, int u, int v, TileRays& rays) {
-  HWY_DYNAMIC_DISPATCH(FillRays)(lattice, u, v, rays);
+  const auto run = UsesPlainKernels() ? plain::FillTileRays : HWY_DYNAMIC_DISPATCH(FillRays);
+  run(lattice, u, v, rays);
 }
 
 void CopyCorners(const std::array<const Half*, 8>& from, RayBlock& block) {
-  HWY_DYNAMIC_DISPATCH(FillCorners)(from, block);
+  const auto run = UsesPlainKernels() ? plain::CopyCorners : HWY_DYNAMIC_DISPATCH(FillCorners);
+  run(from, block);
 }
 
 void PrefetchBlock(const RayBlock& block) {
@@ -371,7 +358,8 @@ void PrefetchBlock(const RayBlock& block) {
 
 float CastThroughBlock(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
                        const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
-  return HWY_DYNAMIC_DISPATCH(Cast)(block, number, lattice, rays, voxel, from, hits);
+  const auto run = UsesPlainKernels() ? plain::CastThroughBlock : HWY_DYNAMIC_DISPATCH(Cast);
+  return run(block, number, lattice, rays, voxel, from, hits);
 }
 
 }  // namespace tsdfpp

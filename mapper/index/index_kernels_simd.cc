@@ -1,8 +1,9 @@
 #include "mapper/index/index_kernels.h"
+#include "mapper/kernels.h"
 
-// One pass of this file an instruction set (see fusion_kernels.cc).
+// One pass of this file an instruction set (see fusion_kernels_simd.cc).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/index/index_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/index/index_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -97,16 +98,19 @@ HWY_EXPORT(Insert);
 
 VotesCounted VoteForActive(const BlockMask& votes, InstanceId id, int confidence_cap,
                            const InstanceId* active, std::uint8_t* confidences) {
-  return HWY_DYNAMIC_DISPATCH(Votes)(votes, id, confidence_cap, active, confidences);
+  const auto run = UsesPlainKernels() ? plain::VoteForActive : HWY_DYNAMIC_DISPATCH(Votes);
+  return run(votes, id, confidence_cap, active, confidences);
 }
 
 void ListAlone(const BlockMask& covered, InstanceId id, InstanceId* ids) {
-  HWY_DYNAMIC_DISPATCH(Alone)(covered, id, ids);
+  const auto run = UsesPlainKernels() ? plain::ListAlone : HWY_DYNAMIC_DISPATCH(Alone);
+  run(covered, id, ids);
 }
 
 void InsertByDistance(const BlockMask& covered, const float* distance, InstanceId id,
                       const OrderedLists& lists) {
-  HWY_DYNAMIC_DISPATCH(Insert)(covered, distance, id, lists);
+  const auto run = UsesPlainKernels() ? plain::InsertByDistance : HWY_DYNAMIC_DISPATCH(Insert);
+  run(covered, distance, id, lists);
 }
 
 }  // namespace tsdfpp

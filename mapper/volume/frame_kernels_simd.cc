@@ -1,12 +1,12 @@
-#include "mapper/volume/frame_kernels.h"
-
 #include <algorithm>
 
+#include "mapper/kernels.h"
+#include "mapper/volume/frame_kernels.h"
 #include "mapper/volume/fusion_kernels.h"
 
-// One pass of this file an instruction set (see fusion_kernels.cc).
+// One pass of this file an instruction set (see fusion_kernels_simd.cc).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/volume/frame_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/volume/frame_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -160,12 +160,14 @@ HWY_EXPORT(Summarise);
 HWY_EXPORT(RayBlocks);
 
 void SummariseTiles(const KernelFrame& frame, int row, Tile* tiles) {
-  HWY_DYNAMIC_DISPATCH(Summarise)(frame, row, tiles);
+  const auto run = UsesPlainKernels() ? plain::SummariseTiles : HWY_DYNAMIC_DISPATCH(Summarise);
+  run(frame, row, tiles);
 }
 
 std::size_t BlocksAtPoints(const CameraInLattice& camera, const RayPoints& where,
                            const RayBatch& rays, std::uint64_t* keys) {
-  return HWY_DYNAMIC_DISPATCH(RayBlocks)(camera, where, rays, keys);
+  const auto run = UsesPlainKernels() ? plain::BlocksAtPoints : HWY_DYNAMIC_DISPATCH(RayBlocks);
+  return run(camera, where, rays, keys);
 }
 
 }  // namespace tsdfpp

@@ -1,8 +1,9 @@
+#include "mapper/kernels.h"
 #include "mapper/volume/cube_masks.h"
 
-// One pass of this file an instruction set (see fusion_kernels.cc).
+// One pass of this file an instruction set (see fusion_kernels_simd.cc).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/volume/cube_masks.cc"
+#define HWY_TARGET_INCLUDE "mapper/volume/cube_masks_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -157,14 +158,19 @@ HWY_EXPORT(CornersOf);
 HWY_EXPORT(Changed);
 
 CubeMasks FindCubeMasks(const UpperMasks& observed, const UpperMasks& negative) {
-  return HWY_DYNAMIC_DISPATCH(CubesOf)(observed, negative);
+  const auto run = UsesPlainKernels() ? plain::FindCubeMasks : HWY_DYNAMIC_DISPATCH(CubesOf);
+  return run(observed, negative);
 }
 
-BlockMask CornersOfCubes(const LowerMasks& cubes) { return HWY_DYNAMIC_DISPATCH(CornersOf)(cubes); }
+BlockMask CornersOfCubes(const LowerMasks& cubes) {
+  const auto run = UsesPlainKernels() ? plain::CornersOfCubes : HWY_DYNAMIC_DISPATCH(CornersOf);
+  return run(cubes);
+}
 
 BlockMask ChangedSigns(const BlockMask& old_observed, const BlockMask& old_negative,
                        const BlockMask& observed, const BlockMask& negative) {
-  return HWY_DYNAMIC_DISPATCH(Changed)(old_observed, old_negative, observed, negative);
+  const auto run = UsesPlainKernels() ? plain::ChangedSigns : HWY_DYNAMIC_DISPATCH(Changed);
+  return run(old_observed, old_negative, observed, negative);
 }
 
 }  // namespace tsdfpp

@@ -1,11 +1,12 @@
-#include "mapper/volume/pull_back_kernels.h"
-
 #include <algorithm>
 #include <cstdlib>
 
-// One pass of this file an instruction set (see fusion_kernels.cc).
+#include "mapper/kernels.h"
+#include "mapper/volume/pull_back_kernels.h"
+
+// One pass of this file an instruction set (see fusion_kernels_simd.cc).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/volume/pull_back_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/volume/pull_back_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -271,38 +272,45 @@ HWY_EXPORT(Put);
 
 void PullBackPoints(const std::array<double, 12>& T, double voxel_m, const Index3& first,
                     PulledPoints& points) {
-  HWY_DYNAMIC_DISPATCH(Points)(T, voxel_m, first, points);
+  const auto run = UsesPlainKernels() ? plain::PullBackPoints : HWY_DYNAMIC_DISPATCH(Points);
+  run(T, voxel_m, first, points);
 }
 
 void InterpolateCounted(const PatchValues& values, const PulledPoints& points,
                         const BlockMask& wanted, float* out) {
-  HWY_DYNAMIC_DISPATCH(Counted)(values, points, wanted, out);
+  const auto run = UsesPlainKernels() ? plain::InterpolateCounted : HWY_DYNAMIC_DISPATCH(Counted);
+  run(values, points, wanted, out);
 }
 
 void InterpolateAll(const PatchValues& values, const PulledPoints& points, const BlockMask& wanted,
                     float* out) {
-  HWY_DYNAMIC_DISPATCH(All)(values, points, wanted, out);
+  const auto run = UsesPlainKernels() ? plain::InterpolateAll : HWY_DYNAMIC_DISPATCH(All);
+  run(values, points, wanted, out);
 }
 
 void InterpolateObserved(const PatchValues& values, const PulledPoints& points,
                          const BlockMask& wanted, float* out) {
-  HWY_DYNAMIC_DISPATCH(Observed)(values, points, wanted, out);
+  const auto run = UsesPlainKernels() ? plain::InterpolateObserved : HWY_DYNAMIC_DISPATCH(Observed);
+  run(values, points, wanted, out);
 }
 
 BlockMask Covered(const BlockMask& wanted, const BlockMask& in_crossed, const float* distance,
                   float back) {
-  return HWY_DYNAMIC_DISPATCH(Cover)(wanted, in_crossed, distance, back);
+  const auto run = UsesPlainKernels() ? plain::Covered : HWY_DYNAMIC_DISPATCH(Cover);
+  return run(wanted, in_crossed, distance, back);
 }
 
 void PutValues(const BlockMask& wanted, const float* distance, const float* weight,
                TsdfBlock& block) {
-  HWY_DYNAMIC_DISPATCH(Put)(wanted, distance, weight, block);
+  const auto run = UsesPlainKernels() ? plain::PutValues : HWY_DYNAMIC_DISPATCH(Put);
+  run(wanted, distance, weight, block);
 }
 
 void PutColours(const std::array<PatchValues, 3>& channels, const PatchValues& count,
                 const PulledPoints& points, const BlockMask& wanted, const float* points_count,
                 TsdfBlock& block) {
-  HWY_DYNAMIC_DISPATCH(Colours)(channels, count, points, wanted, points_count, block);
+  const auto run = UsesPlainKernels() ? plain::PutColours : HWY_DYNAMIC_DISPATCH(Colours);
+  run(channels, count, points, wanted, points_count, block);
 }
 
 }  // namespace tsdfpp

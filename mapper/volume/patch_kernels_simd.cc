@@ -1,10 +1,11 @@
-#include "mapper/volume/patch_kernels.h"
-
 #include <limits>
 
-// One pass of this file an instruction set (see fusion_kernels.cc).
+#include "mapper/kernels.h"
+#include "mapper/volume/patch_kernels.h"
+
+// One pass of this file an instruction set (see fusion_kernels_simd.cc).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/volume/patch_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/volume/patch_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -276,28 +277,34 @@ HWY_EXPORT(FieldValues);
 
 void PatchBits(const PatchBlocks& blocks, const PulledPoints& points, BlockMask TsdfBlock::*mask,
                PatchRows& rows) {
-  HWY_DYNAMIC_DISPATCH(Bits)(blocks, points, mask, rows);
+  const auto run = UsesPlainKernels() ? plain::PatchBits : HWY_DYNAMIC_DISPATCH(Bits);
+  run(blocks, points, mask, rows);
 }
 
-void CubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes) {
-  HWY_DYNAMIC_DISPATCH(Cubes)(observed, negative, cubes);
+void PatchCubesOf(const PatchRows& observed, const PatchRows& negative, PatchCubes& cubes) {
+  const auto run = UsesPlainKernels() ? plain::PatchCubesOf : HWY_DYNAMIC_DISPATCH(Cubes);
+  run(observed, negative, cubes);
 }
 
 BlockMask MarkedAt(const PatchRows& rows, const PulledPoints& points) {
-  return HWY_DYNAMIC_DISPATCH(Marked)(rows, points);
+  const auto run = UsesPlainKernels() ? plain::MarkedAt : HWY_DYNAMIC_DISPATCH(Marked);
+  return run(rows, points);
 }
 
 BlockMask MarkedNearest(const PatchRows& rows, const PulledPoints& points) {
-  return HWY_DYNAMIC_DISPATCH(Nearest)(rows, points);
+  const auto run = UsesPlainKernels() ? plain::MarkedNearest : HWY_DYNAMIC_DISPATCH(Nearest);
+  return run(rows, points);
 }
 
 BlockMask InMarkedCube(const PatchRows& cubes, const PulledPoints& points) {
-  return HWY_DYNAMIC_DISPATCH(InCubes)(cubes, points);
+  const auto run = UsesPlainKernels() ? plain::InMarkedCube : HWY_DYNAMIC_DISPATCH(InCubes);
+  return run(cubes, points);
 }
 
 void PatchValuesOf(const PatchBlocks& blocks, const PulledPoints& points, PatchField field,
                    PatchValues& values) {
-  HWY_DYNAMIC_DISPATCH(FieldValues)(blocks, points, field, values);
+  const auto run = UsesPlainKernels() ? plain::PatchValuesOf : HWY_DYNAMIC_DISPATCH(FieldValues);
+  run(blocks, points, field, values);
 }
 
 }  // namespace tsdfpp

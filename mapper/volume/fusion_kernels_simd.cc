@@ -1,19 +1,19 @@
-#include "mapper/volume/fusion_kernels.h"
-
 #include <hwy/cache_control.h>
 
 #include <algorithm>
 #include <bit>
 
 #include "core/types.h"
+#include "mapper/kernels.h"
 #include "mapper/volume/cube_masks.h"
 #include "mapper/volume/frame_reads.h"
+#include "mapper/volume/fusion_kernels.h"
 
 // One pass of this file an instruction set; the machine's best is chosen at run time. On x86-64 all
 // give the same bits: only correctly rounded operations, none contracted
 // (cmake/TsdfppTarget.cmake).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/volume/fusion_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/volume/fusion_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -269,7 +269,8 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       const auto taken_w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
       const auto w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), taken_w);
       hn::StoreU(hn::DemoteTo(d8, Truncated(w)), d8, &block.weight[i]);
-      PutBits(df, hn::Eq(w, cap), i, full.data());
+      const auto still_full = hn::AndNot(touched, is_full);
+      PutBits(df, hn::Or(still_full, hn::And(touched, hn::Eq(w, cap))), i, full.data());
       PutBits(df, against, i, cleared.data());
       PutBits(df, hn::AndNot(free, against), i, lost.data());
       any_cleared = true;
@@ -277,7 +278,7 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       // Full weights stay what they are: then the memory need not be written.
       const auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
       hn::StoreU(hn::DemoteTo(d8, Truncated(w)), d8, &block.weight[i]);
-      PutBits(df, hn::Eq(w, cap), i, full.data());
+      PutBits(df, hn::Or(is_full, hn::And(taken, hn::Eq(w, cap))), i, full.data());
     }
     StoreHalves(df, d, &block.distance[i]);
     PutBits(df, hn::Lt(d, zero), i, negative.data());
@@ -336,12 +337,14 @@ HWY_EXPORT(Fuse);
 
 bool ObserveVoxels(const KernelFrame& frame, const BlockPlace& place, float back,
                    BlockObservation& out) {
-  return HWY_DYNAMIC_DISPATCH(Observe)(frame, place, back, out);
+  const auto run = UsesPlainKernels() ? plain::ObserveVoxels : HWY_DYNAMIC_DISPATCH(Observe);
+  return run(frame, place, back, out);
 }
 
 FusionResult FuseVoxels(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                         TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
-  return HWY_DYNAMIC_DISPATCH(Fuse)(frame, place, rule, block, next, votes);
+  const auto run = UsesPlainKernels() ? plain::FuseVoxels : HWY_DYNAMIC_DISPATCH(Fuse);
+  return run(frame, place, rule, block, next, votes);
 }
 
 }  // namespace tsdfpp
