@@ -9,6 +9,7 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/rays/cubic_lanes-inl.h"
 #include "mapper/volume/half_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -16,13 +17,6 @@ namespace tsdfpp::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-
-// Registers of at most this many rays: with more, neighbours have less in common.
-using DF = hn::CappedTag<float, 16>;
-using DI = hn::RebindToSigned<DF>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
-using MF = decltype(hn::Lt(VF(), VF()));
 
 void FillRays(const LatticeRays& lattice, int u0, int v0, TileRays& rays) {
   constexpr float kLeast = 1e-4F;  // voxels per metre
@@ -76,10 +70,32 @@ struct Axis {
   VF ahead;  // 1 where the next plane is the cube's upper one, 0 where its lower one
   VF low;    // of the crossed cubes
   VF last;
+
+  HWY_INLINE VF At(VF depth) const { return hn::Add(origin, hn::Mul(direction, depth)); }
+  HWY_INLINE VF DepthOf(VF plane) const { return hn::Mul(hn::Sub(plane, origin), inverse); }
+};
+
+// Rays on their way through a block, one a lane.
+struct Walk {
+  Axis x;
+  Axis y;
+  Axis z;
+  VF t;       // depth
+  VF end;     // where the box around the crossed cubes ends, or what has been met
+  VI place;   // of the cube in the block
+  MF active;  // the others have met something, or have left
+};
+
+// Where the rays leave the cubes that they are in.
+struct WayOut {
+  VF x;  // depths of the next planes
+  VF y;
+  VF z;
+  VF first;
 };
 
 // Of a block's sixteen words the one that each lane names: they fit into the widest registers.
-VI WordsAt(const std::int32_t* words, VI index) {
+HWY_INLINE VI WordsAt(const std::int32_t* words, VI index) {
   const DI di;
 #if HWY_MAX_BYTES >= 64 && HWY_TARGET != HWY_SCALAR
   if (hn::Lanes(di) == 16) {
@@ -89,240 +105,209 @@ VI WordsAt(const std::int32_t* words, VI index) {
   return hn::GatherIndex(di, words, index);
 }
 
-float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
-           const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
+// Cuts the rays to the box around the crossed cubes, along one axis.
+HWY_INLINE void EnterBox(const RayBlock& block, const TileRays& rays, float origin, std::size_t a,
+                         std::size_t i, Axis& axis, Walk& walk) {
+  const DF df;
+  axis.origin = hn::Set(df, origin);
+  axis.direction = hn::LoadU(df, rays.direction[a].data() + i);
+  axis.inverse = hn::LoadU(df, rays.inverse[a].data() + i);
+  const VF low = axis.DepthOf(hn::Set(df, block.cubes.low[a]));
+  const VF high = axis.DepthOf(hn::Set(df, block.cubes.high[a]));
+  walk.t = hn::Max(walk.t, hn::Min(low, high));
+  walk.end = hn::Min(walk.end, hn::Max(low, high));
+}
+
+// The cubes in which the rays begin, and how they step, along one axis.
+HWY_INLINE void BeginAt(const RayBlock& block, std::size_t a, Axis& axis, Walk& walk) {
   const DF df;
   const DI di;
   const VF zero = hn::Zero(df);
   const VF one = hn::Set(df, 1.0F);
-  // A face between two cubes is reached from both with other roundings: what is hardly negative
-  // counts as outside where a cube is entered.
+  axis.low = hn::Set(df, block.cubes.low[a]);
+  axis.last = hn::Set(df, static_cast<float>(block.cubes.high[a]) - 1.0F);
+  const VF at = axis.At(hn::IfThenElse(walk.active, walk.t, zero));
+  const VF inside = hn::Min(hn::Max(at, axis.low), axis.last);
+  const VI cell = hn::ConvertTo(di, inside);
+  axis.cell = hn::ConvertTo(df, cell);
+  walk.place = hn::Add(walk.place, hn::ShiftLeftSame(cell, static_cast<int>(3 * a)));
+  const MF up = hn::Gt(axis.direction, zero);
+  axis.step = hn::IfThenElse(up, one, hn::Neg(one));
+  axis.ahead = hn::IfThenElse(up, one, zero);
+  const VI pace = hn::Set(di, 1 << (3 * a));
+  axis.pace = hn::IfThenElse(hn::RebindMask(di, up), pace, hn::Neg(pace));
+}
+
+HWY_INLINE WayOut FindWayOut(const Walk& walk) {
+  const auto to_plane = [](const Axis& axis) {
+    return axis.DepthOf(hn::Add(axis.cell, axis.ahead));
+  };
+  WayOut out;
+  out.x = to_plane(walk.x);
+  out.y = to_plane(walk.y);
+  out.z = to_plane(walk.z);
+  out.first = hn::Min(hn::Min(out.x, out.y), out.z);
+  return out;
+}
+
+HWY_INLINE MF InCrossedCube(const Walk& walk, const std::int32_t* words) {
+  const DF df;
+  const DI di;
+  const VI word = WordsAt(words, hn::ShiftRight<5>(walk.place));
+  const VI shift = hn::And(walk.place, hn::Set(di, 31));
+  const VI bit = hn::And(hn::Shr(word, shift), hn::Set(di, 1));
+  return hn::And(walk.active, hn::RebindMask(df, hn::Ne(bit, hn::Zero(di))));
+}
+
+// The rays `stepping` go on into the next cube along one axis, where that is the way out, or end
+// with the box.
+HWY_INLINE void StepAlong(MF stepping, VF plane, VF first, Axis& axis, Walk& walk) {
+  const DI di;
+  const MF passes = hn::And(stepping, hn::Eq(plane, first));
+  const VF next = hn::Add(axis.cell, axis.step);
+  const MF left = hn::And(passes, hn::Or(hn::Lt(next, axis.low), hn::Gt(next, axis.last)));
+  walk.active = hn::AndNot(left, walk.active);
+  const MF stays = hn::AndNot(left, passes);
+  axis.cell = hn::IfThenElse(stays, next, axis.cell);
+  walk.place = hn::Add(walk.place, hn::IfThenElseZero(hn::RebindMask(di, stays), axis.pace));
+}
+
+HWY_INLINE void Step(MF stepping, const WayOut& out, Walk& walk) {
+  StepAlong(stepping, out.x, out.first, walk.x, walk);
+  StepAlong(stepping, out.y, out.first, walk.y, walk);
+  StepAlong(stepping, out.z, out.first, walk.z, walk);
+  walk.t = hn::IfThenElse(stepping, hn::Max(walk.t, out.first), walk.t);
+  walk.active = hn::AndNot(hn::And(stepping, hn::Ge(walk.t, walk.end)), walk.active);
+}
+
+// Of the lanes' cubes. Neighbours are mostly in the same few cubes, so that the corners of one cube
+// after the other are read: far less than a gather for each lane. `places` is room for a vector.
+HWY_INLINE Corners ReadCorners(const float* distance, MF wanted, VI place, std::int32_t* places) {
+  const DF df;
+  const DI di;
+  const VF zero = hn::Zero(df);
+  Corners corners{zero, zero, zero, zero, zero, zero, zero, zero};
+  hn::Store(place, di, places);
+  for (MF left = wanted;;) {
+    const intptr_t lane = hn::FindFirstTrue(df, left);
+    if (lane < 0) break;
+    const std::int32_t cube = places[lane];
+    const MF same = hn::And(left, hn::RebindMask(df, hn::Eq(place, hn::Set(di, cube))));
+    left = hn::AndNot(same, left);
+    const float* first =
+        distance + kCorners * kCorners * (cube >> 6) + kCorners * ((cube >> 3) & 7) + (cube & 7);
+    const auto read = [&](int offset, VF& corner) {
+      corner = hn::IfThenElse(same, hn::Set(df, first[offset]), corner);
+    };
+    read(0, corners.c000);
+    read(1, corners.c100);
+    read(kCorners, corners.c010);
+    read(kCorners + 1, corners.c110);
+    read(kCorners * kCorners, corners.c001);
+    read(kCorners * kCorners + 1, corners.c101);
+    read(kCorners * kCorners + kCorners, corners.c011);
+    read(kCorners * kCorners + kCorners + 1, corners.c111);
+  }
+  return corners;
+}
+
+HWY_INLINE Stretch StretchInCube(const Walk& walk, VF leave) {
+  Stretch on;
+  on.length = hn::Max(hn::Sub(leave, walk.t), hn::Zero(DF()));
+  on.x = hn::Sub(walk.x.At(walk.t), walk.x.cell);
+  on.y = hn::Sub(walk.y.At(walk.t), walk.y.cell);
+  on.z = hn::Sub(walk.z.At(walk.t), walk.z.cell);
+  on.dx = hn::Mul(walk.x.direction, on.length);
+  on.dy = hn::Mul(walk.y.direction, on.length);
+  on.dz = hn::Mul(walk.z.direction, on.length);
+  return on;
+}
+
+// The hits take the lanes' points at `s` of their stretches, where these are nearer.
+HWY_INLINE void KeepHits(const Trilinear& trilinear, const Stretch& on, VF t, VF s, MF hit,
+                         std::int32_t number, const LatticeRays& lattice, std::size_t i,
+                         TileHits& hits) {
+  const DF df;
+  const DI di;
+  const VF depth = hn::Add(t, hn::Mul(s, on.length));
+  const VF px = hn::Add(on.x, hn::Mul(s, on.dx));
+  const VF py = hn::Add(on.y, hn::Mul(s, on.dy));
+  const VF pz = hn::Add(on.z, hn::Mul(s, on.dz));
+  const VF nx = trilinear.SlopeX(py, pz);
+  const VF ny = trilinear.SlopeY(px, pz);
+  const VF nz = trilinear.SlopeZ(px, py);
+  const VF norm = hn::Sqrt(hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz)));
+  const VF scale = hn::Div(hn::Set(df, 1.0F), hn::Max(norm, hn::Set(df, 1e-20F)));
+  const MF taken = hn::And(hit, hn::Lt(depth, hn::LoadU(df, hits.depth.data() + i)));
+  const auto keep = [&](VF now, float* stored) {
+    hn::StoreU(hn::IfThenElse(taken, now, hn::LoadU(df, stored)), df, stored);
+  };
+  keep(depth, hits.depth.data() + i);
+  for (std::size_t r = 0; r < 3; ++r) {
+    const VF component = hn::Add(hn::Add(hn::Mul(hn::Set(df, lattice.R_WL[3 * r]), nx),
+                                         hn::Mul(hn::Set(df, lattice.R_WL[3 * r + 1]), ny)),
+                                 hn::Mul(hn::Set(df, lattice.R_WL[3 * r + 2]), nz));
+    keep(hn::Mul(component, scale), hits.normal[r].data() + i);
+  }
+  hn::StoreU(hn::IfThenElse(hn::RebindMask(di, taken), hn::Set(di, number),
+                            hn::LoadU(di, hits.block.data() + i)),
+             di, hits.block.data() + i);
+}
+
+// Rays wait in crossed cubes until all are in one: then all look for a root.
+HWY_INLINE void WalkThrough(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
+                            VF outside, std::size_t i, Walk& walk, TileHits& hits) {
+  const DF df;
+  const auto* words = reinterpret_cast<const std::int32_t*>(block.cubes.bits.data());
+  HWY_ALIGN std::array<std::int32_t, HWY_MAX_BYTES / sizeof(std::int32_t)> places;
+  while (true) {
+    const WayOut out = FindWayOut(walk);
+    const MF crossed = InCrossedCube(walk, words);
+    const MF moving = hn::AndNot(crossed, walk.active);
+    MF stepping = moving;
+    if (hn::AllFalse(df, moving)) {
+      if (hn::AllFalse(df, crossed)) return;
+      const Trilinear trilinear(
+          ReadCorners(block.distance.data(), crossed, walk.place, places.data()));
+      const Stretch stretch = StretchInCube(walk, out.first);
+      const Cubic cubic(trilinear, stretch);
+      const Bracket change = FirstChange(cubic, crossed, outside);
+      if (!hn::AllFalse(df, change.hit)) {
+        const VF s = RootOf(cubic, change);
+        KeepHits(trilinear, stretch, walk.t, s, change.hit, number, lattice, i, hits);
+        walk.active = hn::AndNot(change.hit, walk.active);
+      }
+      stepping = hn::AndNot(change.hit, crossed);
+    }
+    Step(stepping, out, walk);
+  }
+}
+
+float Cast(const RayBlock& block, std::int32_t number, const LatticeRays& lattice,
+           const TileRays& rays, float voxel, const TileValues& from, TileHits& hits) {
+  const DF df;
+  const DI di;
   const VF outside = hn::Set(df, -5e-4F * voxel);
   std::array<float, 3> origin;
   const std::array<int, 3> first{block.index.x * kBlockSide, block.index.y * kBlockSide,
                                  block.index.z * kBlockSide};
   for (std::size_t a = 0; a < 3; ++a) origin[a] = static_cast<float>(lattice.origin[a] - first[a]);
-  const auto* words = reinterpret_cast<const std::int32_t*>(block.cubes.bits.data());
-  const float* distance = block.distance.data();
-  HWY_ALIGN std::array<std::int32_t, HWY_MAX_BYTES / sizeof(std::int32_t)> place_of_lane;
-  std::int32_t* places = place_of_lane.data();
-  VF farthest = zero;
+  VF farthest = hn::Zero(df);
 
   for (std::size_t i = 0; i < kTilePixels; i += hn::Lanes(df)) {
-    const VF best = hn::LoadU(df, hits.depth.data() + i);
-    VF t = hn::LoadU(df, from.data() + i);
-    VF end = best;
-    Axis x;
-    Axis y;
-    Axis z;
-    const auto enter = [&](Axis& axis, std::size_t a) {
-      axis.origin = hn::Set(df, origin[a]);
-      axis.direction = hn::LoadU(df, rays.direction[a].data() + i);
-      axis.inverse = hn::LoadU(df, rays.inverse[a].data() + i);
-      const VF low = hn::Mul(hn::Sub(hn::Set(df, block.cubes.low[a]), axis.origin), axis.inverse);
-      const VF high = hn::Mul(hn::Sub(hn::Set(df, block.cubes.high[a]), axis.origin), axis.inverse);
-      t = hn::Max(t, hn::Min(low, high));
-      end = hn::Min(end, hn::Max(low, high));
-    };
-    enter(x, 0);
-    enter(y, 1);
-    enter(z, 2);
-    MF active = hn::Lt(t, end);
-    if (hn::AllFalse(df, active)) {
-      farthest = hn::Max(farthest, best);
-      continue;
-    }
-    VI place = hn::Zero(di);  // of the cube in the block
-    const auto begin = [&](Axis& axis, std::size_t a) {
-      axis.low = hn::Set(df, block.cubes.low[a]);
-      axis.last = hn::Set(df, static_cast<float>(block.cubes.high[a]) - 1.0F);
-      const VF at = hn::Add(axis.origin, hn::Mul(axis.direction, hn::IfThenElse(active, t, zero)));
-      const VF inside = hn::Min(hn::Max(at, axis.low), axis.last);
-      const VI cell = hn::ConvertTo(di, inside);
-      axis.cell = hn::ConvertTo(df, cell);
-      place = hn::Add(place, hn::ShiftLeftSame(cell, static_cast<int>(3 * a)));
-      const MF up = hn::Gt(axis.direction, zero);
-      axis.step = hn::IfThenElse(up, one, hn::Neg(one));
-      axis.ahead = hn::IfThenElse(up, one, zero);
-      const VI pace = hn::Set(di, 1 << (3 * a));
-      axis.pace = hn::IfThenElse(hn::RebindMask(di, up), pace, hn::Neg(pace));
-    };
-    begin(x, 0);
-    begin(y, 1);
-    begin(z, 2);
-    while (true) {
-      const auto to_plane = [&](const Axis& axis) {
-        return hn::Mul(hn::Sub(hn::Add(axis.cell, axis.ahead), axis.origin), axis.inverse);
-      };
-      const VF plane_x = to_plane(x);
-      const VF plane_y = to_plane(y);
-      const VF plane_z = to_plane(z);
-      const VF leave = hn::Min(hn::Min(plane_x, plane_y), plane_z);
-      const VI word = WordsAt(words, hn::ShiftRight<5>(place));
-      const VI bit = hn::And(hn::Shr(word, hn::And(place, hn::Set(di, 31))), hn::Set(di, 1));
-      const MF crossed = hn::And(active, hn::RebindMask(df, hn::Ne(bit, hn::Zero(di))));
-      const MF moving = hn::AndNot(crossed, active);
-      MF stepping = moving;
-      if (hn::AllFalse(df, moving)) {
-        if (hn::AllFalse(df, crossed)) break;
-        // The distance along the ray inside the cube, a cubic of s = 0 ... 1.
-        const VF length = hn::Max(hn::Sub(leave, t), zero);
-        const auto local = [&](const Axis& axis) {
-          return hn::Sub(hn::Add(axis.origin, hn::Mul(axis.direction, t)), axis.cell);
-        };
-        const VF x0 = local(x);
-        const VF y0 = local(y);
-        const VF z0 = local(z);
-        const VF dx = hn::Mul(x.direction, length);
-        const VF dy = hn::Mul(y.direction, length);
-        const VF dz = hn::Mul(z.direction, length);
-        VF c000 = zero;
-        VF c100 = zero;
-        VF c010 = zero;
-        VF c110 = zero;
-        VF c001 = zero;
-        VF c101 = zero;
-        VF c011 = zero;
-        VF c111 = zero;
-        // Neighbours are mostly in the same few cubes, so that the corners of one cube after the
-        // other are read: far less than a gather for each lane.
-        hn::Store(place, di, places);
-        for (MF left = crossed;;) {
-          const intptr_t lane = hn::FindFirstTrue(df, left);
-          if (lane < 0) break;
-          const std::int32_t cube = places[lane];
-          const MF same = hn::And(left, hn::RebindMask(df, hn::Eq(place, hn::Set(di, cube))));
-          left = hn::AndNot(same, left);
-          const float* first_corner = distance + kCorners * kCorners * (cube >> 6) +
-                                      kCorners * ((cube >> 3) & 7) + (cube & 7);
-          const auto read = [&](int offset, VF& corner) {
-            corner = hn::IfThenElse(same, hn::Set(df, first_corner[offset]), corner);
-          };
-          read(0, c000);
-          read(1, c100);
-          read(kCorners, c010);
-          read(kCorners + 1, c110);
-          read(kCorners * kCorners, c001);
-          read(kCorners * kCorners + 1, c101);
-          read(kCorners * kCorners + kCorners, c011);
-          read(kCorners * kCorners + kCorners + 1, c111);
-        }
-        const VF kx = hn::Sub(c100, c000);
-        const VF ky = hn::Sub(c010, c000);
-        const VF kz = hn::Sub(c001, c000);
-        const VF kxy = hn::Sub(hn::Sub(c110, c010), kx);
-        const VF kxz = hn::Sub(hn::Sub(c101, c001), kx);
-        const VF kyz = hn::Sub(hn::Sub(c011, c001), ky);
-        const VF kxyz = hn::Sub(hn::Sub(hn::Sub(c111, c011), hn::Sub(c101, c001)), kxy);
-        // The gradient at a place, and the terms that are shared.
-        const auto slope_x = [&](VF py, VF pz) {
-          return hn::Add(hn::Add(kx, hn::Mul(kxy, py)),
-                         hn::Mul(hn::Add(kxz, hn::Mul(kxyz, py)), pz));
-        };
-        const auto slope_y = [&](VF px, VF pz) {
-          return hn::Add(hn::Add(ky, hn::Mul(kxy, px)),
-                         hn::Mul(hn::Add(kyz, hn::Mul(kxyz, px)), pz));
-        };
-        const auto slope_z = [&](VF px, VF py) {
-          return hn::Add(hn::Add(kz, hn::Mul(kxz, px)),
-                         hn::Mul(hn::Add(kyz, hn::Mul(kxyz, px)), py));
-        };
-        const VF a0 = hn::Add(
-            hn::Add(hn::Add(c000, hn::Mul(kx, x0)), hn::Mul(hn::Add(ky, hn::Mul(kxy, x0)), y0)),
-            hn::Mul(slope_z(x0, y0), z0));
-        const VF a1 = hn::Add(hn::Add(hn::Mul(slope_x(y0, z0), dx), hn::Mul(slope_y(x0, z0), dy)),
-                              hn::Mul(slope_z(x0, y0), dz));
-        const VF dxy = hn::Mul(dx, dy);
-        const VF dxz = hn::Mul(dx, dz);
-        const VF dyz = hn::Mul(dy, dz);
-        const VF a2 = hn::Add(hn::Add(hn::Mul(hn::Add(kxy, hn::Mul(kxyz, z0)), dxy),
-                                      hn::Mul(hn::Add(kxz, hn::Mul(kxyz, y0)), dxz)),
-                              hn::Mul(hn::Add(kyz, hn::Mul(kxyz, x0)), dyz));
-        const VF a3 = hn::Mul(hn::Mul(dxy, dz), kxyz);
-        const auto value = [&](VF s) {
-          return hn::Add(a0, hn::Mul(s, hn::Add(a1, hn::Mul(s, hn::Add(a2, hn::Mul(s, a3))))));
-        };
-        // The first of the cube's thirds at whose ends the distance changes from outside to inside.
-        const VF third = hn::Set(df, 1.0F / 3.0F);
-        const VF two_thirds = hn::Set(df, 2.0F / 3.0F);
-        const VF g1 = value(third);
-        const VF g2 = value(two_thirds);
-        const VF g3 = value(one);
-        const MF in_1 = hn::Lt(g1, zero);
-        const MF in_2 = hn::Lt(g2, zero);
-        const MF in_3 = hn::Lt(g3, zero);
-        const MF at_1 = hn::And(hn::Ge(a0, outside), in_1);
-        const MF at_2 = hn::AndNot(at_1, hn::AndNot(in_1, in_2));
-        const MF at_3 = hn::AndNot(hn::Or(at_1, at_2), hn::AndNot(in_2, in_3));
-        MF hit = hn::And(crossed, hn::Or(hn::Or(at_1, at_2), at_3));
-        if (!hn::AllFalse(df, hit)) {
-          VF low = hn::IfThenElse(at_1, zero, hn::IfThenElse(at_2, third, two_thirds));
-          VF high = hn::IfThenElse(at_1, third, hn::IfThenElse(at_2, two_thirds, one));
-          VF g_low = hn::Max(hn::IfThenElse(at_1, a0, hn::IfThenElse(at_2, g1, g2)), zero);
-          VF g_high = hn::IfThenElse(at_1, g1, hn::IfThenElse(at_2, g2, g3));
-          g_high = hn::IfThenElse(hit, g_high, hn::Neg(one));
-          const auto chord = [&]() {
-            return hn::Add(low,
-                           hn::Mul(hn::Sub(high, low), hn::Div(g_low, hn::Sub(g_low, g_high))));
-          };
-          // Newton's steps where they stay between what is known to be outside and inside.
-          VF s = chord();
-          for (int round = 0; round < 1; ++round) {
-            const VF g = value(s);
-            const MF in = hn::Lt(g, zero);
-            high = hn::IfThenElse(in, s, high);
-            g_high = hn::IfThenElse(in, g, g_high);
-            low = hn::IfThenElse(in, low, s);
-            g_low = hn::IfThenElse(in, g_low, g);
-            const VF slope = hn::Add(
-                a1,
-                hn::Mul(s, hn::Add(hn::Add(a2, a2), hn::Mul(s, hn::Mul(hn::Set(df, 3.0F), a3)))));
-            const VF newton = hn::Sub(s, hn::Div(g, hn::Min(slope, hn::Set(df, -1e-9F))));
-            const MF between = hn::And(hn::Gt(newton, low), hn::Lt(newton, high));
-            s = hn::IfThenElse(between, newton, chord());
-          }
-          const VF depth = hn::Add(t, hn::Mul(s, length));
-          const VF px = hn::Add(x0, hn::Mul(s, dx));
-          const VF py = hn::Add(y0, hn::Mul(s, dy));
-          const VF pz = hn::Add(z0, hn::Mul(s, dz));
-          const VF nx = slope_x(py, pz);
-          const VF ny = slope_y(px, pz);
-          const VF nz = slope_z(px, py);
-          const VF norm =
-              hn::Sqrt(hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz)));
-          const VF scale = hn::Div(one, hn::Max(norm, hn::Set(df, 1e-20F)));
-          const MF taken = hn::And(hit, hn::Lt(depth, hn::LoadU(df, hits.depth.data() + i)));
-          const auto keep = [&](VF now, float* stored) {
-            hn::StoreU(hn::IfThenElse(taken, now, hn::LoadU(df, stored)), df, stored);
-          };
-          keep(depth, hits.depth.data() + i);
-          for (std::size_t r = 0; r < 3; ++r) {
-            const VF component = hn::Add(hn::Add(hn::Mul(hn::Set(df, lattice.R_WL[3 * r]), nx),
-                                                 hn::Mul(hn::Set(df, lattice.R_WL[3 * r + 1]), ny)),
-                                         hn::Mul(hn::Set(df, lattice.R_WL[3 * r + 2]), nz));
-            keep(hn::Mul(component, scale), hits.normal[r].data() + i);
-          }
-          hn::StoreU(hn::IfThenElse(hn::RebindMask(di, taken), hn::Set(di, number),
-                                    hn::LoadU(di, hits.block.data() + i)),
-                     di, hits.block.data() + i);
-          active = hn::AndNot(hit, active);
-        }
-        stepping = hn::AndNot(hit, crossed);
-      }
-      const auto step = [&](Axis& axis, VF plane) {
-        const MF passes = hn::And(stepping, hn::Eq(plane, leave));
-        const VF next = hn::Add(axis.cell, axis.step);
-        const MF left = hn::And(passes, hn::Or(hn::Lt(next, axis.low), hn::Gt(next, axis.last)));
-        active = hn::AndNot(left, active);
-        const MF stays = hn::AndNot(left, passes);
-        axis.cell = hn::IfThenElse(stays, next, axis.cell);
-        place = hn::Add(place, hn::IfThenElseZero(hn::RebindMask(di, stays), axis.pace));
-      };
-      step(x, plane_x);
-      step(y, plane_y);
-      step(z, plane_z);
-      t = hn::IfThenElse(stepping, hn::Max(t, leave), t);
-      active = hn::AndNot(hn::And(stepping, hn::Ge(t, end)), active);
+    Walk walk;
+    walk.t = hn::LoadU(df, from.data() + i);
+    walk.end = hn::LoadU(df, hits.depth.data() + i);
+    EnterBox(block, rays, origin[0], 0, i, walk.x, walk);
+    EnterBox(block, rays, origin[1], 1, i, walk.y, walk);
+    EnterBox(block, rays, origin[2], 2, i, walk.z, walk);
+    walk.active = hn::Lt(walk.t, walk.end);
+    if (!hn::AllFalse(df, walk.active)) {
+      walk.place = hn::Zero(di);
+      BeginAt(block, 0, walk.x, walk);
+      BeginAt(block, 1, walk.y, walk);
+      BeginAt(block, 2, walk.z, walk);
+      WalkThrough(block, number, lattice, outside, i, walk, hits);
     }
     farthest = hn::Max(farthest, hn::LoadU(df, hits.depth.data() + i));
   }

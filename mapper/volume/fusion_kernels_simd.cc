@@ -17,6 +17,7 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include "mapper/volume/colour_lanes-inl.h"
 #include "mapper/volume/half_lanes-inl.h"
 #include "mapper/volume/mask_lanes-inl.h"
 #include "mapper/volume/projection_lanes-inl.h"
@@ -26,9 +27,6 @@ namespace tsdfpp::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-
-using Shorts = hn::Rebind<std::uint16_t, Floats>;
-using Bytes8 = hn::Rebind<std::uint8_t, Floats>;
 
 bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, BlockObservation& out) {
   const auto fetch_nothing = [](std::size_t) {};
@@ -58,50 +56,6 @@ bool Observe(const KernelFrame& frame, const BlockPlace& place, float back, Bloc
   return !hn::AllFalse(di, any);
 }
 
-// docs/map.md: the colours of the voxels of a slice that `wanted` marks; `pixel` is of the slice.
-void FuseColours(const KernelFrame& frame, const std::int32_t* pixel, std::uint64_t wanted,
-                 float weight_cap, ColourSlice& colours) {
-  const Floats df;
-  const Ints di;
-  const Shorts du;
-  const std::size_t lanes = hn::Lanes(df);
-  const std::uint64_t of_lanes = (1ULL << lanes) - 1;
-  // All loads before their first use: they are stored singly and read as vectors.
-  HWY_ALIGN std::array<std::int32_t, kSliceVoxels> colour;
-  for (std::size_t i = 0; i < kSliceVoxels; i += lanes) {
-    if ((wanted >> i & of_lanes) == 0) continue;
-    for (std::size_t k = i; k < i + lanes; ++k) colour[k] = BytesOfColour(frame, pixel[k]);
-  }
-  const auto* bits = reinterpret_cast<const std::uint8_t*>(&wanted);
-  const auto low_byte = hn::Set(di, 255);
-  const auto half = hn::Set(df, 0.5F);
-  const auto one = hn::Set(df, 1.0F);
-  for (std::size_t i = 0; i < kSliceVoxels; i += lanes) {
-    if ((wanted >> i & of_lanes) == 0) continue;
-    const auto take = MaskAt(df, bits, i);
-    const auto bytes = hn::Load(di, &colour[i]);
-    const auto at_zero = hn::Eq(hn::Load(di, pixel + i), hn::Zero(di));
-    const auto seen = hn::IfThenElse(at_zero, bytes, hn::ShiftRight<8>(bytes));
-    const Bytes8 d8;
-    std::uint8_t* counts = &colours.count[i];
-    const auto count = hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(d8, counts)));
-    const auto more = hn::Add(count, one);
-    const auto share = hn::Div(one, more);
-    const auto fuse = [&](std::uint16_t* stored, auto level) {
-      const auto old = hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(du, stored)));
-      const auto change =
-          hn::Mul(hn::Sub(hn::Mul(hn::Set(df, 256.0F), hn::ConvertTo(df, level)), old), share);
-      const auto mean = hn::Add(hn::Add(old, change), half);
-      hn::StoreU(hn::DemoteTo(du, Truncated(hn::IfThenElse(take, mean, old))), du, stored);
-    };
-    fuse(&colours.channel[0][i], hn::And(seen, low_byte));
-    fuse(&colours.channel[1][i], hn::And(hn::ShiftRight<8>(seen), low_byte));
-    fuse(&colours.channel[2][i], hn::And(hn::ShiftRight<16>(seen), low_byte));
-    const auto capped = hn::Min(more, hn::Set(df, weight_cap));
-    hn::StoreU(hn::DemoteTo(d8, Truncated(hn::IfThenElse(take, capped, count))), d8, counts);
-  }
-}
-
 // One vote each of the lanes `voting` of voxel i ... for the labels that they see; true where a
 // label changed.
 template <class M, class V>
@@ -125,19 +79,269 @@ bool Vote(M voting, V seen, std::size_t i, const LabelVotes& votes) {
 
 enum class Labels { kOne, kSome, kEvery };
 
+// The block that comes next is fetched into the cache meanwhile, a few lines at a time: many at
+// once would wait for each other.
+class NextBlock {
+ public:
+  explicit NextBlock(const TsdfBlock* block) : block_(block) {
+    if (block_ != nullptr) hwy::Prefetch(&block_->colours);
+  }
+  HWY_INLINE void FetchValues(std::size_t z) const {
+    if (block_ == nullptr) return;
+    hwy::Prefetch(&block_->distance[kSliceVoxels * z]);
+    hwy::Prefetch(&block_->distance[kSliceVoxels * z + kSliceVoxels / 2]);
+    hwy::Prefetch(&block_->weight[kSliceVoxels * z]);
+  }
+  HWY_INLINE void FetchMasks() const {
+    if (block_ == nullptr) return;
+    hwy::Prefetch(&block_->observed);
+    hwy::Prefetch(&block_->negative);
+    hwy::Prefetch(&block_->band);
+    hwy::Prefetch(&block_->full);
+    hwy::Prefetch(&block_->revision);
+  }
+  HWY_INLINE void FetchColours(std::size_t z) const {
+    if (block_ == nullptr) return;
+    if (const ColourSlice* slice = block_->colours[z].get()) hwy::Prefetch(slice->count.data());
+  }
+
+ private:
+  const TsdfBlock* block_;
+};
+
+// The numbers of a fusion, in each lane.
+struct RuleLanes {
+  RuleLanes(const BlockPlace& place, const FusionRule& rule, const LabelVotes* votes)
+      : id(hn::Set(Ints(), rule.id)),
+        nobody(hn::Set(Ints(), kNoInstance)),
+        front(hn::Set(Floats(), rule.front)),
+        minus_back(hn::Set(Floats(), -rule.back)),
+        colour_band(hn::Set(Floats(), rule.colour_band)),
+        first_colour_band(hn::Set(Floats(), rule.first_colour_band)),
+        most_colour_band(hn::Max(colour_band, first_colour_band)),
+        cap(hn::Set(Floats(), rule.weight_cap)),
+        full_share(hn::Div(hn::Set(Floats(), 1.0F), hn::Add(cap, hn::Set(Floats(), 1.0F)))),
+        voxel(hn::Set(Floats(), place.voxel)),
+        half_inside(hn::Set(Floats(), -0.5F * place.voxel)),
+        guard(hn::Set(Floats(), votes == nullptr ? 0.0F : votes->guard)),
+        vote_band(hn::Set(Floats(), votes == nullptr ? 0.0F : votes->band)) {}
+
+  VI id;
+  VI nobody;
+  VF front;
+  VF minus_back;
+  VF colour_band;
+  VF first_colour_band;
+  VF most_colour_band;
+  VF cap;
+  VF full_share;  // of an observation where the weight is at its cap
+  VF voxel;
+  VF half_inside;
+  VF guard;
+  VF vote_band;
+};
+
+// Masks of the block, a bit a voxel: those that it has, changed by the fusion, and what happened.
+struct FusionMasks {
+  using Bytes = std::array<std::uint8_t, sizeof(BlockMask)>;
+  explicit FusionMasks(const TsdfBlock& block)
+      : negative(std::bit_cast<Bytes>(block.negative)),
+        band(std::bit_cast<Bytes>(block.band)),
+        full(std::bit_cast<Bytes>(block.full)) {}
+
+  HWY_ALIGN Bytes negative;  // distance < 0, observed or not
+  HWY_ALIGN Bytes band;      // distance >= -back, likewise
+  HWY_ALIGN Bytes full;
+  HWY_ALIGN Bytes taken{};
+  HWY_ALIGN Bytes lost{};  // no longer observed
+  HWY_ALIGN Bytes in_band{};
+  HWY_ALIGN Bytes to_colour{};
+  HWY_ALIGN Bytes cleared{};
+  bool any_cleared = false;
+};
+
+// What the lanes' voxels have before the frame.
+struct Stored {
+  VF distance;
+  VF weight;
+  MF is_full;  // it is known that the weight is at its cap
+  bool all_full;
+};
+
+HWY_INLINE Stored ReadVoxels(const TsdfBlock& block, const FusionMasks& masks,
+                             const RuleLanes& rule, std::size_t i) {
+  const Floats df;
+  Stored stored;
+  stored.distance = LoadHalves(df, &block.distance[i]);
+  // Where all weights are known, they need not be read.
+  stored.is_full = MaskAt(df, masks.full.data(), i);
+  stored.all_full = hn::AllTrue(df, stored.is_full);
+  stored.weight =
+      stored.all_full
+          ? rule.cap
+          : hn::ConvertTo(df, hn::PromoteTo(Ints(), hn::LoadU(Bytes8(), &block.weight[i])));
+  return stored;
+}
+
+// Which lanes the observation changes.
+struct Wanted {
+  MF taken;    // those that take it
+  MF against;  // those that it contradicts
+  MF touched;  // either
+  VI seen;     // the labels
+};
+
+template <Labels kLabels>
+HWY_INLINE Wanted WhoTakes(const RuleLanes& rule, bool contradiction, const Stored& stored, VF s,
+                           const Lanes& label, std::size_t i, const LabelVotes* votes) {
+  const Floats df;
+  const Ints di;
+  Wanted wanted;
+  wanted.taken = hn::Ge(s, rule.minus_back);
+  wanted.against = hn::MaskFromVec(hn::Zero(df));
+  wanted.touched = wanted.taken;
+  wanted.seen = rule.id;
+  if constexpr (kLabels == Labels::kOne) return wanted;
+  wanted.seen = hn::Load(di, &label[i]);
+  const auto labelled = hn::RebindMask(df, hn::Ne(wanted.seen, rule.nobody));
+  if constexpr (kLabels == Labels::kSome) {
+    wanted.taken = hn::And(wanted.taken, hn::RebindMask(df, hn::Eq(wanted.seen, rule.id)));
+    if (contradiction) {
+      const auto claims =
+          hn::And(hn::Gt(stored.weight, hn::Zero(df)), hn::Lt(stored.distance, rule.half_inside));
+      wanted.against = hn::And(hn::AndNot(wanted.taken, hn::And(wanted.touched, labelled)),
+                               hn::And(claims, hn::Ge(s, rule.half_inside)));
+    }
+    wanted.touched = hn::Or(wanted.taken, wanted.against);
+  } else {
+    const auto owner = hn::PromoteTo(di, hn::LoadU(Shorts(), votes->id + i));
+    const auto of_others = hn::AndNot(hn::Eq(owner, rule.nobody), hn::Ne(owner, wanted.seen));
+    const auto held = hn::And(hn::RebindMask(df, of_others), hn::Le(stored.distance, rule.guard));
+    wanted.taken =
+        hn::AndNot(hn::And(held, hn::Lt(s, hn::Zero(df))), hn::And(wanted.taken, labelled));
+    wanted.touched = wanted.taken;
+  }
+  return wanted;
+}
+
+// Whether all that is touched is free space seen once more, that no longer counts observations: it
+// stays what it is.
+HWY_INLINE bool AllSettled(const RuleLanes& rule, const Stored& stored, const Wanted& wanted,
+                           VF s) {
+  const auto settled =
+      hn::And(hn::Eq(stored.distance, rule.front), hn::And(stored.is_full, hn::Gt(s, rule.front)));
+  return hn::AllTrue(Floats(), hn::Or(hn::Not(wanted.touched), settled));
+}
+
+// Marks the lanes of `near` that take a colour; these and the pixels' colours are fetched.
+HWY_INLINE void ChooseColours(const KernelFrame& frame, const TsdfBlock& block,
+                              const RuleLanes& rule, const Projected& projected, MF near, VF s,
+                              std::size_t i, FusionMasks& masks) {
+  const Floats df;
+  const Ints di;
+  const auto off_surface = hn::Abs(s);
+  const auto colours = hn::And(near, hn::Le(off_surface, rule.most_colour_band));
+  if (hn::AllFalse(df, colours)) return;
+  // Only between the two bands does it matter whether there is a colour.
+  auto may_colour = rule.first_colour_band;
+  if (const ColourSlice* slice = block.colours[i / kSliceVoxels].get()) {
+    const std::size_t k = i % kSliceVoxels;
+    const auto counts = hn::PromoteTo(di, hn::LoadU(Bytes8(), &slice->count[k]));
+    const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
+    may_colour = hn::IfThenElse(has_colour, rule.colour_band, rule.first_colour_band);
+    for (const auto& channel : slice->channel) hwy::Prefetch(&channel[k]);
+  }
+  PutBits(df, hn::And(colours, hn::Le(off_surface, may_colour)), i, masks.to_colour.data());
+  // The ends of the rows; what lies between is near.
+  for (std::size_t k = i; k < i + hn::Lanes(df); k += std::min<std::size_t>(8, kLanes)) {
+    const std::size_t last = k + std::min<std::size_t>(8, kLanes) - 1;
+    hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[k]));
+    hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[last]));
+  }
+}
+
+HWY_INLINE void StoreWeights(VF weight, MF full, std::size_t i, TsdfBlock& block,
+                             FusionMasks& masks) {
+  hn::StoreU(hn::DemoteTo(Bytes8(), Truncated(weight)), Bytes8(), &block.weight[i]);
+  PutBits(Floats(), full, i, masks.full.data());
+}
+
+// New distances and weights of the lanes, and the masks that follow from them.
+HWY_INLINE void StoreFused(const RuleLanes& rule, const Stored& stored, const Wanted& wanted,
+                           bool contradiction, VF s, std::size_t i, TsdfBlock& block,
+                           FusionMasks& masks) {
+  const Floats df;
+  const auto one = hn::Set(df, 1.0F);
+  const auto clamped = hn::Min(s, rule.front);
+  const auto more = hn::Add(stored.weight, one);
+  const auto share = stored.all_full ? rule.full_share : hn::Div(one, more);
+  const auto fused = hn::Add(stored.distance, hn::Mul(hn::Sub(clamped, stored.distance), share));
+  auto d = hn::IfThenElse(wanted.taken, RoundLanesToHalf(df, fused), stored.distance);
+  PutBits(df, wanted.taken, i, masks.taken.data());
+  if (contradiction && !hn::AllFalse(df, wanted.against)) {
+    const auto free = hn::And(wanted.against, hn::Gt(s, rule.voxel));
+    d = hn::IfThenElse(wanted.against, hn::IfThenElseZero(free, RoundLanesToHalf(df, clamped)), d);
+    const auto taken_w = hn::IfThenElse(wanted.taken, hn::Min(more, rule.cap), stored.weight);
+    const auto w = hn::IfThenElse(wanted.against, hn::IfThenElseZero(free, one), taken_w);
+    const auto known = hn::AndNot(wanted.touched, stored.is_full);
+    StoreWeights(w, hn::Or(known, hn::And(wanted.touched, hn::Eq(w, rule.cap))), i, block, masks);
+    PutBits(df, wanted.against, i, masks.cleared.data());
+    PutBits(df, hn::AndNot(free, wanted.against), i, masks.lost.data());
+    masks.any_cleared = true;
+  } else if (!stored.all_full) {
+    // Full weights stay what they are: then the memory need not be written.
+    const auto w = hn::IfThenElse(wanted.taken, hn::Min(more, rule.cap), stored.weight);
+    const auto reached = hn::And(wanted.taken, hn::Eq(w, rule.cap));
+    StoreWeights(w, hn::Or(stored.is_full, reached), i, block, masks);
+  }
+  StoreHalves(df, d, &block.distance[i]);
+  PutBits(df, hn::Lt(d, hn::Zero(df)), i, masks.negative.data());
+  PutBits(df, hn::Ge(d, rule.minus_back), i, masks.band.data());
+}
+
+void FuseAllColours(const KernelFrame& frame, const Projected& projected, const FusionMasks& masks,
+                    float weight_cap, TsdfBlock& block) {
+  const auto colour_at = std::bit_cast<BlockMask>(masks.to_colour);
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    if (colour_at[z] == 0) continue;
+    FuseColours(frame, &projected.pixel[z * kSliceVoxels], colour_at[z], weight_cap,
+                block.MakeColours(z));
+  }
+  if (!masks.any_cleared) return;
+  const auto cleared = std::bit_cast<BlockMask>(masks.cleared);
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    if (Bit(cleared, i)) block.SetColour(static_cast<std::size_t>(i), {}, 0);
+  }
+  block.FreeColoursIfNone();
+}
+
+// The block's masks as they are after the fusion, and how they changed.
+void UpdateMasks(const FusionMasks& masks, TsdfBlock& block, FusionResult& result) {
+  result.in_band = std::bit_cast<BlockMask>(masks.in_band);
+  block.full = std::bit_cast<BlockMask>(masks.full);
+  const auto taken = std::bit_cast<BlockMask>(masks.taken);
+  const auto lost = std::bit_cast<BlockMask>(masks.lost);
+  auto observed = block.observed;
+  auto negative = std::bit_cast<BlockMask>(masks.negative);
+  auto band = std::bit_cast<BlockMask>(masks.band);
+  for (std::size_t z = 0; z < kBlockSide; ++z) {
+    observed[z] = (observed[z] | taken[z]) & ~lost[z];
+    negative[z] &= observed[z];
+    band[z] &= negative[z];
+  }
+  result.changed_signs = ChangedSigns(block.observed, block.negative, observed, negative);
+  result.band_changed = block.band != band;
+  block.observed = observed;
+  block.negative = negative;
+  block.band = band;
+}
+
 template <Labels kLabels>
 FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
-                      TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
+                      TsdfBlock& block, const NextBlock& next, LabelVotes* votes) {
   FusionResult result;
-  // The next block is fetched a few lines at a time: many at once would wait for each other.
-  if (next != nullptr) hwy::Prefetch(&next->colours);
-  const auto fetch_values = [&](std::size_t z) {
-    if (next == nullptr) return;
-    hwy::Prefetch(&next->distance[kSliceVoxels * z]);
-    hwy::Prefetch(&next->distance[kSliceVoxels * z + kSliceVoxels / 2]);
-    hwy::Prefetch(&next->weight[kSliceVoxels * z]);
-  };
   Projected projected;
+  const auto fetch_values = [&](std::size_t z) { next.FetchValues(z); };
   if (!Project(frame, place, fetch_values, projected)) return result;
   HWY_ALIGN std::array<float, kBlockVoxels> depth;
   HWY_ALIGN Lanes label;
@@ -149,180 +353,45 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
   }
 
   const Floats df;
-  const Ints di;
-  const Bytes8 d8;
-  const auto zero = hn::Zero(df);
-  const auto one = hn::Set(df, 1.0F);
-  const auto id = hn::Set(di, rule.id);
-  const auto nobody = hn::Set(di, kNoInstance);
-  const auto front = hn::Set(df, rule.front);
-  const auto minus_back = hn::Set(df, -rule.back);
-  const auto colour_band = hn::Set(df, rule.colour_band);
-  const auto first_colour_band = hn::Set(df, rule.first_colour_band);
-  const auto most_colour_band = hn::Max(colour_band, first_colour_band);
-  const auto cap = hn::Set(df, rule.weight_cap);
-  const auto full_share = hn::Div(one, hn::Add(cap, one));
-  const auto minus_half = hn::Set(df, -0.5F * place.voxel);
+  const RuleLanes lanes(place, rule, votes);
   const bool contradiction = kLabels == Labels::kSome && rule.contradiction;
-  [[maybe_unused]] const auto guard = hn::Set(df, votes == nullptr ? 0.0F : votes->guard);
-  [[maybe_unused]] const auto vote_band = hn::Set(df, votes == nullptr ? 0.0F : votes->band);
-
-  using Bytes = std::array<std::uint8_t, sizeof(BlockMask)>;
-  HWY_ALIGN auto negative = std::bit_cast<Bytes>(block.negative);
-  HWY_ALIGN auto band = std::bit_cast<Bytes>(block.band);
-  HWY_ALIGN auto full = std::bit_cast<Bytes>(block.full);
-  HWY_ALIGN Bytes taken_here{};
-  HWY_ALIGN Bytes lost{};  // no longer observed
-  HWY_ALIGN Bytes in_band{};
-  HWY_ALIGN Bytes to_colour{};
-  HWY_ALIGN Bytes cleared{};
-  bool any_cleared = false;
-  if (next != nullptr) {
-    hwy::Prefetch(&next->observed);
-    hwy::Prefetch(&next->negative);
-    hwy::Prefetch(&next->band);
-    hwy::Prefetch(&next->full);
-    hwy::Prefetch(&next->revision);
-  }
+  FusionMasks masks(block);
+  next.FetchMasks();
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(df)) {
-    if (next != nullptr && i % kSliceVoxels == 0) {
-      if (const ColourSlice* slice = next->colours[i / kSliceVoxels].get()) {
-        hwy::Prefetch(slice->count.data());
-      }
-    }
+    if (i % kSliceVoxels == 0) next.FetchColours(i / kSliceVoxels);
     if (projected.look[i] == 0) continue;
     const auto s = Measure(projected, depth.data(), i);
-    auto taken = hn::Ge(s, minus_back);
-    auto touched = taken;
-    [[maybe_unused]] auto against = hn::MaskFromVec(zero);
-    const auto old_d = LoadHalves(df, &block.distance[i]);
-    // Where all weights are known, they need not be read.
-    const auto is_full = MaskAt(df, full.data(), i);
-    const bool all_full = hn::AllTrue(df, is_full);
-    const auto old_w =
-        all_full ? cap : hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(d8, &block.weight[i])));
-    hn::VFromD<Ints> seen = id;
-    if constexpr (kLabels != Labels::kOne) {
-      seen = hn::Load(di, &label[i]);
-      const auto labelled = hn::RebindMask(df, hn::Ne(seen, nobody));
-      if constexpr (kLabels == Labels::kSome) {
-        taken = hn::And(taken, hn::RebindMask(df, hn::Eq(seen, id)));
-        if (contradiction) {
-          const auto claims = hn::And(hn::Gt(old_w, zero), hn::Lt(old_d, minus_half));
-          against = hn::And(hn::AndNot(taken, hn::And(touched, labelled)),
-                            hn::And(claims, hn::Ge(s, minus_half)));
-        }
-        touched = hn::Or(taken, against);
-      } else {
-        taken = hn::And(taken, labelled);
-        const auto owner = hn::PromoteTo(di, hn::LoadU(Shorts(), votes->id + i));
-        const auto of_others = hn::AndNot(hn::Eq(owner, nobody), hn::Ne(owner, seen));
-        const auto held = hn::And(hn::RebindMask(df, of_others), hn::Le(old_d, guard));
-        taken = hn::AndNot(hn::And(held, hn::Lt(s, zero)), taken);
-        touched = taken;
-      }
-    }
-    if (hn::AllFalse(df, touched)) continue;
-    const auto near = hn::And(taken, hn::Le(s, front));
+    const Stored stored = ReadVoxels(block, masks, lanes, i);
+    const Wanted wanted = WhoTakes<kLabels>(lanes, contradiction, stored, s, label, i, votes);
+    if (hn::AllFalse(df, wanted.touched)) continue;
+    const auto near = hn::And(wanted.taken, hn::Le(s, lanes.front));
     if (hn::AllFalse(df, near)) {
-      // Free space seen once more, that no longer counts observations, stays what it is.
-      const auto settled = hn::And(hn::Eq(old_d, front), hn::And(is_full, hn::Gt(s, front)));
-      if (hn::AllTrue(df, hn::Or(hn::Not(touched), settled))) continue;
+      if (AllSettled(lanes, stored, wanted, s)) continue;
     } else {
-      PutBits(df, near, i, in_band.data());
+      PutBits(df, near, i, masks.in_band.data());
       if constexpr (kLabels == Labels::kEvery) {
-        const auto voting = hn::And(near, hn::Le(hn::Abs(s), vote_band));
-        if (Vote(hn::RebindMask(di, voting), seen, i, *votes)) votes->any_label_changed = true;
-      }
-      const auto off_surface = hn::Abs(s);
-      auto colours = hn::And(near, hn::Le(off_surface, most_colour_band));
-      if (!hn::AllFalse(df, colours)) {
-        // Only between the two bands does it matter whether there is a colour.
-        auto may_colour = first_colour_band;
-        if (const ColourSlice* slice = block.colours[i / kSliceVoxels].get()) {
-          const std::size_t k = i % kSliceVoxels;
-          const auto counts = hn::PromoteTo(di, hn::LoadU(d8, &slice->count[k]));
-          const auto has_colour = hn::RebindMask(df, hn::Gt(counts, hn::Zero(di)));
-          may_colour = hn::IfThenElse(has_colour, colour_band, first_colour_band);
-          for (const auto& channel : slice->channel) hwy::Prefetch(&channel[k]);
-        }
-        colours = hn::And(colours, hn::Le(off_surface, may_colour));
-        PutBits(df, colours, i, to_colour.data());
-        // The ends of the rows; what lies between is near.
-        for (std::size_t k = i; k < i + hn::Lanes(df); k += std::min<std::size_t>(8, kLanes)) {
-          const std::size_t last = k + std::min<std::size_t>(8, kLanes) - 1;
-          hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[k]));
-          hwy::Prefetch(frame.colour + 3 * static_cast<std::ptrdiff_t>(projected.pixel[last]));
+        const auto voting = hn::And(near, hn::Le(hn::Abs(s), lanes.vote_band));
+        if (Vote(hn::RebindMask(Ints(), voting), wanted.seen, i, *votes)) {
+          votes->any_label_changed = true;
         }
       }
+      ChooseColours(frame, block, lanes, projected, near, s, i, masks);
     }
     result.changed = true;
-    const auto clamped = hn::Min(s, front);
-    const auto more = hn::Add(old_w, one);
-    const auto share = all_full ? full_share : hn::Div(one, more);
-    const auto fused = hn::Add(old_d, hn::Mul(hn::Sub(clamped, old_d), share));
-    auto d = hn::IfThenElse(taken, RoundLanesToHalf(df, fused), old_d);
-    PutBits(df, taken, i, taken_here.data());
-    if (contradiction && !hn::AllFalse(df, against)) {
-      const auto free = hn::And(against, hn::Gt(s, hn::Set(df, place.voxel)));
-      d = hn::IfThenElse(against, hn::IfThenElseZero(free, RoundLanesToHalf(df, clamped)), d);
-      const auto taken_w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
-      const auto w = hn::IfThenElse(against, hn::IfThenElseZero(free, one), taken_w);
-      hn::StoreU(hn::DemoteTo(d8, Truncated(w)), d8, &block.weight[i]);
-      const auto still_full = hn::AndNot(touched, is_full);
-      PutBits(df, hn::Or(still_full, hn::And(touched, hn::Eq(w, cap))), i, full.data());
-      PutBits(df, against, i, cleared.data());
-      PutBits(df, hn::AndNot(free, against), i, lost.data());
-      any_cleared = true;
-    } else if (!all_full) {
-      // Full weights stay what they are: then the memory need not be written.
-      const auto w = hn::IfThenElse(taken, hn::Min(more, cap), old_w);
-      hn::StoreU(hn::DemoteTo(d8, Truncated(w)), d8, &block.weight[i]);
-      PutBits(df, hn::Or(is_full, hn::And(taken, hn::Eq(w, cap))), i, full.data());
-    }
-    StoreHalves(df, d, &block.distance[i]);
-    PutBits(df, hn::Lt(d, zero), i, negative.data());
-    PutBits(df, hn::Ge(d, minus_back), i, band.data());
-  }
-  const auto colour_at = std::bit_cast<BlockMask>(to_colour);
-  for (std::size_t z = 0; z < kBlockSide; ++z) {
-    if (colour_at[z] == 0) continue;
-    FuseColours(frame, &projected.pixel[z * kSliceVoxels], colour_at[z], rule.weight_cap,
-                block.MakeColours(z));
-  }
-  if (any_cleared) {
-    const auto places = std::bit_cast<BlockMask>(cleared);
-    for (int i = 0; i < kBlockVoxels; ++i) {
-      if (Bit(places, i)) block.SetColour(static_cast<std::size_t>(i), {}, 0);
-    }
-    block.FreeColoursIfNone();
+    StoreFused(lanes, stored, wanted, contradiction, s, i, block, masks);
   }
   if (!result.changed) return result;
-  result.in_band = std::bit_cast<BlockMask>(in_band);
-  block.full = std::bit_cast<BlockMask>(full);
-  const auto now_taken = std::bit_cast<BlockMask>(taken_here);
-  const auto now_lost = std::bit_cast<BlockMask>(lost);
-  auto new_observed = block.observed;
-  auto new_negative = std::bit_cast<BlockMask>(negative);
-  auto new_band = std::bit_cast<BlockMask>(band);
-  for (std::size_t z = 0; z < kBlockSide; ++z) {
-    new_observed[z] = (new_observed[z] | now_taken[z]) & ~now_lost[z];
-    new_negative[z] &= new_observed[z];
-    new_band[z] &= new_negative[z];
-  }
-  result.changed_signs = ChangedSigns(block.observed, block.negative, new_observed, new_negative);
-  result.band_changed = block.band != new_band;
-  block.observed = new_observed;
-  block.negative = new_negative;
-  block.band = new_band;
+  FuseAllColours(frame, projected, masks, rule.weight_cap, block);
+  UpdateMasks(masks, block, result);
   return result;
 }
 
 FusionResult Fuse(const KernelFrame& frame, const BlockPlace& place, const FusionRule& rule,
                   TsdfBlock& block, const TsdfBlock* next, LabelVotes* votes) {
-  if (votes != nullptr) return FuseWith<Labels::kEvery>(frame, place, rule, block, next, votes);
-  if (rule.one_label) return FuseWith<Labels::kOne>(frame, place, rule, block, next, nullptr);
-  return FuseWith<Labels::kSome>(frame, place, rule, block, next, nullptr);
+  const NextBlock ahead(next);
+  if (votes != nullptr) return FuseWith<Labels::kEvery>(frame, place, rule, block, ahead, votes);
+  if (rule.one_label) return FuseWith<Labels::kOne>(frame, place, rule, block, ahead, nullptr);
+  return FuseWith<Labels::kSome>(frame, place, rule, block, ahead, nullptr);
 }
 
 }  // namespace
