@@ -259,12 +259,13 @@ MeshWork PlacedMesh::Update(const ObjectVolume& volume, float voxel) {
   lattice_is_world = volume.lattice_is_world;
   has_moved = has_moved || moves;
   const MeshWork work = mesh.Update(volume.grid, voxel, volume.revision);
-  changed.insert(changed.end(), mesh.changed().begin(), mesh.changed().end());
-  // Nor may they pile up while nobody resets them.
-  if (changed.size() > 2 * mesh.parts().size()) {
+  // Nor may they pile up while nobody resets them: where room runs out, each is kept once.
+  if (changed.size() + mesh.changed().size() > changed.capacity()) {
     std::sort(changed.begin(), changed.end());
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+    changed.reserve(2 * (changed.size() + mesh.changed().size()));
   }
+  changed.insert(changed.end(), mesh.changed().begin(), mesh.changed().end());
   for (const Index3& index : mesh.changed()) {
     const MeshPart* part = mesh.PartAt(index);
     if (part != nullptr && part->any_negative) negative.Extend(index);
