@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "mapper/index/change_log.h"
 #include "mapper/map_editing.h"
 #include "mapper/map_file.h"
 #include "mapper/map_query.h"

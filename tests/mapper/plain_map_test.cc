@@ -10,7 +10,7 @@ namespace tsdfpp {
 namespace {
 
 class PlainMap : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(PlainMap);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(PlainMap);  // others use no kernels
 
 std::string BytesOf(const std::vector<RaySurface>& surfaces) {
   std::string bytes;
@@ -39,7 +39,7 @@ Outcome OutcomeOf(Method method, const MapConfig& config) {
     outcome.images += BytesOf(map->CastRays(camera, CircleCamera(0.4 + i), options));
     if (i == 1) map->Remove(kTray);
   }
-  outcome.saved = MapToBytes(*map);
+  outcome.saved = MapToBytes(*map).value();
   outcome.snapshot = SnapshotOf(*map, ToyIds());
   return outcome;
 }
