@@ -12,7 +12,7 @@
 
 #include "core/ply.h"
 #include "eval/score/evaluate_meshes.h"
-#include "metrics/mesh_tools.h"
+#include "eval/score/surface_file.h"
 #include "tests/sequence/box_source.h"
 
 namespace tsdfpp::test {

@@ -10,6 +10,7 @@
 #include "core/pose_text.h"
 #include "eval/compare/compare.h"
 #include "eval/run/open_source.h"
+#include "eval/score/surface_file.h"
 #include "metrics/mesh_tools.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/box_meshes.h"

@@ -10,6 +10,7 @@
 
 #include "core/files.h"
 #include "core/gltf.h"
+#include "metrics/mesh_tools.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/box_meshes.h"
 
