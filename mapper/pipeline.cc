@@ -7,6 +7,7 @@
 
 #include "mapper/associate/given_ids.h"
 #include "mapper/map_reach.h"
+#include "mapper/track/frozen_pixels.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/pcl_icp.h"
 #include "mapper/track/sdf_tracker.h"
@@ -42,17 +43,6 @@ std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config, const Tracked
       return std::make_unique<SdfTracker>(config.track, tracked);
   }
   std::abort();
-}
-
-// The labels without those of frozen objects, of which nothing is to be fused.
-cv::Mat WithoutFrozen(const cv::Mat& labels, const TrackedPoses& tracked) {
-  cv::Mat fused = labels;
-  for (const auto& [id, status] : tracked.seen) {
-    if (status != TrackStatus::kFrozen) continue;
-    if (fused.data == labels.data) fused = labels.clone();
-    fused.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
-  }
-  return fused;
 }
 
 }  // namespace
@@ -92,7 +82,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   const cv::Mat associated = associator_->Associate(frame, segments, *map_);
   times.associate_s = watch.Lap();
   TrackedPoses tracked = tracker_->Track(frame, associated, *map_, T_WO_);
-  const cv::Mat labels = WithoutFrozen(associated, tracked);
+  const cv::Mat labels = LabelsToFuse(frame, associated, *map_, tracked);
   TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, tracked.T_WO));
   times.track_s = watch.Lap();
   if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);

@@ -36,7 +36,7 @@ class SurfaceReader {
   // whose second differences along the axes are those of the voxels: f (1 - f) / 2 times each, f
   // the point's place between two voxels, which is exact for any quadratic one. Distances along
   // rays bend where a surface does, upwards over convex ones, and the more the flatter the rays
-  // fall; without this the interpolated surface of a mug lies some 0.5 mm inside it
+  // fall; without this the interpolated surface lies inside the object
   // (docs/tracking.md). Lines of voxels that go on on neither side count as straight. 0 where a
   // corner is unobserved.
   float SagAt(const Eigen::Vector3d& p_L) const;

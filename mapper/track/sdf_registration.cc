@@ -30,33 +30,47 @@ MotionFrame FrameOf(const SdfRegistration& task) {
   return frame;
 }
 
-// Shares and directions of what the sums know; their translations' part has the points' weights as
-// its trace.
-void Analyse(const Matrix6& H, Vector6& shares, Matrix6& directions) {
-  const double weights = H.topLeftCorner<3, 3>().trace();
-  if (!(weights > 0)) return;
-  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(H / weights);
-  shares = solver.eigenvalues().cwiseMax(0);
-  directions = solver.eigenvectors();
+// Of the shares below which a share is none: keeps directions of which nothing speaks apart from
+// rounding.
+constexpr double kNoShare = 1e-9;
+
+Eigen::Matrix3d PriorOf(const Eigen::Vector3d& shares, const Eigen::Matrix3d& directions,
+                        double weak_share) {
+  const Eigen::Vector3d lacking = (weak_share - shares.array()).max(0);
+  return directions * lacking.asDiagonal() * directions.transpose();
 }
 
 MotionPrior PriorFor(const Matrix6& H, const Pose& expected, double weak_share) {
   MotionPrior prior;
   prior.expected = expected;
-  Vector6 shares = Vector6::Zero();
-  Matrix6 directions = Matrix6::Identity();
-  Analyse(H, shares, directions);
+  const KnownDirections known = DirectionsOf(H);
   const double weights = std::max(1.0, H.topLeftCorner<3, 3>().trace());
-  for (Eigen::Index i = 0; i < 6; ++i) {
-    const double lacking = weak_share - shares[i];
-    if (lacking <= 0) continue;
-    const Vector6 direction = directions.col(i);
-    prior.P += lacking * weights * direction * direction.transpose();
-  }
+  prior.P.topLeftCorner<3, 3>() = weights * PriorOf(known.shift_shares, known.shifts, weak_share);
+  prior.P.bottomRightCorner<3, 3>() = weights * PriorOf(known.turn_shares, known.turns, weak_share);
   return prior;
 }
 
 }  // namespace
+
+KnownDirections DirectionsOf(const Matrix6& information) {
+  KnownDirections known;
+  const double weights = information.topLeftCorner<3, 3>().trace();
+  if (!(weights > 0) || !information.allFinite()) return known;
+  const Matrix6 H = information / weights;
+  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
+  const Eigen::Matrix3d shifts = H.topLeftCorner<3, 3>();
+  const Solver of_shifts(shifts);
+  known.shift_shares = of_shifts.eigenvalues().cwiseMax(0);
+  known.shifts = of_shifts.eigenvectors();
+  const Eigen::Matrix3d floor = kNoShare * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d both = H.topRightCorner<3, 3>();
+  const Eigen::Matrix3d schur =
+      H.bottomRightCorner<3, 3>() - both.transpose() * (shifts + floor).ldlt().solve(both);
+  const Solver of_turns((schur + schur.transpose()) / 2);
+  known.turn_shares = of_turns.eigenvalues().cwiseMax(0);
+  known.turns = of_turns.eigenvectors();
+  return known;
+}
 
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config) {
@@ -109,11 +123,12 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
     result.iterations += found.iterations;
     result.T_LC = found.T;
   }
-  result.converged = found.converged;
+  // Where no point has a distance there is nothing to be at rest on.
+  result.converged = found.converged && found.at.H.trace() > 0;
   result.counts = fine.Count(found.T);
   result.deviation_m = fine.RobustDeviation_m(found.T, 0);
   result.information = found.at.H;
-  Analyse(found.at.H, result.shares, result.directions);
+  result.known = DirectionsOf(found.at.H);
   const Matrix6 all = found.at.H + prior.P + 1e-9 * Matrix6::Identity();
   result.covariance =
       result.deviation_m * result.deviation_m * all.ldlt().solve(Matrix6::Identity());

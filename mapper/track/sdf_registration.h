@@ -2,6 +2,7 @@
 // Levenberg-Marquardt search over six numbers and without matching points (docs/tracking.md).
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,21 @@ struct SdfRegistration {
   bool is_near = false;
 };
 
+// How much is known along which directions, as shares of the points' weights, increasing, with the
+// directions as columns. Of turns what the terms know while any shift is free (the Schur
+// complement of the shifts): a ball tells no turn about its centre, whatever point `frame` turns it
+// about. Of shifts what they know of an object that does not turn. So whatever motion the terms do
+// not see has a part in one of the two.
+struct KnownDirections {
+  Eigen::Vector3d shift_shares = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d shifts = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d turn_shares = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Identity();
+
+  double LeastShare() const { return std::min(shift_shares[0], turn_shares[0]); }
+};
+KnownDirections DirectionsOf(const Matrix6& information);
+
 struct SdfRegistrationResult {
   Pose T_LC = Pose::Identity();
   bool converged = false;
@@ -33,9 +49,8 @@ struct SdfRegistrationResult {
   // What the terms know, without the expectation: over the six lengths of `frame`, in points.
   MotionFrame frame;
   Matrix6 information = Matrix6::Zero();
-  // The eigenvalues of that, increasing, as shares of the points' weights, and their directions.
-  Vector6 shares = Vector6::Zero();
-  Matrix6 directions = Matrix6::Identity();
+  // Its weak and strong directions.
+  KnownDirections known;
   // Of the six lengths, square metres, if the points' errors were independent of each other and of
   // `deviation_m`; the expectation counts in it as if it were data.
   Matrix6 covariance = Matrix6::Zero();

@@ -38,13 +38,15 @@ Pose MotionOf(const Pose& T_WL, const Pose& T_WC, const Pose& T_LC) {
 // The motion without what it has along directions of which too little is known.
 Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double weak_share) {
   if (weak_share <= 0) return motion_L;
-  const Vector6 x = found.frame.LengthsOf(motion_L);
-  Vector6 known = Vector6::Zero();
-  for (Eigen::Index i = 0; i < 6; ++i) {
-    const Vector6 direction = found.directions.col(i);
-    known += std::min(1.0, found.shares[i] / weak_share) * direction.dot(x) * direction;
-  }
-  return found.frame.MotionOf(known);
+  const auto part = [&](const Eigen::Vector3d& shares, const Eigen::Matrix3d& directions,
+                        const Eigen::Vector3d& x) -> Eigen::Vector3d {
+    const Eigen::Vector3d trust = (shares.array() / weak_share).min(1);
+    return directions * trust.asDiagonal() * directions.transpose() * x;
+  };
+  Vector6 x = found.frame.LengthsOf(motion_L);
+  x.head<3>() = part(found.known.shift_shares, found.known.shifts, x.head<3>());
+  x.tail<3>() = part(found.known.turn_shares, found.known.turns, x.tail<3>());
+  return found.frame.MotionOf(x);
 }
 
 }  // namespace

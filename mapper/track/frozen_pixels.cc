@@ -1,0 +1,70 @@
+#include "mapper/track/frozen_pixels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "mapper/track/object_model.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr double kNearest_m = 0.05;  // docs/map.md, "Observation of a voxel"
+
+// The pixels that the voxels of a block fall on; the whole image where some are beside the camera.
+cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const Intrinsics& camera) {
+  const cv::Rect image(0, 0, camera.width, camera.height);
+  double left = camera.width;
+  double top = camera.height;
+  double right = 0;
+  double bottom = 0;
+  int behind = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Index3 corner =
+        VoxelAt(block, (i & 1) * 7 + ((i >> 1) & 1) * 7 * kBlockSide + (i >> 2) * 7 * 64);
+    const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(corner.x, corner.y, corner.z));
+    if (p_C.z() < kNearest_m) {
+      ++behind;
+      continue;
+    }
+    const double u = camera.fx * p_C.x() / p_C.z() + camera.cx;
+    const double v = camera.fy * p_C.y() / p_C.z() + camera.cy;
+    left = std::min(left, std::floor(u));
+    right = std::max(right, std::ceil(u) + 1);
+    top = std::min(top, std::floor(v));
+    bottom = std::max(bottom, std::ceil(v) + 1);
+  }
+  if (behind == 8) return {};
+  if (behind > 0) return image;
+  const auto clamped = [](double x, int end) {
+    return static_cast<int>(std::clamp(x, 0.0, static_cast<double>(end)));
+  };
+  const cv::Point low(clamped(left, camera.width), clamped(top, camera.height));
+  const cv::Point high(clamped(right, camera.width), clamped(bottom, camera.height));
+  if (high.x <= low.x || high.y <= low.y) return {};
+  return {low, high};
+}
+
+}  // namespace
+
+cv::Mat LabelsToFuse(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
+                     const TrackedPoses& tracked) {
+  cv::Mat fused = labels;
+  for (const auto& [id, status] : tracked.seen) {
+    if (status != TrackStatus::kFrozen) continue;
+    if (fused.data == labels.data) fused = labels.clone();
+    fused.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
+    if (IsOneField(map.method())) continue;
+    const std::optional<ObjectModel> model = ModelOf(map, id);
+    if (!model) continue;
+    const Pose T_CL = frame.T_WC.inverse() * model->T_WL;
+    for (const auto& entry : model->grid->entries()) {
+      if (!entry.block->AnyNegative()) continue;
+      fused(PixelsOf(entry.index, T_CL, map.config().voxel_m, frame.intrinsics))
+          .setTo(static_cast<double>(kNoInstance));
+    }
+  }
+  return fused;
+}
+
+}  // namespace tsdfpp

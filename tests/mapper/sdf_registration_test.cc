@@ -1,0 +1,290 @@
+// Registration of points to signed distances, against shapes whose distances are known exactly.
+#include "mapper/track/sdf_registration.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "core/random.h"
+#include "core/units.h"
+#include "tests/reference/analytic_scene.h"
+#include "tests/reference/sdf_registration_reference.h"
+
+namespace tsdfpp {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+using reference::DistanceFunction;
+using reference::MakePose;
+
+constexpr double kVoxel_m = 0.01;
+const Eigen::Vector3d kEye(0.5, -0.6, 0.7);  // of the camera, in the object's frame
+// A torus is smooth: what is left is of the third order in a voxel over its tube's radius of four.
+constexpr double kSmooth_voxels = 0.02;
+// Beside an edge, points lie between voxels on both sides of it, whose distances bend.
+constexpr double kEdges_voxels = 0.05;
+// Over shapes of some 8 cm.
+constexpr double kSmooth_rad = kSmooth_voxels * kVoxel_m / 0.08;
+constexpr double kEdges_rad = kEdges_voxels * kVoxel_m / 0.08;
+
+// Observed everywhere, without truncation.
+TsdfGrid GridOf(const DistanceFunction& distance, int reach_voxels = 24) {
+  TsdfGrid grid;
+  const int blocks = reach_voxels / kBlockSide;
+  for (int i = 0; i < 8 * blocks * blocks * blocks; ++i) {
+    const Index3 index{i % (2 * blocks) - blocks, i / (2 * blocks) % (2 * blocks) - blocks,
+                       i / (4 * blocks * blocks) - blocks};
+    TsdfBlock& block = grid.FindOrAdd(index);
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      const Index3 voxel = VoxelAt(index, place);
+      const Eigen::Vector3d p = kVoxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z);
+      block.distance[static_cast<std::size_t>(place)] = static_cast<float>(distance(p));
+      block.weight[static_cast<std::size_t>(place)] = 50;
+    }
+  }
+  return grid;
+}
+
+Pose TrueLC() { return reference::LookAt(kEye, Eigen::Vector3d::Zero()); }
+
+std::vector<SegmentPoint> InCamera(const Points& points_L) {
+  std::vector<SegmentPoint> points_C;
+  for (const Eigen::Vector3d& p_L : points_L) {
+    points_C.push_back({(TrueLC().inverse() * p_L).cast<float>(), {}});
+  }
+  return points_C;
+}
+
+SdfRegistration TaskFrom(const SurfaceReader& model, const std::vector<SegmentPoint>& points,
+                         const Pose& motion) {
+  SdfRegistration task{&model, points, kVoxel_m, reference::SmallCamera()};
+  task.T_LC_expected = motion * TrueLC();
+  return task;
+}
+
+double Turn(const Pose& T) { return Eigen::AngleAxisd(T.linear()).angle(); }
+
+const Pose kMotion = MakePose(4 * kDegree, {0.3, -1, 0.5}, {0.008, -0.009, 0.006});
+
+TEST(SdfRegistration, FindsWhereABoxIs) {
+  const DistanceFunction box = reference::BoxDistance({0.08, 0.05, 0.06});
+  const TsdfGrid grid = GridOf(box);
+  const SurfaceReader model(grid, kVoxel_m);
+  const auto points = InCamera(reference::VisiblePoints(box, kEye, 120));
+  const auto found = RegisterToDistances(TaskFrom(model, points, kMotion), {});
+  ASSERT_TRUE(found.converged);
+  const Pose off = found.T_LC * TrueLC().inverse();
+  EXPECT_LT(off.translation().norm(), kEdges_voxels * kVoxel_m);
+  EXPECT_LT(Turn(off), kEdges_rad);
+  EXPECT_GT(found.known.LeastShare(), SdfTrackConfig().weak_share) << "three faces hold a box";
+  EXPECT_EQ(found.counts.inliers, found.counts.points);
+}
+
+// All but the turn about its axis, along which it stays where it was expected.
+TEST(SdfRegistration, FindsWhereATorusIsAsBruteForceDoes) {
+  const DistanceFunction torus = reference::TorusDistance(0.06, 0.04);
+  const TsdfGrid grid = GridOf(torus);
+  const SurfaceReader model(grid, kVoxel_m);
+  const Points points_L = reference::VisiblePoints(torus, kEye, 100);
+  const auto points = InCamera(points_L);
+  const auto found = RegisterToDistances(TaskFrom(model, points, kMotion), {});
+  ASSERT_TRUE(found.converged);
+  const Pose brute = reference::BruteForcePose(torus, points_L, kMotion);
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  const Pose off = found.T_LC * TrueLC().inverse();
+  for (const Pose& other : {Pose::Identity(), brute}) {
+    EXPECT_LT((off.translation() - other.translation()).norm(), kSmooth_voxels * kVoxel_m);
+    EXPECT_LT((off.linear() * z - other.linear() * z).norm(), kSmooth_rad);
+  }
+  EXPECT_LT(found.known.turn_shares[0], 1e-3);
+  EXPECT_GT(std::abs(found.known.turns.col(0).z()), 0.99);
+  EXPECT_GT(found.known.shift_shares[0], SdfTrackConfig().weak_share);
+}
+
+TEST(SdfRegistration, FindsABallAndDoesNotMakeUpItsTurn) {
+  const DistanceFunction ball = reference::SphereDistance(0.06);
+  const TsdfGrid grid = GridOf(ball);
+  const SurfaceReader model(grid, kVoxel_m);
+  const auto points = InCamera(reference::VisiblePoints(ball, kEye, 120));
+  const auto found = RegisterToDistances(
+      TaskFrom(model, points, Pose(Eigen::Translation3d(0.008, -0.009, 0.006))), {});
+  ASSERT_TRUE(found.converged);
+  const Pose off = found.T_LC * TrueLC().inverse();
+  EXPECT_LT(off.translation().norm(), kSmooth_voxels * kVoxel_m);
+  // A turn by a thousandth of a voxel at its surface for each of some ten steps.
+  EXPECT_LT(Turn(off), 0.01 * kVoxel_m / 0.06);
+}
+
+// The trilinear surface of a ball lies inside it where distances bend upwards; the sag says so.
+TEST(SdfRegistration, IsBiasedWithoutSags) {
+  const DistanceFunction bent = [](const Eigen::Vector3d& p) {
+    const double d = p.norm() - 0.06;
+    return d + 20 * d * d;  // as along grazing rays
+  };
+  const TsdfGrid grid = GridOf(bent);
+  const SurfaceReader model(grid, kVoxel_m);
+  Points points_L = reference::VisiblePoints(reference::SphereDistance(0.06), kEye, 120);
+  const auto points = InCamera(points_L);
+  SdfTrackConfig config;
+  const auto off = [&] {
+    const auto found = RegisterToDistances(TaskFrom(model, points, Pose::Identity()), config);
+    EXPECT_TRUE(found.converged);
+    return (found.T_LC * TrueLC().inverse()).translation().norm() / kVoxel_m;
+  };
+  const double with_sags = off();
+  config.curved = false;
+  EXPECT_LT(with_sags, kSmooth_voxels);
+  EXPECT_GT(off(), 2 * kSmooth_voxels);
+}
+
+// Distances that are whole multiples of 2^-10 m, which halves hold exactly.
+TEST(SurfaceReader, KnowsTheSagOfAQuadraticFunction) {
+  const DistanceFunction quadratic = [](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d v = p / kVoxel_m;
+    return std::round(2 * v.x() * v.x() - v.y() * v.y() + 3 * v.z() * v.z() + v.x() * v.y() -
+                      2 * v.y() * v.z() + v.x()) /
+           1024;
+  };
+  const auto exact = [](const Eigen::Vector3d& v) {
+    return (2 * v.x() * v.x() - v.y() * v.y() + 3 * v.z() * v.z() + v.x() * v.y() -
+            2 * v.y() * v.z() + v.x()) /
+           1024;
+  };
+  const TsdfGrid grid = GridOf(quadratic, 16);
+  const SurfaceReader reader(grid, kVoxel_m);
+  const VoxelReader voxels(grid);
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    const auto draw = UniformDraw(11, 0, i);
+    const Eigen::Vector3d q = 12 * Eigen::Vector3d(draw[0], draw[1], draw[2]).array() - 6;
+    const double trilinear = *DistanceAt(FindCorners(voxels, q));
+    // Single precision, of values up to 0.5 and their differences.
+    EXPECT_NEAR(reader.SagAt(q * kVoxel_m), trilinear - exact(q), 1e-6);
+  }
+  EXPECT_EQ(reader.SagAt(Eigen::Vector3d(5, 5, 5)), 0) << "nothing is there";
+}
+
+// On a plane the distance is linear, so that Gauss and Newton's sums are the cost's derivatives.
+TEST(DistanceTerm, HasTheDerivativesOfItsCost) {
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.3, -0.5, 0.8).normalized();
+  const DistanceFunction plane = [&](const Eigen::Vector3d& p) { return normal.dot(p) - 0.013; };
+  const TsdfGrid grid = GridOf(plane);
+  const SurfaceReader model(grid, kVoxel_m);
+  Points points_L;
+  for (std::uint64_t i = 0; i < 700; ++i) {
+    const auto draw = UniformDraw(12, 0, i);
+    Eigen::Vector3d p = 0.2 * (Eigen::Vector3d(draw[0], draw[1], draw[2]).array() - 0.5);
+    p -= (normal.dot(p) - 0.013 - 0.006 * (draw[3] - 0.4)) * normal;
+    points_L.push_back(p);
+  }
+  const auto points = InCamera(points_L);
+  const MotionFrame frame{{0.01, 0.02, -0.01}, 0.07};
+  SdfTrackConfig config;
+  DistanceTerm term(model, points, frame, kVoxel_m, reference::SmallCamera(), config);
+  for (const double huber_m : {1.0, 0.001}) {
+    SCOPED_TRACE(huber_m);
+    term.SetHuber(huber_m);
+    const NormalEquations at = term.Sums(TrueLC());
+    constexpr double kStep_m = 1e-4;  // halves round distances by up to 3e-5 m, the same at both
+    for (int k = 0; k < 6; ++k) {
+      Vector6 x = Vector6::Zero();
+      x[k] = kStep_m;
+      const double up = term.Sums(frame.MotionOf(x) * TrueLC()).cost;
+      const double down = term.Sums(frame.MotionOf(-x) * TrueLC()).cost;
+      EXPECT_NEAR(at.g[k], (up - down) / (2 * kStep_m), 0.01 * at.g.norm()) << k;
+    }
+  }
+}
+
+TEST(MotionFrame, TakesLengthsToMotionsAndBack) {
+  const MotionFrame frame{{0.4, -0.2, 1.3}, 0.05};
+  Vector6 x;
+  x << 0.01, -0.02, 0.03, 0.02, 0.01, -0.04;
+  EXPECT_LT((frame.LengthsOf(frame.MotionOf(x)) - x).norm(), 1e-12);
+  const Pose motion = frame.MotionOf(x);
+  EXPECT_LT((motion * frame.centre - frame.centre - x.head<3>()).norm(), 1e-12);
+  EXPECT_NEAR(Turn(motion), x.tail<3>().norm() / 0.05, 1e-12);
+}
+
+TEST(SdfRegistration, DoesNotDependOnThreads) {
+  const DistanceFunction box = reference::BoxDistance({0.08, 0.05, 0.06});
+  const TsdfGrid grid = GridOf(box);
+  const SurfaceReader model(grid, kVoxel_m);
+  const auto points = InCamera(reference::VisiblePoints(box, kEye, 220));
+  ASSERT_GT(points.size(), 1024U) << "more than two chunks";
+  const auto with = [&](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return RegisterToDistances(TaskFrom(model, points, kMotion), {});
+  };
+  const auto one = with(1);
+  const auto four = with(4);
+  EXPECT_EQ(one.T_LC.matrix(), four.T_LC.matrix());
+  EXPECT_EQ(one.information, four.information);
+}
+
+// A plane holds three of six lengths; the others are as expected.
+TEST(SdfRegistration, DoesNotSlideAlongAPlane) {
+  const DistanceFunction plane = [](const Eigen::Vector3d& p) { return p.z() - 0.013; };
+  const TsdfGrid grid = GridOf(plane);
+  const SurfaceReader model(grid, kVoxel_m);
+  Points points_L;
+  for (int i = 0; i < 900; ++i) points_L.emplace_back(0.004 * (i % 30), 0.003 * (i / 30), 0.013);
+  const auto points = InCamera(points_L);
+  const Pose start(Eigen::Translation3d(0.006, -0.004, 0.005));
+  const auto found = RegisterToDistances(TaskFrom(model, points, start), {});
+  ASSERT_TRUE(found.converged);
+  const Pose off = found.T_LC * TrueLC().inverse();
+  const Eigen::Vector3d at(0.058, 0.0435, 0.013);  // the segment's middle
+  EXPECT_LT((off * at - at - Eigen::Vector3d(0.006, -0.004, 0)).norm(), kSmooth_voxels * kVoxel_m);
+  EXPECT_LT(Turn(off), kSmooth_rad);
+  EXPECT_LT(found.known.shift_shares[1], 1e-6);
+  EXPECT_LT(found.known.turn_shares[0], 1e-6);
+  EXPECT_GT(found.known.turn_shares[1], SdfTrackConfig().weak_share);
+}
+
+TEST(SdfRegistration, SurvivesWhatIsNoSegment) {
+  const DistanceFunction box = reference::BoxDistance({0.08, 0.05, 0.06});
+  const TsdfGrid grid = GridOf(box);
+  const TsdfGrid nothing;
+  const auto whole = InCamera(reference::VisiblePoints(box, kEye, 80));
+  auto broken = whole;
+  broken[3].p_C.y() = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<SegmentPoint> three(whole.begin(), whole.begin() + 3);
+  const std::vector<SegmentPoint> same(100, whole.front());
+  struct Case {
+    std::string name;
+    const TsdfGrid* grid;
+    std::vector<SegmentPoint> points;
+  };
+  for (const Case& trouble : {Case{"no points", &grid, {}}, Case{"three points", &grid, three},
+                              Case{"one place", &grid, same}, Case{"not finite", &grid, broken},
+                              Case{"no model", &nothing, whole}}) {
+    SCOPED_TRACE(trouble.name);
+    const SurfaceReader model(*trouble.grid, kVoxel_m);
+    const auto found = RegisterToDistances(TaskFrom(model, trouble.points, kMotion), {});
+    EXPECT_TRUE(found.T_LC.matrix().allFinite());
+    const bool is_usable = trouble.name == "three points" || trouble.name == "one place";
+    if (!is_usable) {
+      EXPECT_FALSE(found.converged);
+    }
+  }
+}
+
+TEST(SdfTrackConfig, RoundTripsThroughToml) {
+  SdfTrackConfig config;
+  config.curved = false;
+  config.weak_share = 0.03;
+  config.keyframe_points = 77;
+  EXPECT_EQ(SdfTrackConfig::FromToml(config.ToToml(), "t").value(), config);
+  EXPECT_TRUE(SdfTrackConfig().Validate());
+  config.min_points = config.max_points + 1;
+  const auto refused = config.Validate();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(refused.error().message.find("min_points"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tsdfpp
