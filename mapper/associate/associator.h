@@ -20,7 +20,6 @@ struct Association {
   // The semantic class of those objects for which a segment of the frame brought one.
   std::map<InstanceId, std::string> classes{};
 };
-};
 
 class Associator {
  public:
