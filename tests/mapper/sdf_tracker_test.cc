@@ -8,6 +8,7 @@
 
 #include "core/units.h"
 #include "mapper/pipeline.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -80,12 +81,13 @@ void ExpectFrozen(Pipeline& pipeline, const Frame& frame, const std::vector<Inst
   std::map<InstanceId, Before> before;
   for (const InstanceId id : ids) {
     before[id] = {pipeline.trajectories().at(id).rbegin()->second,
-                  pipeline.map().ObservedVoxels(id), pipeline.track_log().objects().at(id).frozen};
+                  VoxelsOf(pipeline.map()).ObservedVoxels(id),
+                  pipeline.track_log().objects().at(id).frozen};
   }
   ASSERT_TRUE(pipeline.Process(frame));
   for (const InstanceId id : ids) {
     EXPECT_EQ(pipeline.trajectories().at(id).rbegin()->second.matrix(), before[id].T_WO.matrix());
-    EXPECT_EQ(pipeline.map().ObservedVoxels(id), before[id].voxels);
+    EXPECT_EQ(VoxelsOf(pipeline.map()).ObservedVoxels(id), before[id].voxels);
     EXPECT_EQ(pipeline.track_log().objects().at(id).frozen, before[id].frozen + 1);
   }
 }
@@ -132,7 +134,7 @@ TEST(SdfTracker, BeginsAnObjectOnceItIsLargeEnough) {
   first.mask.at<std::uint16_t>(somewhere) = kBrick;
   ASSERT_TRUE(pipeline.Process(first));
   EXPECT_FALSE(pipeline.trajectories().contains(kBrick));
-  EXPECT_TRUE(pipeline.map().ObservedVoxels(kBrick).empty());
+  EXPECT_TRUE(VoxelsOf(pipeline.map()).ObservedVoxels(kBrick).empty());
   ASSERT_TRUE(pipeline.Process(MovingToys(2)));
   EXPECT_EQ(pipeline.trajectories().at(kBrick).at(2).matrix(), Pose::Identity().matrix());
 }
