@@ -223,7 +223,7 @@ class FrameWalk {
       const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
       camera_[index] = true_frame.T_WC;
       if (recorder_) recorder_->SeeFrame(true_frame);
-      MapFrame(frame);
+      MapFrame(frame, true_frame.mask);
       if (IsEvaluated(result_, index)) EvaluateAdapters(frame);
       if (progress) progress(index - first + 1, result_.last_frame - first + 1);
       if (IsNothingLeft()) return tl::unexpected(NothingLeft(result_));
@@ -246,8 +246,9 @@ class FrameWalk {
   const std::vector<PictureFile>& pictures() const { return pictures_.files(); }
 
  private:
-  // Gives the frame to each map; one that fails is left out from then on.
-  void MapFrame(const Frame& frame) {
+  // Gives the frame to each map; one that fails is left out from then on. `true_mask` is what its
+  // pixels show.
+  void MapFrame(const Frame& frame, const cv::Mat& true_mask) {
     for (std::size_t r = 0; r < result_.runs.size();) {
       CompareRun& run = *result_.runs[r];
       const auto mapped = Guarded([&]() -> Expected<void> {
@@ -255,7 +256,7 @@ class FrameWalk {
         TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
         run.times.Add(step);
         if (run.config.associate == AssociationMode::kVotes) {
-          run.matching.Observe(run.pipeline.labels(), true_frame.mask);
+          run.matching.Observe(run.pipeline.labels(), true_mask);
         }
         run.process_growth_bytes += ResidentBytes() - before;
         if (recorder_) recorder_->SeeMap(run);
