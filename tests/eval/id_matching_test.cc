@@ -79,8 +79,9 @@ TEST(IdMatching, MeshesHaveTheTruthsIds) {
   matching.Settle();
   // An object that neither map has can be asked for.
   const std::set<InstanceId> movers{kBrick, kTray, 40};
-  const SceneMeshes expected = MeshesOf(*map, movers);
-  const SceneMeshes meshes = MeshesOf(*renamed, movers, matching);
+  SceneMesher mesher;
+  const SceneMeshes expected = MeshesOf(*map, movers, mesher);
+  const SceneMeshes meshes = MeshesOf(*renamed, movers, matching, mesher);
   EXPECT_FALSE(expected.scene.face_ids.empty());
   EXPECT_EQ(meshes.scene.face_ids, expected.scene.face_ids);
   ASSERT_EQ(meshes.without.size(), expected.without.size());

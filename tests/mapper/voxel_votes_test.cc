@@ -71,7 +71,7 @@ TEST_P(VoxelVotesOfMethod, GiveEachObjectOneId) {
     ExpectTrueLabels(world, labels, frame.mask, 3);
   }
   EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
-  EXPECT_EQ(world.map().FindFault(), std::nullopt);
+  EXPECT_EQ(VoxelsOf(world.map()).FindFault(), std::nullopt);
 }
 
 // Each segment's votes, counted plainly, name the object that it joined; lists of the global map
@@ -115,7 +115,7 @@ TEST_P(VoxelVotesOfMethod, AreThePlainlyCountedOnes) {
             frame.T_WC *
             Eigen::Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
         const Eigen::Vector3d q = p_W / kToyVoxel_m;
-        const auto list = before->ListAt(q.array().round().cast<int>());
+        const auto list = VoxelsOf(*before).ListAt(q.array().round().cast<int>());
         if (list.empty() || list.front().id == kBackground) continue;
         ++listed[segments.at<InstanceId>(v, u)][list.front().id];
       }
@@ -243,7 +243,7 @@ TEST(VoxelVotes, HoldsBackWhatIsSmallOrShortLived) {
     without.Map(frame, {blank, {}});
   }
   EXPECT_EQ(world.map().Objects().size(), 4U);
-  EXPECT_TRUE(MapToBytes(world.map()) == MapToBytes(without.map()));
+  EXPECT_TRUE(MapToBytes(world.map()).value() == MapToBytes(without.map()).value());
 }
 
 // Nothing that a mask may hold stops it or enters the map.
@@ -282,7 +282,7 @@ TEST(VoxelVotes, TakesWhatIsHardlyThere) {
       EXPECT_EQ(labels.size(), segments.size());
     }
     EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
-    EXPECT_EQ(world.map().FindFault(), std::nullopt);
+    EXPECT_EQ(VoxelsOf(world.map()).FindFault(), std::nullopt);
   }
 }
 

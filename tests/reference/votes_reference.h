@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapper/map_representation.h"
+#include "mapper/voxel_inspection.h"
 
 namespace tsdfpp::reference {
 
@@ -24,7 +25,7 @@ inline double DistanceTo(const MapRepresentation& map, InstanceId id, const Eige
         const Eigen::Vector3i corner(static_cast<int>(std::floor(q.x())) + x,
                                      static_cast<int>(std::floor(q.y())) + y,
                                      static_cast<int>(std::floor(q.z())) + z);
-        const auto value = map.ValueAt(id, corner);
+        const auto value = VoxelsOf(map).ValueAt(id, corner);
         if (!value) continue;
         double coefficient = 1;
         for (int a = 0; a < 3; ++a) coefficient *= 1 - std::abs(q[a] - corner[a]);
