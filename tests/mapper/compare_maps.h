@@ -29,8 +29,8 @@ std::string Text(const std::vector<Listing>& list);
 
 // Of a reference, which is no MapRepresentation: itself.
 template <typename Reference>
-  requires(!std::is_base_of_v<MapRepresentation, Reference>)
-const Reference& VoxelsOf(const Reference& map) {
+requires(!std::is_base_of_v<MapRepresentation, Reference>) const Reference& VoxelsOf(
+    const Reference& map) {
   return map;
 }
 
