@@ -14,6 +14,7 @@
 #include "cli/command.h"
 #include "cli/log_lines.h"
 #include "cli/report.h"
+#include "cli/segment.h"
 #include "core/guard.h"
 #include "core/json_text.h"
 #include "core/one_line.h"
@@ -52,6 +53,7 @@ int RunCommand(int argc, char** argv) {
   add("verify", "Check a sequence of ours against itself and against rays", tsdfpp::AddVerify);
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
+  add("segment", "Write the segments of each frame as images of ids", tsdfpp::AddSegment);
   add("methods", "List the methods that map knows", tsdfpp::AddMethods);
   add("compare", "Run the paper's experiment on a scene or a sequence", tsdfpp::AddCompare);
   add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",

@@ -61,6 +61,11 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   std::optional<Segmentation> segmentation;
+  if (options.segmentation == "depth") {
+    return UsageError(
+        "--segmentation depth gives a thing another id in every frame, and map has no association "
+        "that would follow it, expected gt or none; `tsdfpp segment` writes the segments");
+  }
   if (!options.segmentation.empty()) {
     TSDFPP_ASSIGN(segmentation, SegmentationFromName(options.segmentation));
     if (options.source.path.empty()) {
@@ -228,7 +233,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--segmentation", options->segmentation,
                  "Where masks come from: gt (the sequence) or none (all is background); by default "
                  "gt where the sequence has masks")
-      ->check(OneOf({"gt", "none"}));
+      ->check(OneOf({"gt", "none", "depth"}));
   app.add_option("--poses", options->poses, "Object poses: gt (given) or icp (tracked)")
       ->capture_default_str();
   app.add_option("--profile", options->profile,

@@ -165,7 +165,7 @@ std::vector<std::size_t> FindWalls(const SurfaceMaps& maps, const cv::Mat& label
   return walls;
 }
 
-// Of each label, the share of its samples that are near each of the large planes.
+// Whether nine tenths of each label's samples are near one of the large planes.
 std::vector<bool> FindWithin(const SurfaceMaps& maps, const cv::Mat& labels,
                              const std::vector<InversePlane>& fitted,
                              const std::vector<std::size_t>& large,

@@ -180,8 +180,8 @@ std::vector<PartSize> MeasureParts(const cv::Mat& labels, const cv::Mat& depth, 
   return sizes;
 }
 
-void JoinSmall(const PixelLinks& links, const PartSize& least, std::vector<PartSize> sizes,
-               cv::Mat& labels) {
+std::int32_t JoinSmall(const PixelLinks& links, const PartSize& least, std::int32_t first,
+                       std::vector<PartSize> sizes, cv::Mat& labels) {
   const auto end = static_cast<std::int32_t>(sizes.size());
   const auto size_of = [&](std::int32_t label) -> PartSize& {
     return sizes[static_cast<std::size_t>(label)];
@@ -210,11 +210,16 @@ void JoinSmall(const PixelLinks& links, const PartSize& least, std::vector<PartS
     }
   }
   std::set<std::pair<std::int64_t, std::int32_t>> small;  // pixels, label
-  for (std::int32_t label = 1; label < end; ++label) {
-    if (is_small(label)) small.emplace(size_of(label).pixels, label);
-  }
   std::vector<std::int32_t> becomes(static_cast<std::size_t>(end));
   std::iota(becomes.begin(), becomes.end(), 0);
+  for (std::int32_t label = 1; label < end; ++label) {
+    if (!is_small(label)) continue;
+    if (shared.contains(label)) {
+      small.emplace(size_of(label).pixels, label);
+    } else {
+      becomes[static_cast<std::size_t>(label)] = 0;
+    }
+  }
   while (!small.empty()) {
     const std::int32_t label = small.begin()->second;
     small.erase(small.begin());
@@ -246,13 +251,20 @@ void JoinSmall(const PixelLinks& links, const PartSize& least, std::vector<PartS
     }
     return label;
   };
+  std::vector<std::int32_t> number(static_cast<std::size_t>(end));
+  for (std::int32_t label = 1; label < end; ++label) {
+    const bool is_left = last(label) == label && size_of(label).pixels > 0;
+    if (is_left) number[static_cast<std::size_t>(label)] = first++;
+  }
   for (std::int32_t label = 1; label < end; ++label) {
     becomes[static_cast<std::size_t>(label)] = last(label);
   }
+  for (std::int32_t& label : becomes) label = number[static_cast<std::size_t>(label)];
   ForEachRow(labels.rows, [&](int v) {
     auto* row = labels.ptr<std::int32_t>(v);
     for (int u = 0; u < labels.cols; ++u) row[u] = becomes[static_cast<std::size_t>(row[u])];
   });
+  return first;
 }
 
 }  // namespace tsdfpp

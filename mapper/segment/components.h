@@ -40,9 +40,10 @@ std::vector<PartSize> MeasureParts(const cv::Mat& labels, const cv::Mat& depth, 
                                    std::int32_t end);
 
 // Joins each part that is small in either way with the part that shares most links with it, those
-// of fewest pixels first (of equal ones the lowest label; of equal shares, too). A part without
-// neighbours becomes 0. `sizes` are the labels' own.
-void JoinSmall(const PixelLinks& links, const PartSize& least, std::vector<PartSize> sizes,
-               cv::Mat& labels);
+// of fewest pixels first (of equal ones the lowest label; of equal shares, too). A small part
+// without neighbours becomes 0. Then numbers those that are left from `first` on, in the order that
+// they had. `sizes` are the labels' own, `first` is at least 1. Returns the number after the last.
+std::int32_t JoinSmall(const PixelLinks& links, const PartSize& least, std::int32_t first,
+                       std::vector<PartSize> sizes, cv::Mat& labels);
 
 }  // namespace tsdfpp

@@ -35,8 +35,8 @@ Expected<cv::Mat> DepthSegments::Segment(const Frame& frame) {
   const double pixels = static_cast<double>(depth.rows) * depth.cols;
   const PartSize least{static_cast<std::int64_t>(std::ceil(config_.min_share * pixels)),
                        config_.min_m2};
-  JoinSmall(links, least, MeasureParts(labels_, maps_->depth, maps_->rays.pixel_width, end),
-            labels_);
+  end = JoinSmall(links, least, kBackgroundLabel + 1,
+                  MeasureParts(labels_, maps_->depth, maps_->rays.pixel_width, end), labels_);
   end = PartBackground(*maps_, links, least, end, config_, labels_);
   return IdsOf(depth, end);
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mapper/segment/pixel_rays.h"
+#include "mapper/segment/surface_kernels.h"
 
 namespace tsdfpp {
 namespace {
@@ -34,35 +35,12 @@ float Bridged(const At& at, float pixel, const DepthSegmentsConfig& config) {
   return (first * static_cast<float>(after) + last * static_cast<float>(before)) / span;
 }
 
-// What a pair of values may be off, and adds it to a mean.
-struct PairMean {
-  NoiseModel noise;
-  float sigmas;    // config.sigmas sqrt(6)
-  float steepest;  // slope a pixel, of q
-
-  PairMean(const DepthSegmentsConfig& config, float pixel)
-      : noise(config.noise, config.noise_scale),
-        sigmas(static_cast<float>(config.sigmas * std::sqrt(6.0))),
-        steepest(kSteepest * pixel) {}
-
-  // Of a row of means: `values` are the values, those `i` before and those `i` behind.
-  void Add(const float* before, const float* values, const float* behind, int i, int begin, int end,
-           float* sum, float* count) const {
-    const float per_two = noise.scale * kSmoothShift_px / static_cast<float>(2 * i);
-    const float most = noise.scale * kSmoothShift_px * steepest;
-    for (int u = begin; u < end; ++u) {
-      const float q = values[u];
-      const float slope = std::abs(behind[u] - before[u]) * per_two;
-      const float shift = slope < most * q ? slope : most * q;
-      const float tolerance = sigmas * (noise.HeadOnInverse(q) + shift);
-      const float both = behind[u] + before[u];
-      const bool taken =
-          (std::abs(both - 2 * q) <= tolerance) & (before[u] != 0) & (behind[u] != 0);
-      sum[u] += taken ? both : 0.0F;
-      count[u] += taken ? 2.0F : 0.0F;
-    }
-  }
-};
+PairScale PairScaleOf(const DepthSegmentsConfig& config, float pixel, int i) {
+  const NoiseModel noise(config.noise, config.noise_scale);
+  return {noise.scale, static_cast<float>(config.sigmas * std::sqrt(6.0)),
+          noise.scale * kSmoothShift_px / static_cast<float>(2 * i),
+          noise.scale * kSmoothShift_px * kSteepest * pixel};
+}
 
 }  // namespace
 
@@ -149,31 +127,31 @@ void Smooth(const cv::Mat& inverse, int smooth_px, float pixel, const DepthSegme
   scratch.create(inverse.size(), CV_32FC1);
   smooth.create(inverse.size(), CV_32FC1);
   depth.create(inverse.size(), CV_32FC1);
-  const PairMean pairs(config, pixel);
   const auto width = static_cast<std::size_t>(cols);
+  std::vector<PairScale> scales(1);  // by i
+  for (int i = 1; i <= smooth_px; ++i) scales.push_back(PairScaleOf(config, pixel, i));
   ForEachRow(rows, [&](int v) {
     const auto* from = inverse.ptr<float>(v);
-    auto* to = scratch.ptr<float>(v);
     std::vector<float> sum(from, from + cols);
     std::vector<float> count(width, 1.0F);
-    for (int i = 1; i <= smooth_px; ++i) {
-      pairs.Add(from - i, from, from + i, i, i, cols - i, sum.data(), count.data());
+    for (std::size_t i = 1; i < scales.size() && 2 * i < width; ++i) {
+      AddPairs(from, from + i, from + 2 * i, width - 2 * i, scales[i], &sum[i], &count[i]);
     }
-    for (int u = 0; u < cols; ++u)
-      to[u] = sum[static_cast<std::size_t>(u)] / count[static_cast<std::size_t>(u)];
+    auto* to = scratch.ptr<float>(v);
+    for (std::size_t u = 0; u < width; ++u) to[u] = sum[u] / count[u];
   });
   ForEachRow(rows, [&](int v) {
     const auto* from = scratch.ptr<float>(v);
-    auto* to = smooth.ptr<float>(v);
-    auto* z = depth.ptr<float>(v);
     std::vector<float> sum(from, from + cols);
     std::vector<float> count(width, 1.0F);
     for (int i = 1; i <= smooth_px && i <= v && v + i < rows; ++i) {
-      pairs.Add(scratch.ptr<float>(v - i), from, scratch.ptr<float>(v + i), i, 0, cols, sum.data(),
-                count.data());
+      AddPairs(scratch.ptr<float>(v - i), from, scratch.ptr<float>(v + i), width,
+               scales[static_cast<std::size_t>(i)], sum.data(), count.data());
     }
-    for (int u = 0; u < cols; ++u) {
-      to[u] = sum[static_cast<std::size_t>(u)] / count[static_cast<std::size_t>(u)];
+    auto* to = smooth.ptr<float>(v);
+    auto* z = depth.ptr<float>(v);
+    for (std::size_t u = 0; u < width; ++u) {
+      to[u] = sum[u] / count[u];
       z[u] = to[u] == 0 ? 0 : 1 / to[u];
     }
   });

@@ -11,7 +11,7 @@ namespace tsdfpp {
 //   (config.sigmas sqrt(2) sigma / sqrt((2 m + 1) (m + 1)) + config.jump_px w z) / z^2
 // from both g0 and g1: neither side goes on as the other. z is the nearer depth, sigma its noise, w
 // z a pixel's width there, (2 m + 1) (m + 1) what half the mean's window holds. A slope across
-// which there is no value is the other one; where there is neither, both are within +-kSteepestJump
+// which there is no value is the other one; where there is neither, both are within +-kSteepest
 // w z / z^2. Beside a pixel without value there is always a jump. `reach_right` and `reach_down`:
 // SurfaceMaps.
 void FindJumps(const PixelRays& rays, const ChordReach& reach, const DepthSegmentsConfig& config,

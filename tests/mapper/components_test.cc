@@ -142,17 +142,17 @@ TEST(Components, SmallOnesJoinTheNeighbourThatTheyShareMostWith) {
   EXPECT_EQ(sizes[3].pixels, 8);
   EXPECT_NEAR(sizes[3].area_m2, 8 * 0.02 * 0.02, 1e-9);
   cv::Mat joined = labels.clone();
-  JoinSmall({right, down}, {10, 0}, sizes, joined);
+  EXPECT_EQ(JoinSmall({right, down}, {10, 0}, 3, sizes, joined), 5);
   for (int u = 0; u < 15; ++u) {
-    EXPECT_EQ(joined.at<std::int32_t>(1, u), u < 7 ? 1 : 4) << u;
+    EXPECT_EQ(joined.at<std::int32_t>(1, u), u < 7 ? 3 : 4) << u;
   }
   EXPECT_EQ(joined.at<std::int32_t>(2, 16), 0);
   // Small in area alone is small, too: all but the two widest.
   cv::Mat by_area = labels.clone();
-  JoinSmall({right, down}, {0, 10 * 0.02 * 0.02}, sizes, by_area);
+  EXPECT_EQ(JoinSmall({right, down}, {0, 10 * 0.02 * 0.02}, 3, sizes, by_area), 5);
   EXPECT_EQ(cv::countNonZero(by_area != joined), 0);
   cv::Mat kept = labels.clone();
-  JoinSmall({right, down}, {1, 0}, sizes, kept);
+  EXPECT_EQ(JoinSmall({right, down}, {1, 0}, 1, sizes, kept), 6);
   EXPECT_EQ(cv::countNonZero(kept != labels), 0);
 }
 
