@@ -90,6 +90,11 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   MapWishes wishes;
   wishes.poses = app.count("--poses") > 0;
+  if (options.segmentation == "depth") {
+    return UsageError(
+        "--segmentation depth is not for map yet: its segments are not checked with --associate "
+        "votes; expected gt or none; `tsdfpp segment` writes them");
+  }
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -301,7 +306,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--segmentation", options->segmentation,
                  "Where masks come from: gt (the sequence) or none (all is background); by default "
                  "gt where the sequence has masks")
-      ->check(OneOf({"gt", "none"}));
+      ->check(OneOf({"gt", "none", "depth"}));
   app.add_option("--associate", options->associate,
                  "Which objects segments are: given (the masks' ids) or votes (their points vote, "
                  "ids are the map's own; poses are then tracked); by default given unless ids are "
