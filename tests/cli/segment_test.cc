@@ -101,8 +101,7 @@ TEST_F(SegmentCommand, MapSaysThatItCannotFollowSegmentsOfDepth) {
   const CommandOutput run = test::RunTsdfpp(
       {"map", Recording(), "--segmentation", "depth", "--out", folder_ / "map"}, folder_.path());
   EXPECT_EQ(run.exit_code, kUsage);
-  EXPECT_NE(run.err.find("--segmentation depth is not for map yet"), std::string::npos)
-      << run.err;
+  EXPECT_NE(run.err.find("--segmentation depth is not for map yet"), std::string::npos) << run.err;
 }
 
 }  // namespace
