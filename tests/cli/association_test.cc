@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "core/files.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 
