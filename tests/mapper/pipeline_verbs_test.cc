@@ -77,7 +77,7 @@ TEST(PipelineVerbs, IcpBeginsWhereAnObjectIsFirstSeen) {
   const Frame frame = SmallFrame();
   const auto map = MakeMap(Method::kTsdfppAnchored, MapConfig());
   PclIcp icp{IcpConfig()};
-  const ObjectPoses first = icp.Track(frame, frame.mask, *map);
+  const ObjectPoses first = icp.Track(frame, frame.mask, *map, {});
   ASSERT_EQ(first.size(), 1U);
   EXPECT_EQ(first.at(7).matrix(), Pose::Identity().matrix());
   const Pose elsewhere(Eigen::Translation3d(5, 5, 5));
