@@ -113,7 +113,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   TSDFPP_ASSIGN(const Segments segments, segmenter_->Segment(frame));
   TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
   times.segment_s = watch.Lap();
-  const Association association = associator_->Associate(frame, segments, *map_);
+  const AssociatedObjects association = associator_->Associate(frame, segments, *map_);
   times.associate_s = watch.Lap();
   TrackedObjects chosen = tracked_;
   for (const auto& [id, name] : association.classes) chosen.Learn(id, name);

@@ -13,7 +13,7 @@
 
 namespace tsdfpp {
 
-struct Association {
+struct AssociatedObjects {
   // The object of each pixel: CV_16UC1 of the size of the segments; ids that the map does not have
   // are of objects that the frame brings into it. May share its pixels with the segments.
   cv::Mat labels;
@@ -27,8 +27,8 @@ class Associator {
 
   // `segments` is what the segmenter made of the frame, and has the frame's form
   // (mapper/map_reach.h). Frames come in order.
-  virtual Association Associate(const Frame& frame, const Segments& segments,
-                                const MapRepresentation& map) = 0;
+  virtual AssociatedObjects Associate(const Frame& frame, const Segments& segments,
+                                      const MapRepresentation& map) = 0;
 
   // Called where the frame associated last was mapped; one that was refused leaves no trace.
   virtual void Accept() {}

@@ -2,8 +2,8 @@
 
 namespace tsdfpp {
 
-Association GivenIds::Associate(const Frame& /*frame*/, const Segments& segments,
-                                const MapRepresentation& /*map*/) {
+AssociatedObjects GivenIds::Associate(const Frame& /*frame*/, const Segments& segments,
+                                      const MapRepresentation& /*map*/) {
   return {segments.ids, segments.classes};
 }
 

@@ -8,8 +8,8 @@ namespace tsdfpp {
 class GivenIds : public Associator {
  public:
   // The segments themselves, with their classes.
-  Association Associate(const Frame& frame, const Segments& segments,
-                        const MapRepresentation& map) override;
+  AssociatedObjects Associate(const Frame& frame, const Segments& segments,
+                              const MapRepresentation& map) override;
 };
 
 }  // namespace tsdfpp

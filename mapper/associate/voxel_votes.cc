@@ -178,8 +178,8 @@ void VoxelVotes::Cut(const Frame& frame, const ObjectLookup& lookup, const Segme
       });
 }
 
-Association VoxelVotes::Associate(const Frame& frame, const Segments& segments,
-                                  const MapRepresentation& map) {
+AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segments,
+                                        const MapRepresentation& map) {
   next_ = state_;
   ++next_.frame;
   const ObjectLookup lookup(map);
@@ -190,7 +190,7 @@ Association VoxelVotes::Associate(const Frame& frame, const Segments& segments,
   FindCuts(found);
   GiveBirth(found, map.config().voxel_m);
 
-  Association association;
+  AssociatedObjects association;
   std::vector<InstanceId> label_of(kIds, kNoInstance);
   label_of[kBackground] = kBackground;
   for (Segment& segment : found) {

@@ -37,8 +37,8 @@ class VoxelVotes : public Associator {
   //     and are never used again; after the last one, kNoInstance - 1, nothing is born any more,
   //     and Remarks() says so.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
-  Association Associate(const Frame& frame, const Segments& segments,
-                        const MapRepresentation& map) override;
+  AssociatedObjects Associate(const Frame& frame, const Segments& segments,
+                              const MapRepresentation& map) override;
 
   void Accept() override { state_ = next_; }
 

@@ -3,9 +3,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
-#include "core/files.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 

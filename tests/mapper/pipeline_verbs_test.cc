@@ -56,7 +56,8 @@ TEST(PipelineVerbs, NoMasksAreBackground) {
 TEST(PipelineVerbs, GivenIdsAreTheSegments) {
   const Frame frame = SmallFrame();
   const auto map = MakeMap(Method::kTsdfppAnchored, MapConfig());
-  const Association association = GivenIds().Associate(frame, {frame.mask, {{7, "car"}}}, *map);
+  const AssociatedObjects association =
+      GivenIds().Associate(frame, {frame.mask, {{7, "car"}}}, *map);
   EXPECT_TRUE(AreEqual(association.labels, frame.mask));
   EXPECT_EQ(association.classes.at(7), "car");
 }

@@ -341,7 +341,7 @@ TEST(VoxelVotes, ClassesGoToTheObjects) {
       world.Map(frame, segments);
       continue;
     }
-    const Association last = world.votes().Associate(frame, segments, world.map());
+    const AssociatedObjects last = world.votes().Associate(frame, segments, world.map());
     ASSERT_EQ(last.classes.size(), 2U);
     for (const auto& [id, name] : last.classes) {
       EXPECT_EQ(name, world.truth_of().at(id) == kBall ? "ball" : "tray");
