@@ -150,8 +150,11 @@ TEST_P(MesherOfCopies, GivesWhatEachGives) {
   ASSERT_TRUE(SameAsFromScratch(*map, mesher));
 }
 
+class MesherOfVoxels : public EveryMethodTest {};
+TSDFPP_FOR_EVERY_VOXEL_METHOD(MesherOfVoxels);
+
 // A label is part of the scene: kept triangles have the new one.
-TEST_P(MesherOfCopies, SeesARenaming) {
+TEST_P(MesherOfVoxels, SeesARenaming) {
   constexpr InstanceId kNew = 9;
   const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
   SceneMesher mesher;

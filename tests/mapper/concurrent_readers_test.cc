@@ -86,10 +86,11 @@ std::string CopyAsBytes(const MapRepresentation& map) {
 }
 
 std::string RestAsBytes(const MapRepresentation& map) {
-  std::string bytes = MapToBytes(map).value();
+  std::string bytes;
   AppendBytes(map.Memory().blocks, bytes);
   for (const InstanceId id : map.Objects()) AppendBytes(map.ObjectLattice(id).matrix(), bytes);
-  bytes += VoxelsOf(map).FindFault().value_or("well");
+  if (map.persistence() != nullptr) bytes += MapToBytes(map).value();
+  if (map.inspection() != nullptr) bytes += VoxelsOf(map).FindFault().value_or("well");
   return bytes;
 }
 
@@ -104,8 +105,10 @@ class ConcurrentReaders : public EveryMethodTest {};
 TSDFPP_FOR_EVERY_METHOD(ConcurrentReaders);
 
 TEST_P(ConcurrentReaders, SeeWhatOneSees) {
-  const std::vector<Reading> readings{VoxelsAsBytes,  ListsAsBytes, RaysAsBytes, MeshesAsBytes,
-                                      AnswersAsBytes, CopyAsBytes,  RestAsBytes};
+  std::vector<Reading> readings{RaysAsBytes, MeshesAsBytes, CopyAsBytes, RestAsBytes};
+  if (InfoOf(GetParam()).has_voxels) {
+    readings.insert(readings.end(), {VoxelsAsBytes, ListsAsBytes, AnswersAsBytes});
+  }
   const auto map_of_one = MapNotReadYet(GetParam());
   std::vector<std::string> expected;
   for (const Reading& read : readings) expected.push_back(read(*map_of_one));
