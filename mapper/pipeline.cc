@@ -47,13 +47,6 @@ std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config, const Tracked
 
 }  // namespace
 
-Expected<void> CheckPoses(Method method, PoseSource poses) {
-  if (poses != PoseSource::kTrack || InfoOf(method).has_voxels) return {};
-  return UsageError(
-      "poses '{}' are tracked by signed distances, which method '{}' has not, expected gt or icp",
-      PoseSourceName(poses), MethodName(method));
-}
-
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
     : Pipeline(config, objects, MakeMap(config.method, config.map), {}) {}
 

@@ -30,9 +30,6 @@ struct PipelineConfig {
   SdfTrackConfig track{};
 };
 
-// Errors: kUsage, a sentence, where the method's maps have not what the poses are tracked by.
-Expected<void> CheckPoses(Method method, PoseSource poses);
-
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
   double segment_s = 0;       // paper III-B; 0 with given masks
