@@ -59,13 +59,6 @@ std::unique_ptr<Associator> MakeAssociator(
 
 }  // namespace
 
-Expected<void> CheckPoses(Method method, PoseSource poses) {
-  if (poses != PoseSource::kTrack || InfoOf(method).has_voxels) return {};
-  return UsageError(
-      "poses '{}' are tracked by signed distances, which method '{}' has not, expected gt or icp",
-      PoseSourceName(poses), MethodName(method));
-}
-
 Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(map.Validate());
   TSDFPP_RETURN_IF_ERROR(votes.Validate());

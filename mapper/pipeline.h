@@ -38,9 +38,6 @@ struct PipelineConfig {
   Expected<void> Validate() const;
 };
 
-// Errors: kUsage, a sentence, where the method's maps have not what the poses are tracked by.
-Expected<void> CheckPoses(Method method, PoseSource poses);
-
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
   double segment_s = 0;       // paper III-B; 0 with given masks

@@ -35,4 +35,11 @@ std::string_view PoseSourceTitle(PoseSource source) {
   std::abort();
 }
 
+Expected<void> CheckPoses(Method method, PoseSource poses) {
+  if (poses != PoseSource::kTrack || InfoOf(method).has_voxels) return {};
+  return UsageError(
+      "poses '{}' are tracked by signed distances, which method '{}' has not, expected gt or icp",
+      PoseSourceName(poses), MethodName(method));
+}
+
 }  // namespace tsdfpp

@@ -50,4 +50,7 @@ std::string_view PoseSourceName(PoseSource source);
 // As titles say it: "given poses", "ICP" or "tracked".
 std::string_view PoseSourceTitle(PoseSource source);
 
+// Errors: kUsage, a sentence, where the method's maps have not what the poses are tracked by.
+Expected<void> CheckPoses(Method method, PoseSource poses);
+
 }  // namespace tsdfpp
