@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mapper/associate/given_ids.h"
+#include "mapper/associate/voxel_votes.h"
 #include "mapper/map_reach.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/pcl_icp.h"
@@ -31,26 +32,52 @@ class StopWatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config,
-                                     const std::vector<ObjectInfo>& objects) {
-  if (config.poses == PoseSource::kIcp) return std::make_unique<PclIcp>(config.icp, objects);
+std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config) {
+  if (config.poses == PoseSource::kIcp) return std::make_unique<PclIcp>(config.icp);
   return std::make_unique<GivenPoses>();
 }
 
+// New objects get ids above those that the map has had.
+std::unique_ptr<Associator> MakeAssociator(
+    const PipelineConfig& config, const std::vector<ObjectInfo>& born,
+    const std::map<InstanceId, std::map<int, Pose>>& trajectories) {
+  if (config.associate == AssociationMode::kGiven) return std::make_unique<GivenIds>();
+  int first = kBackground + 1;
+  for (const ObjectInfo& object : born) first = std::max(first, object.id + 1);
+  if (!trajectories.empty()) first = std::max(first, trajectories.rbegin()->first + 1);
+  return std::make_unique<VoxelVotes>(config.votes, config.reentry, static_cast<InstanceId>(first));
+}
+
 }  // namespace
+
+Expected<void> PipelineConfig::Validate() const {
+  TSDFPP_RETURN_IF_ERROR(map.Validate());
+  TSDFPP_RETURN_IF_ERROR(votes.Validate());
+  TSDFPP_RETURN_IF_ERROR(reentry.Validate());
+  TSDFPP_RETURN_IF_ERROR(icp.Validate());
+  if (associate == AssociationMode::kVotes && poses == PoseSource::kGiven) {
+    return UsageError(
+        "given poses are those of given ids, and association by votes gives ids of its own: "
+        "expected objects that are tracked, or given ids");
+  }
+  return {};
+}
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
     : Pipeline(config, objects, MakeMap(config.method, config.map), {}) {}
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
                    std::unique_ptr<MapRepresentation> map,
-                   std::map<InstanceId, std::map<int, Pose>> trajectories)
+                   std::map<InstanceId, std::map<int, Pose>> trajectories,
+                   const std::vector<ObjectInfo>& born)
     : config_(config),
-      segmenter_(MakeSegmenter(config.segmentation)),
-      associator_(std::make_unique<GivenIds>()),
-      tracker_(MakeTracker(config, objects)),
+      segmenter_(MakeSegmenter(config.segmentation, objects)),
+      associator_(MakeAssociator(config, born, trajectories)),
+      tracker_(MakeTracker(config)),
       map_(std::move(map)),
-      trajectories_(std::move(trajectories)) {
+      trajectories_(std::move(trajectories)),
+      objects_(config.associate == AssociationMode::kGiven ? objects : born),
+      tracked_(config.tracked, objects_) {
   is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
@@ -60,21 +87,46 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
 Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   StepTimes times;
   StopWatch watch;
-  TSDFPP_ASSIGN(const cv::Mat segments, segmenter_->Segment(frame));
-  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments));
+  TSDFPP_ASSIGN(const Segments segments, segmenter_->Segment(frame));
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
   times.segment_s = watch.Lap();
-  const cv::Mat labels = associator_->Associate(frame, segments, *map_);
+  const Association association = associator_->Associate(frame, segments, *map_, MovableObjects());
+  const cv::Mat& labels = association.labels;
+  TSDFPP_RETURN_IF_ERROR(ReturnObjects(frame, association));
   times.associate_s = watch.Lap();
-  ObjectPoses T_WO = tracker_->Track(frame, labels, *map_, T_WO_);
+  TrackedObjects tracked = tracked_;
+  for (const auto& [id, name] : association.classes) tracked.Learn(id, name);
+  ObjectPoses T_WO = tracker_->Track(frame, tracked.Select(labels), *map_, T_WO_);
   TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, T_WO));
+  associator_->Accept();
+  tracked_ = std::move(tracked);
   times.track_s = watch.Lap();
   UpdatePoses(frame.index, std::move(T_WO));
   times.update_poses_s = watch.Lap();
   map_->Fuse(frame, labels);
   times.fuse_s = watch.Lap();
   CountWhileEmpty(frame, labels);
+  labels_ = labels;
   farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
   return times;
+}
+
+std::set<InstanceId> Pipeline::MovableObjects() const {
+  std::set<InstanceId> movable;
+  for (const auto& [id, T_WO] : T_WO_) {
+    if (tracked_.Contains(id)) movable.insert(id);
+  }
+  return movable;
+}
+
+Expected<void> Pipeline::ReturnObjects(const Frame& frame, const Association& association) {
+  if (association.T_now_lost.empty()) return {};
+  ObjectPoses T_WO = T_WO_;
+  for (const auto& [id, T_now_lost] : association.T_now_lost) T_WO[id] = T_now_lost * T_WO.at(id);
+  TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, association.labels, T_WO));
+  for (const auto& [id, T_now_lost] : association.T_now_lost) map_->SetObjectPose(id, T_WO.at(id));
+  T_WO_ = std::move(T_WO);
+  return {};
 }
 
 void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
@@ -101,7 +153,27 @@ std::vector<std::string> Pipeline::Remarks() const {
         "by up to {:.2g} voxels, which blurs surfaces; poses nearer to the origin would help",
         farthest_m_, voxels * std::numeric_limits<float>::epsilon() / 2));
   }
+  for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;
+}
+
+std::vector<ObjectInfo> Pipeline::Objects() const {
+  std::vector<ObjectInfo> objects = objects_;
+  if (config_.associate == AssociationMode::kGiven) return objects;
+  const auto is_known = [&](InstanceId id) {
+    return std::any_of(objects.begin(), objects.end(),
+                       [id](const ObjectInfo& object) { return object.id == id; });
+  };
+  if (!is_known(kBackground)) objects.push_back({kBackground, "background", ""});
+  for (const InstanceId id : map_->Objects()) {
+    if (!is_known(id)) objects.push_back({id, fmt::format("object{}", id), ""});
+  }
+  std::sort(objects.begin(), objects.end(),
+            [](const ObjectInfo& a, const ObjectInfo& b) { return a.id < b.id; });
+  for (ObjectInfo& object : objects) {
+    if (object.id != kBackground) object.semantic_class = tracked_.ClassOf(object.id);
+  }
+  return objects;
 }
 
 }  // namespace tsdfpp

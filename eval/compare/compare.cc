@@ -47,6 +47,11 @@ Expected<int> LastFrame(const SequenceInfo& info, const std::string& until) {
   return frame;
 }
 
+AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info) {
+  return config.associate.value_or(info.mask_ids_are_objects ? AssociationMode::kGiven
+                                                             : AssociationMode::kVotes);
+}
+
 Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig& config,
                                                             const SequenceInfo& info,
                                                             const SceneTruth& truth) {
@@ -54,11 +59,16 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   for (const PoseSource poses : config.poses) {
     for (const std::string& profile : config.profiles) {
       for (const Method method : config.methods) {
-        PipelineConfig pipeline{
-            .method = method, .map = config.map, .poses = poses, .icp = config.icp};
+        PipelineConfig pipeline{.method = method,
+                                .map = config.map,
+                                .associate = AssociationOf(config, info),
+                                .poses = poses,
+                                .icp = config.icp};
         TSDFPP_RETURN_IF_ERROR(pipeline.map.SetProfile(profile));
-        TSDFPP_RETURN_IF_ERROR(pipeline.map.Validate());
-        runs.push_back(std::make_unique<CompareRun>(pipeline, profile, info.objects, truth));
+        TSDFPP_RETURN_IF_ERROR(pipeline.Validate());
+        const std::vector<ObjectInfo> nobody;
+        runs.push_back(std::make_unique<CompareRun>(
+            pipeline, profile, info.mask_ids_are_objects ? info.objects : nobody, truth));
       }
     }
   }
@@ -173,7 +183,10 @@ Expected<void> EvaluateRun(CompareRun& run, const Frame& frame,
                            const CompareResult& result, PictureMaker& pictures,
                            std::optional<ReportRecorder>& recorder) {
   const int index = frame.index;
-  SceneMeshes meshes = MeshesOf(run.pipeline.map(), result.movers);
+  const bool votes = run.config.associate == AssociationMode::kVotes;
+  if (votes) run.matching.Settle();
+  SceneMeshes meshes = votes ? MeshesOf(run.pipeline.map(), result.movers, run.matching)
+                             : MeshesOf(run.pipeline.map(), result.movers);
   if (result.config.keep_meshes) {
     TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out / run.FolderName() / "frames", index));
   }
@@ -186,8 +199,12 @@ Expected<void> EvaluateRun(CompareRun& run, const Frame& frame,
   const bool examined = index == result.reveal_frame.value_or(result.last_frame);
   if (examined) {
     auto copy = run.pipeline.map().Clone();
-    for (const InstanceId id : result.movers) copy->Remove(id);
-    TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, result.info, out / run.FolderName()));
+    for (const InstanceId id : result.movers) {
+      if (run.IdOf(id) != kNoInstance) copy->Remove(run.IdOf(id));
+    }
+    SequenceInfo info = result.info;
+    if (votes) info.objects = run.pipeline.Objects();
+    TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, info, out / run.FolderName()));
   }
   DropMeshes(evaluation);
   return {};
@@ -235,8 +252,9 @@ CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profil
       last_seen(MakeLastSeenStores(truth)) {}
 
 std::string CompareRun::Title() const {
-  return fmt::format("{}, {}, {}", MethodName(config.method), profile,
-                     config.poses == PoseSource::kGiven ? "given poses" : "ICP");
+  return fmt::format("{}, {}, {}{}", MethodName(config.method), profile,
+                     config.poses == PoseSource::kGiven ? "given poses" : "ICP",
+                     config.associate == AssociationMode::kVotes ? ", ids by votes" : "");
 }
 
 std::string CompareRun::FolderName() const {
@@ -318,6 +336,9 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
         const std::int64_t before = ResidentBytes();
         TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
         run.times.Add(step);
+        if (run.config.associate == AssociationMode::kVotes) {
+          run.matching.Observe(run.pipeline.labels(), true_frame.mask);
+        }
         run.process_growth_bytes += ResidentBytes() - before;
         if (recorder) recorder->SeeMap(run);
         if (!evaluate) return {};

@@ -351,7 +351,7 @@ Expected<void> ReportRecorder::Write() {
     runs_[r]["update_poses_ms"] = milliseconds(run.times.update_poses_s);
     runs_[r]["fuse_ms"] = milliseconds(run.times.fuse_s);
     for (const InstanceId id : result_.truth->moved()) {
-      const auto ours = run.pipeline.trajectories().find(id);
+      const auto ours = run.pipeline.trajectories().find(run.IdOf(id));
       const auto truth = result_.truth->trajectories().find(id);
       if (ours == run.pipeline.trajectories().end() ||
           truth == result_.truth->trajectories().end()) {

@@ -2,9 +2,10 @@
 
 namespace tsdfpp {
 
-cv::Mat GivenIds::Associate(const Frame& /*frame*/, const cv::Mat& segments,
-                            const MapRepresentation& /*map*/) {
-  return segments;
+Association GivenIds::Associate(const Frame& /*frame*/, const Segments& segments,
+                                const MapRepresentation& /*map*/,
+                                const std::set<InstanceId>& /*movable*/) {
+  return {segments.ids, segments.classes};
 }
 
 }  // namespace tsdfpp

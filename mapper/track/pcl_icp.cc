@@ -1,5 +1,7 @@
 #include "mapper/track/pcl_icp.h"
 
+#include <set>
+
 namespace tsdfpp {
 namespace {
 
@@ -12,23 +14,17 @@ std::set<InstanceId> LabelsIn(const cv::Mat& labels) {
       if (row[u] != last) ids.insert(last = row[u]);
     }
   }
+  ids.erase(kBackground);
   ids.erase(kNoInstance);
   return ids;
 }
 
 }  // namespace
 
-PclIcp::PclIcp(const IcpConfig& config, const std::vector<ObjectInfo>& objects) : config_(config) {
-  for (const ObjectInfo& object : objects) {
-    if (object.id != kBackground && !object.semantic_class.empty()) tracked_.insert(object.id);
-  }
-}
-
 ObjectPoses PclIcp::Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
                           const ObjectPoses& before) {
   ObjectPoses after = before;
   for (const InstanceId id : LabelsIn(labels)) {
-    if (!tracked_.contains(id)) continue;
     const auto known = before.find(id);
     if (known == before.end()) {
       after[id] = Pose::Identity();

@@ -1,9 +1,6 @@
-// The paper's tracker (III-D): each object that the frame shows and that was classified is
-// registered to its mesh in the map, from where it was.
+// The paper's tracker (III-D): each object that the frame shows is registered to its mesh in the
+// map, from where it was.
 #pragma once
-
-#include <set>
-#include <vector>
 
 #include "mapper/track/icp_registration.h"
 #include "mapper/track/tracker.h"
@@ -12,8 +9,8 @@ namespace tsdfpp {
 
 class PclIcp : public Tracker {
  public:
-  // Of `objects` those with a semantic class are tracked. The config must be valid.
-  PclIcp(const IcpConfig& config, const std::vector<ObjectInfo>& objects);
+  // The config must be valid.
+  explicit PclIcp(const IcpConfig& config) : config_(config) {}
 
   // An object's frame O is its lattice: its pose is the identity where it is first seen, and that
   // before the frame where it is not seen or its registration fails.
@@ -22,7 +19,6 @@ class PclIcp : public Tracker {
 
  private:
   IcpConfig config_;
-  std::set<InstanceId> tracked_;
 };
 
 }  // namespace tsdfpp

@@ -1,0 +1,63 @@
+#include "mapper/track/tracked_objects.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace tsdfpp {
+
+Expected<TrackChoice> TrackChoiceFromName(std::string_view name) {
+  for (const TrackChoice choice :
+       {TrackChoice::kAuto, TrackChoice::kClassified, TrackChoice::kAll}) {
+    if (name == TrackChoiceName(choice)) return choice;
+  }
+  return UsageError("choice of what is tracked '{}' is unknown, expected auto, classified or all",
+                    name);
+}
+
+std::string_view TrackChoiceName(TrackChoice choice) {
+  switch (choice) {
+    case TrackChoice::kAuto:
+      return "auto";
+    case TrackChoice::kClassified:
+      return "classified";
+    case TrackChoice::kAll:
+      return "all";
+  }
+  std::abort();
+}
+
+TrackedObjects::TrackedObjects(TrackChoice choice, const std::vector<ObjectInfo>& objects)
+    : choice_(choice) {
+  for (const ObjectInfo& object : objects) Learn(object.id, object.semantic_class);
+}
+
+void TrackedObjects::Learn(InstanceId id, const std::string& semantic_class) {
+  if (id != kBackground && !semantic_class.empty()) ++classes_[id][semantic_class];
+}
+
+TrackChoice TrackedObjects::choice() const {
+  if (choice_ != TrackChoice::kAuto) return choice_;
+  return classes_.empty() ? TrackChoice::kAll : TrackChoice::kClassified;
+}
+
+std::string TrackedObjects::ClassOf(InstanceId id) const {
+  const auto found = classes_.find(id);
+  if (found == classes_.end()) return "";
+  return std::max_element(found->second.begin(), found->second.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+cv::Mat TrackedObjects::Select(const cv::Mat& labels) const {
+  if (choice() == TrackChoice::kAll) return labels;
+  cv::Mat selected = labels.clone();
+  for (int v = 0; v < selected.rows; ++v) {
+    auto* row = selected.ptr<InstanceId>(v);
+    for (int u = 0; u < selected.cols; ++u) {
+      if (row[u] != kNoInstance && !Contains(row[u])) row[u] = kBackground;
+    }
+  }
+  return selected;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,51 @@
+// Which objects are tracked (paper III-D: those that were classified at some time).
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "core/types.h"
+
+namespace tsdfpp {
+
+enum class TrackChoice {
+  kAuto,        // kClassified from when on a class is known of any object, else kAll
+  kClassified,  // those with a semantic class
+  kAll,         // whatever is not background
+};
+
+// "auto", "classified" or "all". Errors: kUsage.
+Expected<TrackChoice> TrackChoiceFromName(std::string_view name);
+std::string_view TrackChoiceName(TrackChoice choice);
+
+class TrackedObjects {
+ public:
+  // `objects` are those known before the first frame.
+  TrackedObjects(TrackChoice choice, const std::vector<ObjectInfo>& objects);
+
+  // Takes in that a segment of the object was classified; the background is never tracked.
+  void Learn(InstanceId id, const std::string& semantic_class);
+
+  bool Contains(InstanceId id) const {
+    if (id == kBackground || id == kNoInstance) return false;
+    return choice() == TrackChoice::kAll || classes_.contains(id);
+  }
+  // kClassified or kAll, as it is now.
+  TrackChoice choice() const;
+  // The class that the object was given most often, the first in the alphabet of equally frequent
+  // ones; empty where it has none.
+  std::string ClassOf(InstanceId id) const;
+
+  // The labels (CV_16UC1) with kBackground for what is not tracked, kNoInstance aside. May share
+  // its pixels with `labels`.
+  cv::Mat Select(const cv::Mat& labels) const;
+
+ private:
+  TrackChoice choice_;
+  std::map<InstanceId, std::map<std::string, int>> classes_;  // how often; no background
+};
+
+}  // namespace tsdfpp
