@@ -18,6 +18,7 @@
 #include "bench/released.h"
 #include "bench/render.h"
 #include "bench/scaling.h"
+#include "bench/segment.h"
 #include "bench/side_by_side.h"
 #include "core/guard.h"
 
@@ -126,6 +127,21 @@ void AddFigures(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunFigures(*options); }; });
 }
 
+void AddSegment(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<SegmentBenchOptions>();
+  CLI::App* command = app.add_subcommand("segment", "What docs/segmentation.md shows, as CSV");
+  command->add_option("--out", options->out, "Output folder")->required();
+  command->add_option("--parts", options->parts, "Some of them: scenes, shelf")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"scenes", "shelf"}))
+      ->capture_default_str();
+  command->add_option("--scenes", options->scenes, "Folder of scenes")->capture_default_str();
+  command->add_option("--shelf", options->shelf, "Folder of apc_shelf_scene0000")
+      ->capture_default_str();
+  AddCount(command, "--frames", options->frames, "Of a scene, spread over it", 1, 100000);
+  command->callback([=, &chosen] { chosen = [=] { return RunSegmentBench(*options); }; });
+}
+
 void AddReleased(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<ReleasedOptions>();
   CLI::App* command = app.add_subcommand("released", "What docs/released.md shows, as CSV");
@@ -176,6 +192,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddMesh(app, chosen);
   tsdfpp::AddFigures(app, chosen);
   tsdfpp::AddReleased(app, chosen);
+  tsdfpp::AddSegment(app, chosen);
   tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {

@@ -23,7 +23,8 @@ struct CompareArguments {
   std::string methods =
       "tsdf/static,tsdf,tsdf/guarded,tsdf++/literal,tsdf++,tsdf++/anchored,volumes";
   std::string profiles = "paper,close";
-  std::string poses = "gt";
+  std::string poses;
+  std::string associate;
   std::vector<std::string> adapters;
   int reveal = -1;
   std::string removed;
@@ -69,6 +70,14 @@ Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSourc
   return WithPlan(std::move(source), plan, std::move(models));
 }
 
+// The poses that were typed; else those that go with the association.
+std::string PoseNames(const CompareArguments& options, const FrameSource& source) {
+  if (!options.poses.empty()) return options.poses;
+  const bool votes = options.associate.empty() ? !source.info().mask_ids_are_objects
+                                               : options.associate == "votes";
+  return std::string(PoseSourceName(votes ? PoseSource::kIcp : PoseSource::kGiven));
+}
+
 Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   CompareConfig config = options.config;
   config.methods.clear();
@@ -93,8 +102,13 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
     }
   }
   config.profiles = SplitList(options.profiles);
+  if (!options.associate.empty()) {
+    TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
+  }
+  TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
+  const std::string pose_names = PoseNames(options, *opened.source);
   config.poses.clear();
-  for (const std::string& name : SplitList(options.poses)) {
+  for (const std::string& name : SplitList(pose_names)) {
     TSDFPP_ASSIGN(const PoseSource poses, PoseSourceFromName(name));
     for (const Method method : config.methods) {
       TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
@@ -107,7 +121,7 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   }
   for (const auto& [option, list] :
        {std::pair{"--methods", &options.methods}, std::pair{"--profiles", &options.profiles},
-        std::pair{"--poses", &options.poses}}) {
+        std::pair{"--poses", &pose_names}}) {
     const std::vector<std::string> names = SplitList(*list);
     for (const std::string& name : names) {
       if (std::count(names.begin(), names.end(), name) > 1) {
@@ -120,7 +134,6 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));
     TSDFPP_RETURN_IF_ERROR(probe.Validate());
   }
-  TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
   TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened.source), options, config));
   if (!opened.remark.empty()) {
     config.truth_note += (config.truth_note.empty() ? "" : " ") + opened.remark;
@@ -128,11 +141,12 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
       "--until {}{}",
-      TextOf(options.source), options.out, options.methods, options.profiles, options.poses,
+      TextOf(options.source), options.out, options.methods, options.profiles, pose_names,
       config.map.voxel_m, config.every, config.until, config.keep_meshes ? " --keep-meshes" : "",
       config.record ? " --record" : "");
   if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
   if (!options.removed.empty()) command += " --removed " + options.removed;
+  if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   ProgressBar bar("compare");
   const auto show = [&](int done, int total) { bar.Show(done, total); };
@@ -177,9 +191,15 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();
-  app.add_option("--poses", options->poses,
-                 "Object poses: gt (given), icp or track (tracked, docs/tracking.md)")
-      ->capture_default_str();
+  app.add_option("--associate", options->associate,
+                 "Which objects segments are: given (the masks' ids) or votes (their points vote; "
+                 "ids are the map's own and matched to the truth's by overlap, each once); by "
+                 "default given unless ids are drawn anew in every frame")
+      ->check(OneOf({"given", "votes"}));
+  app.add_option(
+      "--poses", options->poses,
+      "Object poses: gt (given), icp or track (tracked, docs/tracking.md); by default gt, with "
+      "votes icp");
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();
   app.add_option("--every", options->config.every, "Frames between evaluations")

@@ -14,6 +14,7 @@
 #include "cli/command.h"
 #include "cli/log_lines.h"
 #include "cli/report.h"
+#include "cli/segment.h"
 #include "core/guard.h"
 #include "core/json_text.h"
 #include "core/one_line.h"
@@ -58,6 +59,7 @@ std::map<const CLI::App*, tsdfpp::Run> AddSubcommands(CLI::App& app, CommonOptio
   add("verify", "Check a sequence of ours against itself and against rays", tsdfpp::AddVerify);
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
   add_that_maps("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
+  add("segment", "Write the segments of each frame as images of ids", tsdfpp::AddSegment);
   add("methods", "List the methods that map knows", tsdfpp::AddMethods);
   add_that_maps("compare", "Run the paper's experiment on a scene or a sequence",
                 tsdfpp::AddCompare);

@@ -26,6 +26,7 @@ struct MapArguments {
   SequenceArguments source;
   std::string method = "tsdf++/anchored";
   std::string segmentation;
+  std::string associate;
   std::string poses = "gt";
   std::string track = "auto";
   std::string track_config;
@@ -43,8 +44,9 @@ struct MapArguments {
 };
 
 // Settings that a loaded map has already.
-constexpr std::array<const char*, 7> kSettingsOfTheMap = {
-    "--method", "--profile", "--trunc-front", "--trunc-back", "--layers", "--voxel", "--poses"};
+constexpr std::array<const char*, 8> kSettingsOfTheMap = {
+    "--method", "--profile", "--trunc-front", "--trunc-back",
+    "--layers", "--voxel",   "--poses",       "--associate"};
 
 // What is tracked, and how.
 Expected<void> ReadTracking(const MapArguments& options, PipelineConfig& config) {
@@ -86,9 +88,18 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 }
 
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
-  std::optional<Segmentation> segmentation;
+  MapWishes wishes;
+  wishes.poses = app.count("--poses") > 0;
+  if (options.segmentation == "depth") {
+    return UsageError(
+        "--segmentation depth is not for map yet: its segments are not checked with --associate "
+        "votes; expected gt or none; `tsdfpp segment` writes them");
+  }
+  if (!options.associate.empty()) {
+    TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
+  }
   if (!options.segmentation.empty()) {
-    TSDFPP_ASSIGN(segmentation, SegmentationFromName(options.segmentation));
+    TSDFPP_ASSIGN(wishes.segmentation, SegmentationFromName(options.segmentation));
     if (options.source.path.empty()) {
       return UsageError("--segmentation {} needs a sequence to map", options.segmentation);
     }
@@ -98,14 +109,14 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
       return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
     }
     TSDFPP_ASSIGN(const PipelineConfig config, ConfigOf(options));
-    return StartNew(config, options.source, segmentation, options.until);
+    return StartNew(config, options.source, wishes, options.until);
   }
   for (const char* option : kSettingsOfTheMap) {
     if (app.count(option) > 0) {
       return UsageError("{} cannot be given with --load, whose map has its own", option);
     }
   }
-  return StartLoaded(options.load, options.source, segmentation, options.until);
+  return StartLoaded(options.load, options.source, wishes.segmentation, options.until);
 }
 
 // The command with what was given.
@@ -179,10 +190,15 @@ nlohmann::json TrackingJson(const Pipeline& pipeline, const SequenceInfo& info) 
 Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app) {
   TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   TSDFPP_ASSIGN(const MapStart start, Start(options, app));
-  const SequenceInfo& info = start.info;
+  SequenceInfo info = start.info;
   const PipelineConfig& config = start.config;
   Pipeline& pipeline = *start.pipeline;
-  TSDFPP_ASSIGN(const auto removed, FindObjects(info, SplitList(options.remove)));
+  const bool votes = config.associate == AssociationMode::kVotes;
+  std::vector<InstanceId> removed;
+  // With votes the map's objects are known once it is made.
+  if (!votes) {
+    TSDFPP_ASSIGN(removed, FindObjects(info, SplitList(options.remove)));
+  }
   if (!removed.empty() && !start.mask_remark.empty() && options.load.empty()) {
     return UsageError("--remove {} has nothing to remove: {}", options.remove, start.mask_remark);
   }
@@ -192,6 +208,10 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     const bool all = pipeline.tracked().choice() == TrackChoice::kAll;
     spdlog::info("{}: tracked is {}", info.name,
                  all ? "all that is not background" : "what has a class");
+  }
+  if (votes) {
+    spdlog::info("{}: the map's ids are its own, found by votes; poses are tracked ({})", info.name,
+                 PoseSourceName(config.poses));
   }
   const int frames = start.last - start.first + 1;
   if (options.views > 0 && frames == 0) {
@@ -224,6 +244,10 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   }
   const std::vector<std::string> remarks = pipeline.Remarks();
   for (const std::string& remark : remarks) spdlog::warn("{}: {}", info.name, remark);
+  info.objects = ObjectsOf(start);
+  if (votes) {
+    TSDFPP_ASSIGN(removed, FindObjects(info, SplitList(options.remove)));
+  }
   const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
   TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, out, mesh_format));
@@ -236,6 +260,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
       {"method", MethodName(config.method)},
       {"poses", PoseSourceName(config.poses)},
       {"segmentation", SegmentationName(config.segmentation)},
+      {"associate", AssociationModeName(config.associate)},
       {"sequence", info.name},
       {"frames", frames},
       {"removed", removed},
@@ -281,7 +306,12 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--segmentation", options->segmentation,
                  "Where masks come from: gt (the sequence) or none (all is background); by default "
                  "gt where the sequence has masks")
-      ->check(OneOf({"gt", "none"}));
+      ->check(OneOf({"gt", "none", "depth"}));
+  app.add_option("--associate", options->associate,
+                 "Which objects segments are: given (the masks' ids) or votes (their points vote, "
+                 "ids are the map's own; poses are then tracked); by default given unless ids are "
+                 "drawn anew in every frame")
+      ->check(OneOf({"given", "votes"}));
   app.add_option(
          "--poses", options->poses,
          "Object poses: gt (given), icp (tracked as in the paper), track (tracked by signed "

@@ -34,13 +34,42 @@ Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
   return {};
 }
 
+// Who says which object a segment is, and where that object is.
+Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
+  const bool of_objects = start.info.mask_ids_are_objects;
+  const bool has_segments = start.config.segmentation != Segmentation::kNone;
+  start.config.associate = wishes.associate.value_or(
+      of_objects || !has_segments ? AssociationMode::kGiven : AssociationMode::kVotes);
+  if (start.config.associate == AssociationMode::kGiven) {
+    if (of_objects || !has_segments) return {};
+    return UsageError(
+        "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
+        "--associate votes",
+        start.info.name);
+  }
+  if (start.config.poses != PoseSource::kGiven) return {};
+  if (wishes.poses) {
+    return UsageError(
+        "--poses gt are the poses of given ids, and --associate votes gives ids of its own: "
+        "expected --poses icp, or --associate given");
+  }
+  start.config.poses = PoseSource::kIcp;
+  return {};
+}
+
+// What the masks' ids stand for.
+std::vector<ObjectInfo> ObjectsOfMasks(const SequenceInfo& info) {
+  return info.mask_ids_are_objects ? info.objects : std::vector<ObjectInfo>{};
+}
+
 }  // namespace
 
 Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArguments& source,
-                            std::optional<Segmentation> segmentation, int until) {
+                            const MapWishes& wishes, int until) {
   MapStart start;
   start.config = config;
-  TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, segmentation));
+  TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
+  TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
   start.first = start.info.first_index;
   const int end = start.info.first_index + start.info.frame_count - 1;
   start.last = until < 0 ? end : until;
@@ -48,7 +77,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
     return UsageError("--until {} is out of range: {} has frames {} to {}", start.last,
                       start.info.name, start.first, end);
   }
-  start.pipeline = std::make_unique<Pipeline>(start.config, start.info.objects);
+  start.pipeline = std::make_unique<Pipeline>(start.config, ObjectsOfMasks(start.info));
   return start;
 }
 
@@ -70,13 +99,18 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.config.method = loaded.map->method();
   start.config.map = loaded.map->config();
   TSDFPP_ASSIGN(start.config.poses, PoseSourceFromName(run.poses));
+  start.config.associate = run.associate;
+  const bool votes = run.associate == AssociationMode::kVotes;
   start.info.name = run.sequence;
   start.info.objects = run.objects;
   start.first = run.last_frame + 1;
   start.last = run.last_frame;
   if (!source.path.empty()) {
     TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, segmentation));
-    if (!loaded.run || start.info.name != run.sequence || start.info.objects != run.objects) {
+    // With votes the map's objects are its own.
+    const bool is_other =
+        start.info.name != run.sequence || (!votes && start.info.objects != run.objects);
+    if (!loaded.run || is_other) {
       return UsageError("--load {} is a map of '{}', expected one of {}, '{}'", file, run.sequence,
                         source.path, start.info.name);
     }
@@ -90,8 +124,10 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   } else if (until >= 0) {
     return UsageError("--until {} needs a sequence to map", until);
   }
-  start.pipeline = std::make_unique<Pipeline>(start.config, run.objects, std::move(loaded.map),
-                                              std::move(run.trajectories));
+  const std::vector<ObjectInfo> nobody;
+  start.pipeline = std::make_unique<Pipeline>(
+      start.config, votes ? ObjectsOfMasks(start.info) : run.objects, std::move(loaded.map),
+      std::move(run.trajectories), votes ? run.objects : nobody);
   return start;
 }
 
@@ -106,10 +142,16 @@ Expected<Frame> ReadToMap(const MapStart& start, int index) {
                    start.info.name, index, start.info.first_index);
 }
 
+std::vector<ObjectInfo> ObjectsOf(const MapStart& start) {
+  return start.config.associate == AssociationMode::kVotes ? start.pipeline->Objects()
+                                                           : start.info.objects;
+}
+
 MappedRun RunOf(const MapStart& start, int last_frame) {
   MappedRun run;
   run.sequence = start.info.name;
-  run.objects = start.info.objects;
+  run.objects = ObjectsOf(start);
+  run.associate = start.config.associate;
   run.poses = PoseSourceName(start.config.poses);
   run.last_frame = last_frame;
   run.trajectories = start.pipeline->trajectories();

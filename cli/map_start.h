@@ -11,6 +11,13 @@
 
 namespace tsdfpp {
 
+// What was asked for beside a config; nothing: as the sequence is.
+struct MapWishes {
+  std::optional<Segmentation> segmentation;
+  std::optional<AssociationMode> associate;
+  bool poses = false;  // the config's poses are what was asked for
+};
+
 struct MapStart {
   PipelineConfig config;
   std::unique_ptr<FrameSource> source;  // none where a map alone is loaded
@@ -22,12 +29,14 @@ struct MapStart {
   std::unique_ptr<Pipeline> pipeline;
 };
 
-// With an empty map. `until` is the last frame, or below 0 for the sequence's. Masks are those of
-// the sequence where `segmentation` is nothing and its first frame has one.
-// Errors: those of OpenArguments; kUsage where `until` is out of range; kData where masks are asked
-// for and there are none.
+// With an empty map. `until` is the last frame, or below 0 for the sequence's. Where nothing is
+// wished, masks are those of the sequence if its first frame has one, association is by votes if
+// the masks' ids are of one frame alone, and poses are tracked (PoseSource::kIcp) if it is.
+// Errors: those of OpenArguments; kUsage where `until` is out of range, ids of one frame are to be
+// those of objects, or given poses are to go with votes; kData where masks are asked for and there
+// are none.
 Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArguments& source,
-                            std::optional<Segmentation> segmentation, int until);
+                            const MapWishes& wishes, int until);
 
 // With the map in `file`; goes on after its last frame where `source` names a sequence.
 // Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than the map's,
@@ -38,6 +47,9 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
 // Reads a frame to be mapped. Errors: kData also where it has a mask and others have none, or the
 // other way round.
 Expected<Frame> ReadToMap(const MapStart& start, int index);
+
+// The objects of the map: those of the sequence, or with votes the map's own.
+std::vector<ObjectInfo> ObjectsOf(const MapStart& start);
 
 // What a file says beside the map, so that the run can go on.
 MappedRun RunOf(const MapStart& start, int last_frame);

@@ -25,6 +25,9 @@ struct SequenceInfo {
   double rate_hz = 30;
   std::vector<ObjectInfo> objects;  // ordered by id, background first
   std::optional<RevealPlan> reveal;
+  // Whether an id in the frames' masks is the same object in every frame, one of `objects`; else
+  // ids are of one frame alone.
+  bool mask_ids_are_objects = true;
 };
 
 class FrameSource {

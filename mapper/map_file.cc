@@ -43,6 +43,8 @@ std::string RunToBytes(const MappedRun& run) {
       SavePose(T_WO, bytes);
     }
   }
+  // Absent where ids are given, as in files from before.
+  if (run.associate != AssociationMode::kGiven) PutText(AssociationModeName(run.associate), bytes);
   return bytes;
 }
 
@@ -68,6 +70,11 @@ Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range
       const auto frame = bytes.Get<std::int32_t>();
       TSDFPP_ASSIGN(poses[frame], LoadPose(bytes, range));
     }
+  }
+  if (bytes.ok() && !bytes.AtEnd()) {
+    const auto associate = AssociationModeFromName(GetText(bytes));
+    if (!associate) return DataError("it has another length than it says");
+    run.associate = *associate;
   }
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
   TSDFPP_RETURN_IF_ERROR(CheckLabel(run.sequence, "the sequence's name"));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "mapper/associate/associator.h"
 #include "mapper/map_representation.h"
 
 namespace tsdfpp {
@@ -16,10 +17,11 @@ namespace tsdfpp {
 // What a run of the pipeline knows beside its map: needed to continue it, and to name the objects.
 struct MappedRun {
   std::string sequence;             // its name
-  std::vector<ObjectInfo> objects;  // of the sequence
+  std::vector<ObjectInfo> objects;  // of the sequence, or with votes of the map
   std::string poses;                // where they came from: PoseSourceName
   int last_frame = 0;               // the file number of the last frame in the map
   std::map<InstanceId, std::map<int, Pose>> trajectories;  // T_WO by frame, as the map had it
+  AssociationMode associate = AssociationMode::kGiven;     // whose ids the map's are
 };
 
 struct LoadedMap {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mapper/associate/given_ids.h"
+#include "mapper/associate/voxel_votes.h"
 #include "mapper/map_reach.h"
 #include "mapper/track/frozen_pixels.h"
 #include "mapper/track/given_poses.h"
@@ -33,33 +34,66 @@ class StopWatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config, const TrackedObjects& tracked) {
+std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config) {
   switch (config.poses) {
     case PoseSource::kGiven:
       return std::make_unique<GivenPoses>();
     case PoseSource::kIcp:
-      return std::make_unique<PclIcp>(config.icp, tracked);
+      return std::make_unique<PclIcp>(config.icp);
     case PoseSource::kTrack:
-      return std::make_unique<SdfTracker>(config.track, tracked);
+      return std::make_unique<SdfTracker>(config.track);
   }
   std::abort();
 }
 
+// New objects get ids above those that the map has had.
+std::unique_ptr<Associator> MakeAssociator(
+    const PipelineConfig& config, const std::vector<ObjectInfo>& born,
+    const std::map<InstanceId, std::map<int, Pose>>& trajectories) {
+  if (config.associate == AssociationMode::kGiven) return std::make_unique<GivenIds>();
+  int first = kBackground + 1;
+  for (const ObjectInfo& object : born) first = std::max(first, object.id + 1);
+  if (!trajectories.empty()) first = std::max(first, trajectories.rbegin()->first + 1);
+  return std::make_unique<VoxelVotes>(config.votes, static_cast<InstanceId>(first));
+}
+
 }  // namespace
+
+Expected<void> PipelineConfig::Validate() const {
+  TSDFPP_RETURN_IF_ERROR(map.Validate());
+  TSDFPP_RETURN_IF_ERROR(votes.Validate());
+  TSDFPP_RETURN_IF_ERROR(icp.Validate());
+  TSDFPP_RETURN_IF_ERROR(track.Validate());
+  TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
+  if (associate == AssociationMode::kVotes && !InfoOf(method).has_voxels) {
+    return UsageError(
+        "association by votes asks a map for its voxels, which method '{}' has not, expected given "
+        "ids",
+        MethodName(method));
+  }
+  if (associate == AssociationMode::kVotes && poses == PoseSource::kGiven) {
+    return UsageError(
+        "given poses are those of given ids, and association by votes gives ids of its own: "
+        "expected objects that are tracked, or given ids");
+  }
+  return {};
+}
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
     : Pipeline(config, objects, MakeMap(config.method, config.map), {}) {}
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
                    std::unique_ptr<MapRepresentation> map,
-                   std::map<InstanceId, std::map<int, Pose>> trajectories)
+                   std::map<InstanceId, std::map<int, Pose>> trajectories,
+                   const std::vector<ObjectInfo>& born)
     : config_(config),
-      tracked_(config.tracked, objects),
-      segmenter_(MakeSegmenter(config.segmentation)),
-      associator_(std::make_unique<GivenIds>()),
-      tracker_(MakeTracker(config, tracked_)),
+      segmenter_(MakeSegmenter(config.segmentation, objects)),
+      associator_(MakeAssociator(config, born, trajectories)),
+      tracker_(MakeTracker(config)),
       map_(std::move(map)),
-      trajectories_(std::move(trajectories)) {
+      trajectories_(std::move(trajectories)),
+      objects_(config.associate == AssociationMode::kGiven ? objects : born),
+      tracked_(config.tracked, objects_) {
   is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
@@ -69,14 +103,18 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
 Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   StepTimes times;
   StopWatch watch;
-  TSDFPP_ASSIGN(const cv::Mat segments, segmenter_->Segment(frame));
-  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments));
+  TSDFPP_ASSIGN(const Segments segments, segmenter_->Segment(frame));
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
   times.segment_s = watch.Lap();
-  const cv::Mat associated = associator_->Associate(frame, segments, *map_);
+  const AssociatedObjects association = associator_->Associate(frame, segments, *map_);
   times.associate_s = watch.Lap();
-  TrackedPoses tracked = tracker_->Track(frame, associated, *map_, T_WO_);
-  const cv::Mat labels = LabelsToFuse(frame, associated, *map_, tracked);
+  TrackedObjects chosen = tracked_;
+  for (const auto& [id, name] : association.classes) chosen.Learn(id, name);
+  TrackedPoses tracked = tracker_->Track(frame, chosen.Select(association.labels), *map_, T_WO_);
+  const cv::Mat labels = LabelsToFuse(frame, association.labels, *map_, tracked);
   TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, tracked.T_WO));
+  associator_->Accept();
+  tracked_ = std::move(chosen);
   times.track_s = watch.Lap();
   if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);
   UpdatePoses(frame.index, std::move(tracked.T_WO));
@@ -84,6 +122,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   map_->Fuse(frame, labels);
   times.fuse_s = watch.Lap();
   CountWhileEmpty(frame, labels);
+  labels_ = labels;
   farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
   return times;
 }
@@ -119,7 +158,27 @@ std::vector<std::string> Pipeline::Remarks() const {
                     "({})",
                     PoseSourceName(config_.poses), TrackChoiceName(tracked_.choice())));
   }
+  for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;
+}
+
+std::vector<ObjectInfo> Pipeline::Objects() const {
+  std::vector<ObjectInfo> objects = objects_;
+  if (config_.associate == AssociationMode::kGiven) return objects;
+  const auto is_known = [&](InstanceId id) {
+    return std::any_of(objects.begin(), objects.end(),
+                       [id](const ObjectInfo& object) { return object.id == id; });
+  };
+  if (!is_known(kBackground)) objects.push_back({kBackground, "background", ""});
+  for (const InstanceId id : map_->Objects()) {
+    if (!is_known(id)) objects.push_back({id, fmt::format("object{}", id), ""});
+  }
+  std::sort(objects.begin(), objects.end(),
+            [](const ObjectInfo& a, const ObjectInfo& b) { return a.id < b.id; });
+  for (ObjectInfo& object : objects) {
+    if (object.id != kBackground) object.semantic_class = tracked_.ClassOf(object.id);
+  }
+  return objects;
 }
 
 }  // namespace tsdfpp

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mapper/associate/associator.h"
+#include "mapper/associate/vote_config.h"
 #include "mapper/frame_counts.h"
 #include "mapper/map_representation.h"
 #include "mapper/segment/segmenter.h"
@@ -20,20 +21,27 @@
 
 namespace tsdfpp {
 
+// All that a pipeline is told.
 struct PipelineConfig {
   Method method = Method::kTsdfpp;
   MapConfig map{};
   Segmentation segmentation = Segmentation::kGiven;
+  AssociationMode associate = AssociationMode::kGiven;
+  VoteConfig votes{};
   PoseSource poses = PoseSource::kGiven;
   TrackChoice tracked = TrackChoice::kAuto;  // which objects, where poses are not given
   IcpConfig icp{};
   SdfTrackConfig track{};
+
+  // Errors: kUsage where a part is wrong, or given poses, which are those of given ids, are to go
+  // with association by votes.
+  Expected<void> Validate() const;
 };
 
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
   double segment_s = 0;       // paper III-B; 0 with given masks
-  double associate_s = 0;     // paper III-C; 0 with given ids
+  double associate_s = 0;     // paper III-C: votes; 0 with given ids
   double track_s = 0;         // paper III-D: objects' meshes, ICP; 0 with given poses
   double update_poses_s = 0;  // paper III-E
   double fuse_s = 0;          // paper III-F
@@ -42,27 +50,36 @@ struct StepTimes {
 
 class Pipeline {
  public:
-  // `objects` are those of the sequence; config.tracked says which are tracked (paper III-D). The
-  // config must be valid.
+  // `objects` are what the ids of the frames' masks stand for; none where those are of one frame
+  // alone. The config must be valid.
   Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects);
 
   // Goes on from a map, which must have the config's method and settings, and T_WO of its objects
-  // by frame (mapper/map_file.h).
+  // by frame (mapper/map_file.h). With votes `born` are the objects of the map.
   Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
            std::unique_ptr<MapRepresentation> map,
-           std::map<InstanceId, std::map<int, Pose>> trajectories);
+           std::map<InstanceId, std::map<int, Pose>> trajectories,
+           const std::vector<ObjectInfo>& born = {});
 
   // Maps one frame. Errors: kData, a sentence that begins with the frame's number, where it is no
-  // frame (its mask is missing, say) or something lies beyond the map's range
-  // (mapper/map_reach.h); the map is then as it was.
+  // frame (its mask is missing, say) or something lies beyond the map's range (mapper/map_reach.h);
+  // the map is then as it was.
   Expected<StepTimes> Process(const Frame& frame);
 
   const MapRepresentation& map() const { return *map_; }
 
   // What whoever asked for the map should know, a sentence each: that no frame has put anything
   // into it, with counts of what the frames held; that it is so far from the origin that rounding
-  // shows; that objects were to be tracked and none was.
+  // shows; that objects were to be tracked and none was; those of the association.
   std::vector<std::string> Remarks() const;
+
+  // The objects of the pixels of the frame mapped last, as associated; empty before the first.
+  const cv::Mat& labels() const { return labels_; }
+
+  // The objects of the map, by id, the background first: with given ids those that the pipeline was
+  // made with, with votes those that were born ("object1", ...), with the classes that segments
+  // brought.
+  std::vector<ObjectInfo> Objects() const;
 
   // T_WO of each object as the map has it, by frame index. Tracked, the object's frame O is its
   // lattice: the identity where it was first seen.
@@ -81,7 +98,6 @@ class Pipeline {
   void CountWhileEmpty(const Frame& frame, const cv::Mat& labels);
 
   PipelineConfig config_;
-  TrackedObjects tracked_;
   std::unique_ptr<Segmenter> segmenter_;
   std::unique_ptr<Associator> associator_;
   std::unique_ptr<Tracker> tracker_;
@@ -89,6 +105,9 @@ class Pipeline {
   ObjectPoses T_WO_;
   std::map<InstanceId, std::map<int, Pose>> trajectories_;
   TrackLog track_log_;
+  std::vector<ObjectInfo> objects_;
+  TrackedObjects tracked_;
+  cv::Mat labels_;
   bool is_empty_ = true;   // no block has been in the map yet
   FrameCounts in_vain_;    // of the frames until then
   double farthest_m_ = 0;  // along an axis, of the cameras

@@ -23,6 +23,8 @@ constexpr int kOldestSchemaVersion = 1;
 constexpr const char* kGenerator = "tsdfpp";
 constexpr int kGreatestFrame = 1'000'000'000;  // what users of the numbers can add to
 constexpr int kLeastSide_px = 2;
+constexpr const char* kIdsOfObjects = "objects";
+constexpr const char* kIdsOfAFrame = "frame";
 
 // nlohmann's own conversion would wrap a number that does not fit. Throws as that does where the
 // value is of another type.
@@ -95,6 +97,15 @@ SequenceRecord FromJson(const nlohmann::json& json, int version) {
   for (const nlohmann::json& object : json.at("objects")) {
     info.objects.push_back({IdOf(object.at("id")), object.at("name").get<std::string>(),
                             object.at("class").get<std::string>()});
+  }
+  // Absent where masks name objects, and from files of before.
+  if (const auto ids = json.find("mask_ids"); ids != json.end()) {
+    const auto of = ids->get<std::string>();
+    if (of != kIdsOfAFrame && of != kIdsOfObjects) {
+      throw std::out_of_range(fmt::format("mask_ids is {}, expected {} or {}", JsonShown(*ids),
+                                          kIdsOfObjects, kIdsOfAFrame));
+    }
+    info.mask_ids_are_objects = of == kIdsOfObjects;
   }
   if (const nlohmann::json& reveal = json.at("reveal"); !reveal.is_null()) {
     info.reveal =
@@ -174,6 +185,7 @@ std::string SequenceToJson(const SequenceRecord& record) {
     json["objects"].push_back(
         {{"id", object.id}, {"name", object.name}, {"class", object.semantic_class}});
   }
+  if (!info.mask_ids_are_objects) json["mask_ids"] = kIdsOfAFrame;
   json["reveal"] = nullptr;
   if (info.reveal) {
     json["reveal"] = {{"frame", info.reveal->frame}, {"removed", info.reveal->removed}};

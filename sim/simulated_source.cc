@@ -31,6 +31,7 @@ SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& op
   info_.frame_count = config.frames;
   info_.rate_hz = config.rate_hz;
   info_.objects = scene_.objects();
+  info_.mask_ids_are_objects = !DrawsEveryId(config.sensor.masks);
   if (config.experiment) {
     RevealPlan plan;
     plan.frame = config.experiment->reveal_frame;

@@ -52,6 +52,11 @@ Expected<int> LastFrame(const SequenceInfo& info, const std::string& until) {
   return frame;
 }
 
+AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info) {
+  return config.associate.value_or(info.mask_ids_are_objects ? AssociationMode::kGiven
+                                                             : AssociationMode::kVotes);
+}
+
 Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig& config,
                                                             const SequenceInfo& info,
                                                             const SceneTruth& truth) {
@@ -59,11 +64,16 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
   for (const PoseSource poses : config.poses) {
     for (const std::string& profile : config.profiles) {
       for (const Method method : config.methods) {
-        PipelineConfig pipeline{
-            .method = method, .map = config.map, .poses = poses, .icp = config.icp};
+        PipelineConfig pipeline{.method = method,
+                                .map = config.map,
+                                .associate = AssociationOf(config, info),
+                                .poses = poses,
+                                .icp = config.icp};
         TSDFPP_RETURN_IF_ERROR(pipeline.map.SetProfile(profile));
-        TSDFPP_RETURN_IF_ERROR(pipeline.map.Validate());
-        runs.push_back(std::make_unique<CompareRun>(pipeline, profile, info.objects, truth));
+        TSDFPP_RETURN_IF_ERROR(pipeline.Validate());
+        const std::vector<ObjectInfo> nobody;
+        runs.push_back(std::make_unique<CompareRun>(
+            pipeline, profile, info.mask_ids_are_objects ? info.objects : nobody, truth));
       }
     }
   }
@@ -139,8 +149,9 @@ CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profil
       last_seen(MakeLastSeenStores(truth)) {}
 
 std::string CompareRun::Title() const {
-  return fmt::format("{}, {}, {}", MethodName(config.method), profile,
-                     PoseSourceTitle(config.poses));
+  return fmt::format("{}, {}, {}{}", MethodName(config.method), profile,
+                     PoseSourceTitle(config.poses),
+                     config.associate == AssociationMode::kVotes ? ", ids by votes" : "");
 }
 
 std::string CompareRun::FolderName() const {
@@ -212,7 +223,7 @@ class FrameWalk {
       const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
       camera_[index] = true_frame.T_WC;
       if (recorder_) recorder_->SeeFrame(true_frame);
-      MapFrame(frame);
+      MapFrame(frame, true_frame.mask);
       if (IsEvaluated(result_, index)) EvaluateAdapters(frame);
       if (progress) progress(index - first + 1, result_.last_frame - first + 1);
       if (IsNothingLeft()) return tl::unexpected(NothingLeft(result_));
@@ -235,14 +246,18 @@ class FrameWalk {
   const std::vector<PictureFile>& pictures() const { return pictures_.files(); }
 
  private:
-  // Gives the frame to each map; one that fails is left out from then on.
-  void MapFrame(const Frame& frame) {
+  // Gives the frame to each map; one that fails is left out from then on. `true_mask` is what its
+  // pixels show.
+  void MapFrame(const Frame& frame, const cv::Mat& true_mask) {
     for (std::size_t r = 0; r < result_.runs.size();) {
       CompareRun& run = *result_.runs[r];
       const auto mapped = Guarded([&]() -> Expected<void> {
         const std::int64_t before = ResidentBytes();
         TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
         run.times.Add(step);
+        if (run.config.associate == AssociationMode::kVotes) {
+          run.matching.Observe(run.pipeline.labels(), true_mask);
+        }
         run.process_growth_bytes += ResidentBytes() - before;
         if (recorder_) recorder_->SeeMap(run);
         if (!IsEvaluated(result_, frame.index)) return {};
@@ -261,7 +276,11 @@ class FrameWalk {
   // Evaluates a map and writes what is to be seen of it.
   Expected<void> EvaluateRun(CompareRun& run, const Frame& frame) {
     const int index = frame.index;
-    SceneMeshes meshes = MeshesOf(run.pipeline.map(), result_.movers, run.mesher);
+    const bool votes = run.config.associate == AssociationMode::kVotes;
+    if (votes) run.matching.Settle();
+    SceneMeshes meshes =
+        votes ? MeshesOf(run.pipeline.map(), result_.movers, run.matching, run.mesher)
+              : MeshesOf(run.pipeline.map(), result_.movers, run.mesher);
     if (result_.config.keep_meshes) {
       TSDFPP_RETURN_IF_ERROR(WriteMeshFolder(meshes, out_ / run.FolderName() / "frames", index));
     }
@@ -275,8 +294,12 @@ class FrameWalk {
     const bool examined = index == result_.reveal_frame.value_or(result_.last_frame);
     if (examined) {
       auto copy = run.pipeline.map().Clone();
-      for (const InstanceId id : result_.movers) copy->Remove(id);
-      TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, result_.info, out_ / run.FolderName()));
+      for (const InstanceId id : result_.movers) {
+        if (run.IdOf(id) != kNoInstance) copy->Remove(run.IdOf(id));
+      }
+      SequenceInfo info = result_.info;
+      if (votes) info.objects = run.pipeline.Objects();
+      TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, info, out_ / run.FolderName()));
     }
     DropMeshes(evaluation);
     return {};

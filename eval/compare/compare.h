@@ -5,10 +5,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "eval/adapters/adapter.h"
 #include "eval/picture/map_output.h"
 #include "eval/score/evaluation.h"
+#include "eval/score/id_matching.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {
@@ -16,6 +18,8 @@ namespace tsdfpp {
 struct CompareConfig {
   std::vector<Method> methods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored};
   std::vector<std::string> profiles{"paper", "close"};
+  // Nothing: votes, unless the masks' ids are the truth's.
+  std::optional<AssociationMode> associate;
   std::vector<PoseSource> poses{PoseSource::kGiven};
   MapConfig map;  // truncation is the profile's
   IcpConfig icp;
@@ -43,11 +47,17 @@ struct CompareRun {
   PipelineConfig config;
   std::string profile;
   Pipeline pipeline;
-  SceneMesher mesher;  // of its map
+  SceneMesher mesher;   // of its map
+  IdMatching matching;  // with votes
   LastSeenStores last_seen;
   RunTimes times;
   std::int64_t process_growth_bytes = 0;  // of resident memory while this map worked
   std::vector<Evaluation> evaluations;    // meshes kept only where pictures need them
+
+  // The map's id of a true object, kNoInstance where it has none.
+  InstanceId IdOf(InstanceId object) const {
+    return config.associate == AssociationMode::kVotes ? matching.IdOf(object) : object;
+  }
 
   // "tsdf++/anchored, close, given poses", and as a folder's name.
   std::string Title() const;

@@ -60,7 +60,7 @@ nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& 
 nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run) {
   nlohmann::json trajectories;
   for (const InstanceId id : result.movers) {
-    const auto estimate = run.pipeline.trajectories().find(id);
+    const auto estimate = run.pipeline.trajectories().find(run.IdOf(id));
     const auto truth = result.truth->trajectories().find(id);
     if (estimate == run.pipeline.trajectories().end() ||
         truth == result.truth->trajectories().end()) {
@@ -85,6 +85,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"method", MethodName(run.config.method)},
           {"profile", run.profile},
           {"poses", PoseSourceName(run.config.poses)},
+          {"associate", AssociationModeName(run.config.associate)},
           {"settings",
            {{"voxel_m", map.voxel_m},
             {"trunc_front_voxels", map.trunc_front_voxels},
@@ -189,6 +190,9 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
   nlohmann::json runs = nlohmann::json::array();
   for (const auto& run : result.runs) {
     runs.push_back(RunJson(result, *run));
+    if (run->config.associate == AssociationMode::kVotes) {
+      runs.back()["matched_ids"] = run->matching.ToJson();
+    }
     const std::vector<std::string> remarks = run->pipeline.Remarks();
     if (!remarks.empty()) runs.back()["remarks"] = remarks;
   }

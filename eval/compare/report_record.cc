@@ -295,7 +295,7 @@ nlohmann::json ReportRecorder::TruthJson() {
 
 void ReportRecorder::AddErrors(const CompareRun& run, nlohmann::json& json) const {
   for (const InstanceId id : result_.truth->moved()) {
-    const auto ours = run.pipeline.trajectories().find(id);
+    const auto ours = run.pipeline.trajectories().find(run.IdOf(id));
     const auto truth = result_.truth->trajectories().find(id);
     if (ours == run.pipeline.trajectories().end() || truth == result_.truth->trajectories().end()) {
       continue;

@@ -1,20 +1,49 @@
 // Which object of the map each segment is (paper III-C): the second verb of the pipeline.
 #pragma once
 
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
 #include "core/types.h"
 #include "mapper/map_representation.h"
+#include "mapper/segment/segmenter.h"
 
 namespace tsdfpp {
+
+struct AssociatedObjects {
+  // The object of each pixel: CV_16UC1 of the size of the segments; ids that the map does not have
+  // are of objects that the frame brings into it. May share its pixels with the segments.
+  cv::Mat labels;
+  // The semantic class of those objects for which a segment of the frame brought one.
+  std::map<InstanceId, std::string> classes{};
+};
 
 class Associator {
  public:
   virtual ~Associator() = default;
 
-  // The object of each pixel: CV_16UC1 like `segments`, which the segmenter made of the frame; ids
-  // that the map does not have are of objects that the frame brings into it. May share its pixels
-  // with `segments`.
-  virtual cv::Mat Associate(const Frame& frame, const cv::Mat& segments,
-                            const MapRepresentation& map) = 0;
+  // `segments` is what the segmenter made of the frame, and has the frame's form
+  // (mapper/map_reach.h). Frames come in order.
+  virtual AssociatedObjects Associate(const Frame& frame, const Segments& segments,
+                                      const MapRepresentation& map) = 0;
+
+  // Called where the frame associated last was mapped; one that was refused leaves no trace.
+  virtual void Accept() {}
+
+  // What whoever asked for the map should know, a sentence each.
+  virtual std::vector<std::string> Remarks() const { return {}; }
 };
+
+enum class AssociationMode {
+  kGiven,  // the segments' ids are those of objects already
+  kVotes,  // the segments' ids are of one frame alone
+};
+
+// "given" or "votes". Errors: kUsage.
+Expected<AssociationMode> AssociationModeFromName(std::string_view name);
+std::string_view AssociationModeName(AssociationMode mode);
 
 }  // namespace tsdfpp

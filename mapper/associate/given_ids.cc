@@ -2,9 +2,9 @@
 
 namespace tsdfpp {
 
-cv::Mat GivenIds::Associate(const Frame& /*frame*/, const cv::Mat& segments,
-                            const MapRepresentation& /*map*/) {
-  return segments;
+AssociatedObjects GivenIds::Associate(const Frame& /*frame*/, const Segments& segments,
+                                      const MapRepresentation& /*map*/) {
+  return {segments.ids, segments.classes};
 }
 
 }  // namespace tsdfpp

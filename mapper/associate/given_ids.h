@@ -7,9 +7,9 @@ namespace tsdfpp {
 
 class GivenIds : public Associator {
  public:
-  // The segments themselves.
-  cv::Mat Associate(const Frame& frame, const cv::Mat& segments,
-                    const MapRepresentation& map) override;
+  // The segments themselves, with their classes.
+  AssociatedObjects Associate(const Frame& frame, const Segments& segments,
+                              const MapRepresentation& map) override;
 };
 
 }  // namespace tsdfpp

@@ -2,6 +2,15 @@
 
 namespace tsdfpp {
 
-Expected<cv::Mat> GivenMasks::Segment(const Frame& frame) { return frame.mask; }
+GivenMasks::GivenMasks(const std::vector<ObjectInfo>& objects) {
+  for (const ObjectInfo& object : objects) {
+    if (object.id == kBackground || object.semantic_class.empty()) continue;
+    classes_.emplace(object.id, object.semantic_class);
+  }
+}
+
+Expected<Segments> GivenMasks::Segment(const Frame& frame) {
+  return Segments{frame.mask, classes_};
+}
 
 }  // namespace tsdfpp

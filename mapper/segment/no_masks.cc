@@ -2,8 +2,8 @@
 
 namespace tsdfpp {
 
-Expected<cv::Mat> NoMasks::Segment(const Frame& frame) {
-  return cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(kBackground));
+Expected<Segments> NoMasks::Segment(const Frame& frame) {
+  return Segments{cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(kBackground))};
 }
 
 }  // namespace tsdfpp

@@ -8,7 +8,7 @@ namespace tsdfpp {
 class NoMasks : public Segmenter {
  public:
   // kBackground at every pixel of the depth image. Errors: none.
-  Expected<cv::Mat> Segment(const Frame& frame) override;
+  Expected<Segments> Segment(const Frame& frame) override;
 };
 
 }  // namespace tsdfpp

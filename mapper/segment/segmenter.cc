@@ -15,9 +15,10 @@ std::string_view SegmentationName(Segmentation segmentation) {
   return segmentation == Segmentation::kGiven ? "gt" : "none";
 }
 
-std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation) {
+std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
+                                         const std::vector<ObjectInfo>& objects) {
   if (segmentation == Segmentation::kNone) return std::make_unique<NoMasks>();
-  return std::make_unique<GivenMasks>();
+  return std::make_unique<GivenMasks>(objects);
 }
 
 }  // namespace tsdfpp

@@ -1,22 +1,33 @@
 // Which pixels of a frame belong together (paper III-B): the first verb of the pipeline.
 #pragma once
 
+#include <map>
 #include <memory>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/error.h"
 #include "core/types.h"
 
 namespace tsdfpp {
 
+struct Segments {
+  // The segment of each pixel: CV_16UC1 of the depth image's size; kBackground is what the room is
+  // made of, kNoInstance what belongs to no segment and is not fused. May share its pixels with the
+  // frame.
+  cv::Mat ids;
+  // The semantic class of those segments of which it is known, never an empty one; perhaps of
+  // segments that the frame lacks, too.
+  std::map<InstanceId, std::string> classes{};
+};
+
 class Segmenter {
  public:
   virtual ~Segmenter() = default;
 
-  // The segment of each pixel: CV_16UC1 of the depth image's size; kBackground is what the room is
-  // made of, kNoInstance what belongs to no segment and is not fused. May share its pixels with the
-  // frame. Errors: kData, a sentence that begins with the frame's number.
-  virtual Expected<cv::Mat> Segment(const Frame& frame) = 0;
+  // Errors: kData, a sentence that begins with the frame's number.
+  virtual Expected<Segments> Segment(const Frame& frame) = 0;
 };
 
 enum class Segmentation {
@@ -28,6 +39,9 @@ enum class Segmentation {
 Expected<Segmentation> SegmentationFromName(std::string_view name);
 std::string_view SegmentationName(Segmentation segmentation);
 
-std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation);
+// `objects` are what the ids of the frames' masks stand for; none where those ids are of one frame
+// alone.
+std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
+                                         const std::vector<ObjectInfo>& objects);
 
 }  // namespace tsdfpp

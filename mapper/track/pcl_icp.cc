@@ -14,6 +14,7 @@ std::set<InstanceId> LabelsIn(const cv::Mat& labels) {
       if (row[u] != last) ids.insert(last = row[u]);
     }
   }
+  ids.erase(kBackground);
   ids.erase(kNoInstance);
   return ids;
 }
@@ -24,7 +25,6 @@ TrackedPoses PclIcp::Track(const Frame& frame, const cv::Mat& labels, const MapR
                            const ObjectPoses& before) {
   TrackedPoses after{before};
   for (const InstanceId id : LabelsIn(labels)) {
-    if (!tracked_.Contains(id)) continue;
     const auto known = before.find(id);
     if (known == before.end()) {
       after.T_WO[id] = Pose::Identity();

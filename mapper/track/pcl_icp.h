@@ -1,10 +1,9 @@
-// The paper's tracker (III-D): each object that the frame shows and that was classified is
-// registered to its mesh in the map, from where it was.
+// The paper's tracker (III-D): each object that the frame shows is registered to its mesh in the
+// map, from where it was.
 #pragma once
 
 #include "mapper/scene_mesher.h"
 #include "mapper/track/icp_registration.h"
-#include "mapper/track/tracked_objects.h"
 #include "mapper/track/tracker.h"
 
 namespace tsdfpp {
@@ -12,8 +11,7 @@ namespace tsdfpp {
 class PclIcp : public Tracker {
  public:
   // The config must be valid.
-  PclIcp(const IcpConfig& config, const TrackedObjects& tracked)
-      : config_(config), tracked_(tracked) {}
+  explicit PclIcp(const IcpConfig& config) : config_(config) {}
 
   // An object's frame O is its lattice: its pose is the identity where it is first seen, and that
   // before the frame where it is not seen or its registration fails.
@@ -22,7 +20,6 @@ class PclIcp : public Tracker {
 
  private:
   IcpConfig config_;
-  TrackedObjects tracked_;
   SceneMesher mesher_;  // keeps the objects' meshes from frame to frame
 };
 

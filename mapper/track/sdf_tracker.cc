@@ -56,7 +56,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
   TrackedPoses after{before};
   const double voxel_m = map.config().voxel_m;
   for (const auto& [id, box] : BoxesOf(labels)) {
-    if (!tracked_.Contains(id)) continue;
+    if (id == kBackground) continue;
     const auto points = SegmentPointsOf(frame, labels, id, box, voxel_m, config_);
     TrackStatus& status = after.seen[id];
     status = TrackStatus::kFrozen;

@@ -8,7 +8,6 @@
 
 #include "mapper/track/object_model.h"
 #include "mapper/track/sdf_registration.h"
-#include "mapper/track/tracked_objects.h"
 #include "mapper/track/tracker.h"
 
 namespace tsdfpp {
@@ -16,8 +15,7 @@ namespace tsdfpp {
 class SdfTracker : public Tracker {
  public:
   // The config must be valid.
-  SdfTracker(const SdfTrackConfig& config, const TrackedObjects& tracked)
-      : config_(config), tracked_(tracked) {}
+  explicit SdfTracker(const SdfTrackConfig& config) : config_(config) {}
 
   // An object's frame O is its lattice: its pose is the identity where it is first seen with enough
   // points. Frozen are objects that have too few points, are not registered, or fail a gate: they
@@ -67,7 +65,6 @@ class SdfTracker : public Tracker {
                       const Intrinsics& camera) const;
 
   SdfTrackConfig config_;
-  TrackedObjects tracked_;
   std::map<InstanceId, Memory> memory_;
 };
 

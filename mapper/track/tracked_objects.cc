@@ -1,5 +1,6 @@
 #include "mapper/track/tracked_objects.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 namespace tsdfpp {
@@ -27,12 +28,36 @@ std::string_view TrackChoiceName(TrackChoice choice) {
 
 TrackedObjects::TrackedObjects(TrackChoice choice, const std::vector<ObjectInfo>& objects)
     : choice_(choice) {
-  for (const ObjectInfo& object : objects) {
-    if (object.id != kBackground && !object.semantic_class.empty()) classified_.insert(object.id);
+  for (const ObjectInfo& object : objects) Learn(object.id, object.semantic_class);
+}
+
+void TrackedObjects::Learn(InstanceId id, const std::string& semantic_class) {
+  if (id != kBackground && !semantic_class.empty()) ++classes_[id][semantic_class];
+}
+
+TrackChoice TrackedObjects::choice() const {
+  if (choice_ != TrackChoice::kAuto) return choice_;
+  return classes_.empty() ? TrackChoice::kAll : TrackChoice::kClassified;
+}
+
+std::string TrackedObjects::ClassOf(InstanceId id) const {
+  const auto found = classes_.find(id);
+  if (found == classes_.end()) return "";
+  return std::max_element(found->second.begin(), found->second.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+cv::Mat TrackedObjects::Select(const cv::Mat& labels) const {
+  if (choice() == TrackChoice::kAll) return labels;
+  cv::Mat selected = labels.clone();
+  for (int v = 0; v < selected.rows; ++v) {
+    auto* row = selected.ptr<InstanceId>(v);
+    for (int u = 0; u < selected.cols; ++u) {
+      if (row[u] != kNoInstance && !Contains(row[u])) row[u] = kBackground;
+    }
   }
-  if (choice_ == TrackChoice::kAuto) {
-    choice_ = classified_.empty() ? TrackChoice::kAll : TrackChoice::kClassified;
-  }
+  return selected;
 }
 
 }  // namespace tsdfpp

@@ -1,7 +1,8 @@
 // Which objects are tracked (paper III-D: those that were classified at some time).
 #pragma once
 
-#include <set>
+#include <map>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -11,7 +12,7 @@
 namespace tsdfpp {
 
 enum class TrackChoice {
-  kAuto,        // kClassified where a class is known of any object, else kAll
+  kAuto,        // kClassified from when on a class is known of any object, else kAll
   kClassified,  // those with a semantic class
   kAll,         // whatever is not background
 };
@@ -22,19 +23,29 @@ std::string_view TrackChoiceName(TrackChoice choice);
 
 class TrackedObjects {
  public:
-  // `objects` are those of the sequence.
+  // `objects` are those known before the first frame.
   TrackedObjects(TrackChoice choice, const std::vector<ObjectInfo>& objects);
+
+  // Takes in that a segment of the object was classified; the background is never tracked.
+  void Learn(InstanceId id, const std::string& semantic_class);
 
   bool Contains(InstanceId id) const {
     if (id == kBackground || id == kNoInstance) return false;
-    return choice_ == TrackChoice::kAll || classified_.contains(id);
+    return choice() == TrackChoice::kAll || classes_.contains(id);
   }
-  // kClassified or kAll.
-  TrackChoice choice() const { return choice_; }
+  // kClassified or kAll, as it is now.
+  TrackChoice choice() const;
+  // The class that the object was given most often, the first in the alphabet of equally frequent
+  // ones; empty where it has none.
+  std::string ClassOf(InstanceId id) const;
+
+  // The labels (CV_16UC1) with kBackground for what is not tracked, kNoInstance aside. May share
+  // its pixels with `labels`.
+  cv::Mat Select(const cv::Mat& labels) const;
 
  private:
   TrackChoice choice_;
-  std::set<InstanceId> classified_;  // the background excluded
+  std::map<InstanceId, std::map<std::string, int>> classes_;  // how often; no background
 };
 
 }  // namespace tsdfpp

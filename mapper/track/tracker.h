@@ -32,8 +32,8 @@ class Tracker {
   virtual ~Tracker() = default;
 
   // The objects' poses after the frame, of all that have had one, by their poses before it.
-  // `labels` is the frame's objects as associated with the map, which holds what was fused before
-  // the frame.
+  // `labels` is the frame's objects that are tracked (mapper/track/tracked_objects.h), as
+  // associated with the map, which holds what was fused before the frame; the rest is kBackground.
   virtual TrackedPoses Track(const Frame& frame, const cv::Mat& labels,
                              const MapRepresentation& map, const ObjectPoses& before) = 0;
 };

@@ -53,6 +53,12 @@ SensorConfig MaskFaults(int times) {
   return config;
 }
 
+SensorConfig RedrawnIds() {
+  SensorConfig config;
+  config.masks.flicker = {1, 1};
+  return config;
+}
+
 Expected<SensorConfig> OnePreset(std::string_view name, std::string_view joined) {
   std::vector<std::string> names;
   for (const SensorPreset& preset : SensorPresets()) {
@@ -98,6 +104,7 @@ const std::vector<SensorPreset>& SensorPresets() {
       {"pose_drift_strong", "exact images, five times as much", PoseErrors(5)},
       {"masks_mild", "exact images, few mask faults of every kind", MaskFaults(1)},
       {"masks_severe", "exact images, three times as many", MaskFaults(3)},
+      {"masks_redrawn", "exact images, each object another id in every frame", RedrawnIds()},
   };
   return kPresets;
 }

@@ -232,6 +232,8 @@ bool InventsIds(const MaskFaultConfig& config) {
   return config.split.rate > 0 || config.flicker.rate > 0;
 }
 
+bool DrawsEveryId(const MaskFaultConfig& config) { return config.flicker.rate >= 1; }
+
 std::optional<int> FaultStart(const FaultTiming& timing, std::uint64_t seed, SensorStream stream,
                               int frame, InstanceId object) {
   if (timing.rate <= 0) return std::nullopt;

@@ -19,6 +19,8 @@ namespace tsdfpp {
 inline constexpr InstanceId kFirstInventedId = 128;
 inline constexpr InstanceId kLastInventedId = 255;
 bool InventsIds(const MaskFaultConfig& config);
+// Whether each object has an invented id in every frame, so that ids say nothing of objects.
+bool DrawsEveryId(const MaskFaultConfig& config);
 
 // What one id of a sensed mask stands for.
 struct MaskSegment {

@@ -102,7 +102,20 @@ TEST_P(MapFile, ARunComesBack) {
     EXPECT_EQ(loaded.run->trajectories.at(kBrick).at(frame).matrix(),
               run.trajectories.at(kBrick).at(frame).matrix());
   }
+  EXPECT_EQ(loaded.run->associate, AssociationMode::kGiven);
   EXPECT_FALSE(Loaded(MapToBytes(*loaded.map).value()).run.has_value());
+}
+
+// Whose ids the objects have is in the file, too; files of given ids are as they always were.
+TEST_P(MapFile, ARunByVotesComesBack) {
+  MappedRun run = SomeRun();
+  const auto map = MakeMap(GetParam(), ToyConfig());
+  const std::string given = MapToBytes(*map, &run).value();
+  run.associate = AssociationMode::kVotes;
+  const std::string votes = MapToBytes(*map, &run).value();
+  EXPECT_NE(votes, given);
+  EXPECT_EQ(Loaded(votes).run->associate, AssociationMode::kVotes);
+  EXPECT_EQ(Loaded(votes).run->trajectories.size(), 1U);
 }
 
 // Names become file names of what is written; the checksums of such a file are right.

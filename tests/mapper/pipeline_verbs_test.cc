@@ -35,20 +35,31 @@ bool AreEqual(const cv::Mat& a, const cv::Mat& b) {
 
 TEST(PipelineVerbs, GivenMasksAreTheMask) {
   const Frame frame = SmallFrame();
-  EXPECT_TRUE(AreEqual(GivenMasks().Segment(frame).value(), frame.mask));
+  const Segments segments = GivenMasks().Segment(frame).value();
+  EXPECT_TRUE(AreEqual(segments.ids, frame.mask));
+  EXPECT_TRUE(segments.classes.empty());
+}
+
+TEST(PipelineVerbs, GivenMasksHaveTheClassesOfTheirObjects) {
+  GivenMasks masks({{0, "background", "room"}, {7, "car", "car"}, {8, "thing", ""}});
+  const std::map<InstanceId, std::string> expected{{7, "car"}};
+  EXPECT_EQ(masks.Segment(SmallFrame()).value().classes, expected);
 }
 
 TEST(PipelineVerbs, NoMasksAreBackground) {
   Frame frame = SmallFrame();
   frame.mask = cv::Mat();
-  const cv::Mat segments = NoMasks().Segment(frame).value();
+  const cv::Mat segments = NoMasks().Segment(frame).value().ids;
   EXPECT_TRUE(AreEqual(segments, cv::Mat(4, 6, CV_16UC1, cv::Scalar(kBackground))));
 }
 
 TEST(PipelineVerbs, GivenIdsAreTheSegments) {
   const Frame frame = SmallFrame();
   const auto map = MakeMap(Method::kTsdfppAnchored, MapConfig());
-  EXPECT_TRUE(AreEqual(GivenIds().Associate(frame, frame.mask, *map), frame.mask));
+  const AssociatedObjects association =
+      GivenIds().Associate(frame, {frame.mask, {{7, "car"}}}, *map);
+  EXPECT_TRUE(AreEqual(association.labels, frame.mask));
+  EXPECT_EQ(association.classes.at(7), "car");
 }
 
 TEST(PipelineVerbs, GivenPosesStayWhereAFrameSaysNothing) {
@@ -64,13 +75,11 @@ TEST(PipelineVerbs, GivenPosesStayWhereAFrameSaysNothing) {
   EXPECT_EQ(after.at(7).matrix(), frame.T_WO.at(7).matrix());
 }
 
-// Paper III-D: only what was classified is tracked. What cannot be registered stays.
+// What cannot be registered stays.
 TEST(PipelineVerbs, IcpBeginsWhereAnObjectIsFirstSeen) {
-  Frame frame = SmallFrame();
-  frame.mask(cv::Rect(0, 0, 1, 4)) = 8;
+  const Frame frame = SmallFrame();
   const auto map = MakeMap(Method::kTsdfppAnchored, MapConfig());
-  const std::vector<ObjectInfo> objects{{0, "background", "room"}, {7, "car", "car"}, {8, "x", ""}};
-  PclIcp icp(IcpConfig(), TrackedObjects(TrackChoice::kAuto, objects));
+  PclIcp icp{IcpConfig()};
   const TrackedPoses first = icp.Track(frame, frame.mask, *map, {});
   ASSERT_EQ(first.T_WO.size(), 1U);
   EXPECT_EQ(first.T_WO.at(7).matrix(), Pose::Identity().matrix());

@@ -46,6 +46,20 @@ TEST(SequenceJson, RoundTripKeepsEverything) {
   }
 }
 
+// What masks' ids stand for is said only where it is not the objects.
+TEST(SequenceJson, SaysThatMaskIdsAreOfOneFrame) {
+  const TempFolder folder;
+  SequenceRecord record = SomeRecord();
+  EXPECT_EQ(SequenceToJson(record).find("mask_ids"), std::string::npos);
+  for (const bool of_objects : {true, false}) {
+    record.info.mask_ids_are_objects = of_objects;
+    ASSERT_TRUE(WriteFile(folder / "s.json", SequenceToJson(record)).has_value());
+    const auto read = ReadSequenceJson(folder / "s.json");
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    EXPECT_EQ(read->info.mask_ids_are_objects, of_objects);
+  }
+}
+
 // Replaces the first `from` in our own file by `to` and returns what the reader says.
 std::string SentenceAfter(const std::string& from, const std::string& to) {
   const TempFolder folder;

@@ -357,6 +357,31 @@ TEST(MaskFaults, WrongClassIsAnotherOnesClass) {
   }
 }
 
+// Ids of one frame say nothing of the next, and there is a segment for each object.
+TEST(MaskFaults, RedrawnIdsAreOfOneFrame) {
+  EXPECT_FALSE(DrawsEveryId({}));
+  EXPECT_FALSE(DrawsEveryId(Only(&MaskFaultConfig::flicker, {0.99, 1})));
+  const MaskFaultConfig config = SensorPresetNamed("masks_redrawn").value().masks;
+  EXPECT_TRUE(DrawsEveryId(config));
+  const cv::Mat mask = RandomMask(1);
+  std::map<InstanceId, InstanceId> before;  // by object
+  int same = 0;
+  constexpr int kFrames = 400;
+  for (int frame = 1; frame <= kFrames; ++frame) {
+    const SensedMask sensed = SenseMask(config, kMaskSeed, frame, mask, Objects());
+    EXPECT_EQ(sensed.segments.size(), IdsIn(mask).size());
+    for (const MaskSegment& segment : sensed.segments) {
+      EXPECT_GE(segment.id, kFirstInventedId);
+      EXPECT_TRUE(SameBytes(sensed.mask == segment.id, mask == segment.object));
+      same += before[segment.object] == segment.id ? 1 : 0;
+      before[segment.object] = segment.id;
+    }
+  }
+  const double draws = static_cast<double>(kFrames * IdsIn(mask).size());
+  const double chance = 1.0 / (kLastInventedId - kFirstInventedId + 1);
+  EXPECT_NEAR(same, draws * chance, kSigmas * std::sqrt(draws * chance));
+}
+
 TEST(MaskFaults, AllAtOnceKeepIdsAndSegmentsTogether) {
   MaskFaultConfig config;
   config.missing = {0.2, 3};

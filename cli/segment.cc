@@ -1,0 +1,188 @@
+#include "cli/segment.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "cli/sequence_options.h"
+#include "core/files.h"
+#include "core/json_text.h"
+#include "eval/picture/segment_picture.h"
+#include "eval/run/run_folder.h"
+#include "eval/score/segment_scores.h"
+#include "mapper/segment/depth_segments.h"
+#include "mapper/segment/given_masks.h"
+#include "mapper/segment/no_masks.h"
+#include "sequence/image_encoders.h"
+#include "sequence/sequence_json.h"
+
+namespace tsdfpp {
+namespace {
+
+struct SegmentArguments {
+  SequenceArguments source;
+  std::string segmentation = "depth";
+  std::string settings;
+  std::string noise;
+  std::string out;
+  int every = 1;
+  bool colour = false;
+  bool score = false;
+};
+
+Expected<DepthSegmentsConfig> DepthConfig(const SegmentArguments& options) {
+  DepthSegmentsConfig config;
+  if (!options.settings.empty()) {
+    TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.settings));
+    TSDFPP_ASSIGN(config, DepthSegmentsConfig::FromToml(table, options.settings));
+  }
+  if (!options.noise.empty()) {
+    TSDFPP_ASSIGN(config.noise, DepthNoiseFromName(options.noise));
+  }
+  return config;
+}
+
+Expected<std::unique_ptr<Segmenter>> MakeSegmenterOf(const SegmentArguments& options) {
+  if (options.segmentation == "depth") {
+    TSDFPP_ASSIGN(const DepthSegmentsConfig config, DepthConfig(options));
+    return std::make_unique<DepthSegments>(config);
+  }
+  if (!options.settings.empty() || !options.noise.empty()) {
+    return UsageError("{} goes with --segmentation depth only",
+                      options.noise.empty() ? "--settings" : "--noise");
+  }
+  if (options.segmentation == "gt") return std::make_unique<GivenMasks>();
+  return std::make_unique<NoMasks>();
+}
+
+// What a run leaves, frame by frame.
+class SegmentWriter {
+ public:
+  SegmentWriter(const SegmentArguments& options, FrameSource& source, std::filesystem::path out)
+      : options_(options), source_(source), out_(std::move(out)) {}
+
+  static std::string NameOf(int frame) { return fmt::format("{:06d}.png", frame); }
+
+  Expected<void> Add(Segmenter& segmenter, int index) {
+    TSDFPP_ASSIGN(const Frame frame, source_.Read(index));
+    const auto start = std::chrono::steady_clock::now();
+    TSDFPP_ASSIGN(const Segments segments, segmenter.Segment(frame));
+    const cv::Mat& ids = segments.ids;
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (ids.empty()) {
+      return DataError(
+          "{}: frame {} has no mask, expected one for each frame, for --segmentation "
+          "gt",
+          source_.info().name, index);
+    }
+    TSDFPP_RETURN_IF_ERROR(WriteFile(out_ / NameOf(index), PngFile(ids)));
+    if (options_.colour) {
+      TSDFPP_RETURN_IF_ERROR(
+          WriteFile(out_ / "colour" / NameOf(index), PngFile(SegmentPicture(frame.colour, ids))));
+    }
+    ++frames_;
+    if (!options_.score) return {};
+    cv::Mat truth = frame.mask;
+    if (source_.IsSensed()) {
+      TSDFPP_ASSIGN(const Frame true_frame, source_.ReadTrue(index));
+      truth = true_frame.mask;
+    }
+    if (truth.empty()) {
+      return DataError("{}: frame {} has no mask, expected one for each frame, for --score",
+                       source_.info().name, index);
+    }
+    return scorer_.Observe(truth, ids, frame.depth);
+  }
+
+  int frames() const { return frames_; }
+  double SecondsAFrame() const { return frames_ == 0 ? 0 : seconds_ / frames_; }
+  SegmentScores Scores() const { return scorer_.Result(); }
+
+ private:
+  const SegmentArguments& options_;
+  FrameSource& source_;
+  std::filesystem::path out_;
+  SegmentScorer scorer_;
+  double seconds_ = 0;
+  int frames_ = 0;
+};
+
+std::string ScoreText(const Measured& value) {
+  return value.value ? fmt::format("{:.3f}", *value.value) : "-";
+}
+
+Expected<CommandResult> RunSegment(const SegmentArguments& options) {
+  if (IsOurSequence(options.out)) {
+    return UsageError("--out '{}' is a sequence, expected another folder", options.out);
+  }
+  TSDFPP_ASSIGN(const std::unique_ptr<Segmenter> segmenter, MakeSegmenterOf(options));
+  TSDFPP_ASSIGN(const std::unique_ptr<FrameSource> source, OpenArguments(options.source));
+  const SequenceInfo& info = source->info();
+  const std::string command =
+      fmt::format("tsdfpp segment {} --segmentation {} --out {}", TextOf(options.source),
+                  options.segmentation, options.out);
+  TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, command));
+  std::set<std::string> files{"segments.json", SegmentWriter::NameOf(info.first_index)};
+  if (options.colour) files.insert("colour/" + SegmentWriter::NameOf(info.first_index));
+  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files)));
+  SegmentWriter writer(options, *source, run_folder.path());
+  {
+    ProgressBar bar("segment");
+    for (int i = 0; i < info.frame_count; i += options.every) {
+      TSDFPP_RETURN_IF_ERROR(writer.Add(*segmenter, info.first_index + i));
+      bar.Show(i + 1, info.frame_count);
+    }
+  }
+  nlohmann::json json{{"run", run_folder.id()},
+                      {"sequence", info.name},
+                      {"segmentation", options.segmentation},
+                      {"frames", writer.frames()},
+                      {"every", options.every},
+                      {"ms_a_frame", 1000 * writer.SecondsAFrame()}};
+  std::string text =
+      fmt::format("{}: segments of {} frames of {}, {:.1f} ms a frame\n", options.out,
+                  writer.frames(), info.name, 1000 * writer.SecondsAFrame());
+  if (options.score) {
+    const SegmentScores scores = writer.Scores();
+    json["scores"] = ToJson(scores);
+    text += fmt::format(
+        "mean IoU {}, PQ {} (background {}, objects {}), IoU over the sequence {}\n",
+        ScoreText(scores.mean_iou), ScoreText(scores.quality.pq), ScoreText(scores.background.pq),
+        ScoreText(scores.objects.pq), ScoreText(scores.sequence_iou));
+  }
+  TSDFPP_RETURN_IF_ERROR(WriteFile(run_folder.path() / "segments.json", JsonText(json, 2) + "\n"));
+  TSDFPP_RETURN_IF_ERROR(run_folder.Commit());
+  return CommandResult{json, text};
+}
+
+}  // namespace
+
+Run AddSegment(CLI::App& app, const CommonOptions&) {
+  auto options = std::make_shared<SegmentArguments>();
+  AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
+  app.add_option("--segmentation", options->segmentation,
+                 "depth (surfaces between jumps and concave edges), gt (the sequence's masks) or "
+                 "none (all is background)")
+      ->check(OneOf({"depth", "gt", "none"}))
+      ->capture_default_str();
+  app.add_option("--noise", options->noise,
+                 "Of depth: nguyen2012 (Kinect v1, the default) or exact; for depth")
+      ->check(OneOf({"nguyen2012", "exact"}));
+  app.add_option("--settings", options->settings,
+                 "TOML file with settings of depth (docs/segmentation.md)")
+      ->check(NotEmpty("a file"));
+  app.add_option("--every", options->every, "Every N-th frame only")
+      ->check(WholeBetween(1, 1000000))
+      ->capture_default_str();
+  app.add_flag("--colour", options->colour, "Pictures for people, too, in colour/");
+  app.add_flag("--score", options->score, "Compare with the sequence's masks");
+  app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
+  return [options] { return RunSegment(*options); };
+}
+
+}  // namespace tsdfpp

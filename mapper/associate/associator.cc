@@ -1,0 +1,15 @@
+#include "mapper/associate/associator.h"
+
+namespace tsdfpp {
+
+Expected<AssociationMode> AssociationModeFromName(std::string_view name) {
+  if (name == "given") return AssociationMode::kGiven;
+  if (name == "votes") return AssociationMode::kVotes;
+  return UsageError("association '{}' is unknown, expected given or votes", name);
+}
+
+std::string_view AssociationModeName(AssociationMode mode) {
+  return mode == AssociationMode::kGiven ? "given" : "votes";
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,49 @@
+// Segments that no object of the map claims, until they have been there long enough to be one.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "core/types.h"
+#include "mapper/associate/vote_config.h"
+#include "mapper/volume/block_grid.h"
+
+namespace tsdfpp {
+
+// Candidates are not in the map, so the points that a candidate showed last stand for it. Space is
+// divided into cells of half of near_voxels. A segment can be a candidate if near_share of its
+// points are in a cell of that one's points, or in one beside it.
+class Candidates {
+ public:
+  // The config must be valid.
+  Candidates(const VoteConfig& config, double voxel_m);
+
+  // Takes in the unclaimed segments of the next frame, each the points that it shows in the world's
+  // frame. Says for each whether it is confirmed: it and its candidate were there, with min_points
+  // or more, in confirm_frames of the last confirm_window frames. Who is confirmed is a candidate
+  // no longer, and who cannot be any more is forgotten. A candidate is one segment of a frame at
+  // most: pairs with the greatest overlap (that share times the share of the candidate's cells that
+  // are near the segment's) are made first.
+  std::vector<bool> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W);
+
+  std::size_t size() const { return candidates_.size(); }
+
+ private:
+  struct Candidate {
+    std::deque<int> seen;       // frames, within the window
+    std::vector<Index3> cells;  // of the points that it showed last, sorted
+  };
+  std::vector<Index3> CellsOf(const std::vector<Eigen::Vector3d>& points_W) const;
+  double ShareNear(const std::vector<Eigen::Vector3d>& points_W,
+                   const std::vector<Index3>& cells) const;
+  // Whether the cell or one beside it is among `cells`.
+  static bool IsNear(const Index3& cell, const std::vector<Index3>& cells);
+
+  VoteConfig config_;
+  double cell_m_;
+  int frame_ = 0;  // counted here
+  std::vector<Candidate> candidates_;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,43 @@
+// How far points are from the surfaces of a map's objects: all that association asks of a map.
+#pragma once
+
+#include <vector>
+
+#include "core/types.h"
+#include "mapper/map_representation.h"
+#include "mapper/volume/object_volume.h"
+#include "mapper/voxel_inspection.h"
+
+namespace tsdfpp {
+
+// Reads the objects' volumes rather than the lists of the global map volume: the same objects, and
+// those that a list had no place for, at a cost that does not grow with the background. A single
+// field says how far its surface is, and by the label of the nearest voxel whose it is. Made for
+// one frame; the map must not change meanwhile.
+class ObjectLookup {
+ public:
+  explicit ObjectLookup(const MapRepresentation& map);
+
+  // The map's objects that have a volume (none of a map without voxels), but the background, by id.
+  const std::vector<InstanceId>& ids() const { return ids_; }
+
+  // The distances of a point of the world's frame to the surfaces of ids(), in voxels without sign,
+  // each at the object's last pose; infinity where the object's volume says nothing there. They are
+  // interpolated between those of the eight voxels around the point that are observed, which must
+  // make up half of the coefficients.
+  void Distances(const Eigen::Vector3d& p_W, std::vector<float>& distances) const;
+
+ private:
+  struct Place {
+    VoxelReader reader;
+    Pose T_LW;
+  };
+
+  const VoxelInspection* voxels_;
+  double voxel_m_;
+  std::vector<InstanceId> ids_;
+  std::vector<Place> places_;  // of ids_, or of the one field
+  bool one_field_;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,31 @@
+// The settings of association by votes (mapper/associate/voxel_votes.h).
+#pragma once
+
+#include <string>
+
+#include "core/error.h"
+#include "core/toml_reader.h"
+
+namespace tsdfpp {
+
+struct VoteConfig {
+  double at_voxels = 1.5;   // a point this near to an object's surface votes for it
+  double min_share = 0.3;   // of a segment's points have to vote for the object that it joins
+  double cut_share = 0.2;   // of a segment's points make a second object of it, which is cut off
+  double near_voxels = 5;   // an object that moved farther than at_voxels is looked for so far away
+  double near_share = 0.5;  // of a segment's points have to be that near
+  int recent_frames = 3;    // only for objects that had a segment so many frames ago at most
+  int max_points = 2000;    // of a segment; more are thinned evenly
+  int min_points = 50;      // of a segment that may become a new object
+  int confirm_frames = 3;   // it becomes one where it was there in so many frames ...
+  int confirm_window = 5;   // ... of so many
+
+  // Errors: kUsage, naming the field, what was found and what was expected.
+  Expected<void> Validate() const;
+  // Reads one table strictly; `where` names the file in errors.
+  static Expected<VoteConfig> FromToml(const toml::table& table, const std::string& where);
+  toml::table ToToml() const;
+  bool operator==(const VoteConfig&) const = default;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,229 @@
+#include "mapper/associate/voxel_votes.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace tsdfpp {
+namespace {
+
+constexpr std::size_t kIds = std::size_t{kNoInstance} + 1;
+
+Eigen::Vector3d PointOf(const Frame& frame, int pixel) {
+  const int v = pixel / frame.depth.cols;
+  const int u = pixel % frame.depth.cols;
+  const double z = frame.depth.at<float>(v, u);
+  const Intrinsics& camera = frame.intrinsics;
+  return frame.T_WC *
+         Eigen::Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+}
+
+bool IsShare(int count, double share, std::size_t of) {
+  return count > 0 && count >= share * static_cast<double>(of);
+}
+
+}  // namespace
+
+VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id) : config_(config) {
+  state_.next_id = first_id;
+}
+
+std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
+                                                          const cv::Mat& ids) const {
+  std::vector<std::vector<int>> pixels(kIds);
+  std::vector<bool> is_there(kIds);
+  for (int v = 0; v < ids.rows; ++v) {
+    const auto* row = ids.ptr<InstanceId>(v);
+    const auto* depth = frame.depth.ptr<float>(v);
+    for (int u = 0; u < ids.cols; ++u) {
+      if (row[u] == kBackground || row[u] == kNoInstance) continue;
+      is_there[row[u]] = true;
+      if (IsValidDepth(depth[u])) pixels[row[u]].push_back(v * ids.cols + u);
+    }
+  }
+  std::vector<Segment> segments;
+  for (std::size_t id = 0; id < kIds; ++id) {
+    if (!is_there[id]) continue;
+    Segment segment;
+    segment.id = static_cast<InstanceId>(id);
+    segment.pixels = std::move(pixels[id]);
+    const std::size_t all = segment.pixels.size();
+    const std::size_t count = std::min(all, static_cast<std::size_t>(config_.max_points));
+    for (std::size_t i = 0; i < count; ++i) {
+      segment.points_W.push_back(PointOf(frame, segment.pixels[i * all / count]));
+    }
+    segments.push_back(std::move(segment));
+  }
+  return segments;
+}
+
+void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const {
+  segment.at.assign(lookup.ids().size(), 0);
+  segment.near.assign(lookup.ids().size(), 0);
+  std::vector<float> distances;
+  for (const Eigen::Vector3d& p_W : segment.points_W) {
+    lookup.Distances(p_W, distances);
+    const auto nearest = std::min_element(distances.begin(), distances.end());
+    if (nearest == distances.end()) return;
+    if (*nearest <= config_.at_voxels) {
+      ++segment.at[static_cast<std::size_t>(nearest - distances.begin())];
+    }
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (distances[i] <= config_.near_voxels) ++segment.near[i];
+    }
+  }
+}
+
+void VoxelVotes::Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const {
+  tbb::parallel_for(std::size_t{0}, segments.size(),
+                    [&](std::size_t s) { CountVotes(lookup, segments[s]); });
+  for (Segment& segment : segments) {
+    const auto most = std::max_element(segment.at.begin(), segment.at.end());
+    if (most == segment.at.end()) continue;
+    if (IsShare(*most, config_.min_share, segment.points_W.size())) {
+      segment.object = static_cast<std::size_t>(most - segment.at.begin());
+    }
+  }
+}
+
+void VoxelVotes::ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const {
+  struct Pair {
+    double share;
+    Segment* segment;
+    std::size_t object;
+  };
+  std::vector<bool> has_segment(lookup.ids().size());
+  for (const Segment& segment : segments) {
+    if (segment.object) has_segment[*segment.object] = true;
+  }
+  std::vector<Pair> pairs;
+  for (Segment& segment : segments) {
+    if (segment.object) continue;
+    for (std::size_t o = 0; o < lookup.ids().size(); ++o) {
+      const auto seen = next_.last_seen.find(lookup.ids()[o]);
+      const bool is_recent =
+          seen != next_.last_seen.end() && seen->second >= next_.frame - config_.recent_frames;
+      if (has_segment[o] || !is_recent) continue;
+      if (!IsShare(segment.near[o], config_.near_share, segment.points_W.size())) continue;
+      pairs.push_back(
+          {static_cast<double>(segment.near[o]) / static_cast<double>(segment.points_W.size()),
+           &segment, o});
+    }
+  }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& a, const Pair& b) { return a.share > b.share; });
+  for (const Pair& pair : pairs) {
+    if (pair.segment->object || has_segment[pair.object]) continue;
+    pair.segment->object = pair.object;
+    has_segment[pair.object] = true;
+  }
+}
+
+void VoxelVotes::FindCuts(std::vector<Segment>& segments) const {
+  std::vector<bool> has_segment;
+  for (const Segment& segment : segments) {
+    has_segment.resize(segment.at.size());
+    if (segment.object) has_segment[*segment.object] = true;
+  }
+  for (Segment& segment : segments) {
+    if (!segment.object) continue;
+    for (std::size_t o = 0; o < segment.at.size(); ++o) {
+      if (has_segment[o] || !IsShare(segment.at[o], config_.cut_share, segment.points_W.size())) {
+        continue;
+      }
+      segment.shared_with.push_back(o);
+    }
+  }
+}
+
+void VoxelVotes::GiveBirth(std::vector<Segment>& segments, double voxel_m) {
+  std::vector<Segment*> unclaimed;
+  std::vector<std::vector<Eigen::Vector3d>> points_W;
+  for (Segment& segment : segments) {
+    if (segment.object || segment.points_W.empty()) continue;
+    unclaimed.push_back(&segment);
+    points_W.push_back(segment.points_W);
+  }
+  if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
+  const std::vector<bool> is_confirmed = next_.candidates->Confirm(points_W);
+  for (std::size_t i = 0; i < unclaimed.size(); ++i) {
+    if (!is_confirmed[i]) continue;
+    if (next_.next_id >= kNoInstance) {
+      next_.refused_birth = true;
+      continue;
+    }
+    unclaimed[i]->label = static_cast<InstanceId>(next_.next_id++);
+  }
+}
+
+void VoxelVotes::Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
+                     cv::Mat& labels) const {
+  std::vector<std::size_t> sharers = segment.shared_with;
+  sharers.push_back(*segment.object);
+  std::sort(sharers.begin(), sharers.end());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        std::vector<float> distances;
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const int pixel = segment.pixels[i];
+          lookup.Distances(PointOf(frame, pixel), distances);
+          const std::size_t nearest = *std::min_element(
+              sharers.begin(), sharers.end(),
+              [&](std::size_t a, std::size_t b) { return distances[a] < distances[b]; });
+          labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) =
+              distances[nearest] <= config_.near_voxels ? lookup.ids()[nearest] : kNoInstance;
+        }
+      });
+}
+
+AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segments,
+                                        const MapRepresentation& map) {
+  next_ = state_;
+  ++next_.frame;
+  const ObjectLookup lookup(map);
+  if (!lookup.ids().empty()) next_.next_id = std::max(next_.next_id, lookup.ids().back() + 1);
+  std::vector<Segment> found = FindSegments(frame, segments.ids);
+  Claim(lookup, found);
+  ClaimMoved(lookup, found);
+  FindCuts(found);
+  GiveBirth(found, map.config().voxel_m);
+
+  AssociatedObjects association;
+  std::vector<InstanceId> label_of(kIds, kNoInstance);
+  label_of[kBackground] = kBackground;
+  for (Segment& segment : found) {
+    if (segment.object) segment.label = lookup.ids()[*segment.object];
+    label_of[segment.id] = segment.label;
+    if (segment.label == kNoInstance) continue;
+    next_.last_seen[segment.label] = next_.frame;
+    const auto named = segments.classes.find(segment.id);
+    if (named != segments.classes.end()) {
+      association.classes.emplace(segment.label, named->second);
+    }
+  }
+  association.labels.create(segments.ids.size(), CV_16UC1);
+  for (int v = 0; v < segments.ids.rows; ++v) {
+    const auto* from = segments.ids.ptr<InstanceId>(v);
+    auto* to = association.labels.ptr<InstanceId>(v);
+    for (int u = 0; u < segments.ids.cols; ++u) to[u] = label_of[from[u]];
+  }
+  for (const Segment& segment : found) {
+    if (segment.shared_with.empty()) continue;
+    Cut(frame, lookup, segment, association.labels);
+    for (const std::size_t o : segment.shared_with) {
+      next_.last_seen[lookup.ids()[o]] = next_.frame;
+    }
+  }
+  return association;
+}
+
+std::vector<std::string> VoxelVotes::Remarks() const {
+  if (!state_.refused_birth) return {};
+  return {fmt::format(
+      "all {} ids of objects are used up, so segments of further ones were left out of the map",
+      kNoInstance - 1)};
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,83 @@
+// Segments whose ids are of one frame alone, matched to the map's objects by the votes of their
+// points (paper III-C).
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "mapper/associate/associator.h"
+#include "mapper/associate/candidates.h"
+#include "mapper/associate/object_lookup.h"
+#include "mapper/associate/vote_config.h"
+
+namespace tsdfpp {
+
+class VoxelVotes : public Associator {
+ public:
+  // New objects get ids from `first_id` on, above all that the map has had. The config must be
+  // valid.
+  explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1);
+
+  // In this order:
+  //  1. *Votes.* Each point of a segment (a pixel with valid depth, taken through the camera's
+  //     pose) votes for the object to whose surface, at its last pose, it is nearest, if that is
+  //     within at_voxels.
+  //  2. *Claims.* A segment joins the object that most of its points vote for, if those are
+  //     min_share of them; several may join one object.
+  //  3. *Moved objects.* Of the segments that are left and the objects that have none and had one
+  //     at most recent_frames frames ago, those belong together of which the greatest share of
+  //     points, and near_share at least, is within near_voxels of the object; one segment an
+  //     object.
+  //  4. *Cuts.* Where cut_share of a claimed segment's points vote for another object that has no
+  //     segment, the mask has merged the two: each pixel is then the nearest one's of those, and
+  //     nobody's beyond near_voxels.
+  //  5. *Births.* What is left is held back (kNoInstance: not fused, so that nothing of a false
+  //     segment enters the map) until Candidates confirm it, and then a new object. Ids count up
+  //     and are never used again; after the last one, kNoInstance - 1, nothing is born any more,
+  //     and Remarks() says so.
+  // The background (id 0 of the segments) stays the background. Ties go to the lower id.
+  AssociatedObjects Associate(const Frame& frame, const Segments& segments,
+                              const MapRepresentation& map) override;
+
+  void Accept() override { state_ = next_; }
+
+  std::vector<std::string> Remarks() const override;
+
+ private:
+  // A segment of the frame, and what becomes of it.
+  struct Segment {
+    InstanceId id = kNoInstance;            // in the frame's segments
+    std::vector<int> pixels;                // with valid depth, by rows
+    std::vector<Eigen::Vector3d> points_W;  // of them, thinned
+    std::vector<int> at;                    // votes, by ObjectLookup::ids()
+    std::vector<int> near;                  // points within near_voxels
+    std::optional<std::size_t> object;      // by ObjectLookup::ids()
+    std::vector<std::size_t> shared_with;   // objects to be cut off
+    InstanceId label = kNoInstance;
+  };
+
+  std::vector<Segment> FindSegments(const Frame& frame, const cv::Mat& ids) const;
+  void CountVotes(const ObjectLookup& lookup, Segment& segment) const;
+  void Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
+  void ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
+  void FindCuts(std::vector<Segment>& segments) const;
+  void GiveBirth(std::vector<Segment>& segments, double voxel_m);
+  void Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
+           cv::Mat& labels) const;
+
+  // What is remembered from frame to frame.
+  struct State {
+    int next_id = 1;
+    bool refused_birth = false;
+    int frame = 0;                        // counted here
+    std::map<InstanceId, int> last_seen;  // the frame in which an object had a segment
+    std::optional<Candidates> candidates;
+  };
+
+  VoteConfig config_;
+  State state_;  // after the frame accepted last
+  State next_;   // after the frame associated last
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,270 @@
+#include "mapper/segment/components.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include "mapper/segment/pixel_rays.h"
+
+namespace tsdfpp {
+namespace {
+
+// Neighbouring members of a row that are connected.
+struct RunOfPixels {
+  int begin = 0;
+  int end = 0;
+};
+
+std::vector<RunOfPixels> RunsOf(const std::uint8_t* member, const std::uint8_t* right, int cols) {
+  std::vector<RunOfPixels> runs;
+  for (int u = 0; u < cols; ++u) {
+    if (member[u] == 0) continue;
+    const int begin = u;
+    while (u + 1 < cols && member[u + 1] != 0 && right[u] != 0) ++u;
+    runs.push_back({begin, u + 1});
+  }
+  return runs;
+}
+
+// Sets of numbers, each named by its least.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
+  std::int32_t Find(std::int32_t i) {
+    while (parent_[static_cast<std::size_t>(i)] != i) {
+      std::int32_t& parent = parent_[static_cast<std::size_t>(i)];
+      parent = parent_[static_cast<std::size_t>(parent)];
+      i = parent;
+    }
+    return i;
+  }
+  void Join(std::int32_t a, std::int32_t b) {
+    a = Find(a);
+    b = Find(b);
+    parent_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::int32_t> parent_;
+};
+
+// Joins the runs of a row with those of the row below that links lead to.
+void JoinRows(const std::vector<RunOfPixels>& upper, std::int32_t first_upper,
+              const std::vector<RunOfPixels>& lower, std::int32_t first_lower,
+              const std::uint8_t* down, DisjointSets& sets) {
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < upper.size() && j < lower.size()) {
+    const int begin = std::max(upper[i].begin, lower[j].begin);
+    const int end = std::min(upper[i].end, lower[j].end);
+    if (begin < end && std::any_of(down + begin, down + end, [](auto link) { return link != 0; })) {
+      sets.Join(first_upper + static_cast<std::int32_t>(i),
+                first_lower + static_cast<std::int32_t>(j));
+    }
+    upper[i].end < lower[j].end ? ++i : ++j;
+  }
+}
+
+}  // namespace
+
+std::int32_t LabelComponents(const cv::Mat& member, const PixelLinks& links, std::int32_t first,
+                             cv::Mat& labels) {
+  const int rows = member.rows;
+  std::vector<std::vector<RunOfPixels>> runs(static_cast<std::size_t>(rows));
+  ForEachRow(rows, [&](int v) {
+    runs[static_cast<std::size_t>(v)] =
+        RunsOf(member.ptr<std::uint8_t>(v), links.right.ptr<std::uint8_t>(v), member.cols);
+  });
+  std::vector<std::int32_t> first_of_row;
+  std::int32_t count = 0;
+  for (const auto& of_row : runs) {
+    first_of_row.push_back(count);
+    count += static_cast<std::int32_t>(of_row.size());
+  }
+  DisjointSets sets(static_cast<std::size_t>(count));
+  for (std::size_t v = 0; v + 1 < runs.size(); ++v) {
+    JoinRows(runs[v], first_of_row[v], runs[v + 1], first_of_row[v + 1],
+             links.down.ptr<std::uint8_t>(static_cast<int>(v)), sets);
+  }
+  std::vector<std::int32_t> label_of(static_cast<std::size_t>(count));
+  std::int32_t next = first;
+  for (std::int32_t run = 0; run < count; ++run) {
+    const std::int32_t root = sets.Find(run);
+    // A set's least run comes first.
+    label_of[static_cast<std::size_t>(run)] =
+        root == run ? next++ : label_of[static_cast<std::size_t>(root)];
+  }
+  ForEachRow(rows, [&](int v) {
+    auto* to = labels.ptr<std::int32_t>(v);
+    auto run = static_cast<std::size_t>(first_of_row[static_cast<std::size_t>(v)]);
+    for (const RunOfPixels& pixels : runs[static_cast<std::size_t>(v)]) {
+      std::fill(to + pixels.begin, to + pixels.end, label_of[run++]);
+    }
+  });
+  return next;
+}
+
+void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& labels) {
+  const int cols = labels.cols;
+  const int rows = labels.rows;
+  const auto* q = known.ptr<float>();
+  const auto* right = links.right.ptr<std::uint8_t>();
+  const auto* down = links.down.ptr<std::uint8_t>();
+  auto* label = labels.ptr<std::int32_t>();
+  // The neighbours that a pixel has links to.
+  const auto for_each_neighbour = [&](int at, const auto& with) {
+    const int u = at % cols;
+    if (at >= cols && down[at - cols] != 0) with(at - cols);
+    if (u > 0 && right[at - 1] != 0) with(at - 1);
+    if (u + 1 < cols && right[at] != 0) with(at + 1);
+    if (at + cols < rows * cols && down[at] != 0) with(at + cols);
+  };
+  std::vector<int> ring;  // got their labels last
+  for (int at = 0; at < rows * cols; ++at) {
+    if (label[at] != 0 || q[at] == 0) continue;
+    // Begin at the labelled neighbours of what has no label.
+    for_each_neighbour(at, [&](int next) {
+      if (label[next] != 0) ring.push_back(next);
+    });
+  }
+  std::sort(ring.begin(), ring.end());
+  ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
+  std::vector<int> next_ring;
+  while (!ring.empty()) {
+    next_ring.clear();
+    for (const int at : ring) {
+      for_each_neighbour(at, [&](int next) {
+        if (label[next] != 0 || q[next] == 0) return;
+        label[next] = label[at];
+        next_ring.push_back(next);
+      });
+    }
+    ring.swap(next_ring);
+  }
+}
+
+std::vector<std::int32_t> CountLabels(const cv::Mat& labels, std::int32_t end) {
+  std::vector<std::int32_t> pixels(static_cast<std::size_t>(end));
+  for (int v = 0; v < labels.rows; ++v) {
+    const auto* row = labels.ptr<std::int32_t>(v);
+    for (int u = 0; u < labels.cols; ++u) ++pixels[static_cast<std::size_t>(row[u])];
+  }
+  return pixels;
+}
+
+std::vector<PartSize> MeasureParts(const cv::Mat& labels, const cv::Mat& depth, float pixel,
+                                   std::int32_t end) {
+  std::vector<PartSize> sizes(static_cast<std::size_t>(end));
+  const double pixel_m2 = double{pixel} * double{pixel};
+  for (int v = 0; v < labels.rows; ++v) {
+    const auto* row = labels.ptr<std::int32_t>(v);
+    const auto* z = depth.ptr<float>(v);
+    for (int begin = 0; begin < labels.cols;) {
+      // Runs of one label are long.
+      int end_of_run = begin;
+      float sum = 0;
+      while (end_of_run < labels.cols && row[end_of_run] == row[begin]) {
+        sum += z[end_of_run] * z[end_of_run];
+        ++end_of_run;
+      }
+      PartSize& size = sizes[static_cast<std::size_t>(row[begin])];
+      size.pixels += end_of_run - begin;
+      size.area_m2 += pixel_m2 * double{sum};
+      begin = end_of_run;
+    }
+  }
+  return sizes;
+}
+
+std::int32_t JoinSmall(const PixelLinks& links, const PartSize& least, std::int32_t first,
+                       std::vector<PartSize> sizes, cv::Mat& labels) {
+  const auto end = static_cast<std::int32_t>(sizes.size());
+  const auto size_of = [&](std::int32_t label) -> PartSize& {
+    return sizes[static_cast<std::size_t>(label)];
+  };
+  const auto is_small = [&](std::int32_t label) {
+    const PartSize& size = size_of(label);
+    return size.pixels > 0 && (size.pixels < least.pixels || size.area_m2 < least.area_m2);
+  };
+  // Links of each small part to others.
+  std::map<std::int32_t, std::map<std::int32_t, int>> shared;
+  const auto count = [&](std::int32_t a, std::int32_t b) {
+    if (a == b || a == 0 || b == 0) return;
+    if (is_small(a) || is_small(b)) {
+      ++shared[a][b];
+      ++shared[b][a];
+    }
+  };
+  for (int v = 0; v < labels.rows; ++v) {
+    const auto* row = labels.ptr<std::int32_t>(v);
+    const auto* below = v + 1 < labels.rows ? labels.ptr<std::int32_t>(v + 1) : nullptr;
+    const auto* right = links.right.ptr<std::uint8_t>(v);
+    const auto* down = links.down.ptr<std::uint8_t>(v);
+    for (int u = 0; u < labels.cols; ++u) {
+      if (u + 1 < labels.cols && right[u] != 0) count(row[u], row[u + 1]);
+      if (below != nullptr && down[u] != 0) count(row[u], below[u]);
+    }
+  }
+  std::set<std::pair<std::int64_t, std::int32_t>> small;  // pixels, label
+  std::vector<std::int32_t> becomes(static_cast<std::size_t>(end));
+  std::iota(becomes.begin(), becomes.end(), 0);
+  for (std::int32_t label = 1; label < end; ++label) {
+    if (!is_small(label)) continue;
+    if (shared.contains(label)) {
+      small.emplace(size_of(label).pixels, label);
+    } else {
+      becomes[static_cast<std::size_t>(label)] = 0;
+    }
+  }
+  while (!small.empty()) {
+    const std::int32_t label = small.begin()->second;
+    small.erase(small.begin());
+    std::int32_t into = 0;
+    int most = 0;
+    for (const auto& [other, number] : shared[label]) {
+      if (number > most) {
+        most = number;
+        into = other;
+      }
+    }
+    becomes[static_cast<std::size_t>(label)] = into;
+    if (into == 0) continue;
+    small.erase({size_of(into).pixels, into});
+    size_of(into).pixels += size_of(label).pixels;
+    size_of(into).area_m2 += size_of(label).area_m2;
+    if (is_small(into)) small.emplace(size_of(into).pixels, into);
+    for (const auto& [other, number] : shared[label]) {
+      shared[other].erase(label);
+      if (other == into) continue;
+      shared[other][into] += number;
+      shared[into][other] += number;
+    }
+    shared.erase(label);
+  }
+  const auto last = [&](std::int32_t label) {
+    while (becomes[static_cast<std::size_t>(label)] != label) {
+      label = becomes[static_cast<std::size_t>(label)];
+    }
+    return label;
+  };
+  std::vector<std::int32_t> number(static_cast<std::size_t>(end));
+  for (std::int32_t label = 1; label < end; ++label) {
+    const bool is_left = last(label) == label && size_of(label).pixels > 0;
+    if (is_left) number[static_cast<std::size_t>(label)] = first++;
+  }
+  for (std::int32_t label = 1; label < end; ++label) {
+    becomes[static_cast<std::size_t>(label)] = last(label);
+  }
+  for (std::int32_t& label : becomes) label = number[static_cast<std::size_t>(label)];
+  ForEachRow(labels.rows, [&](int v) {
+    auto* row = labels.ptr<std::int32_t>(v);
+    for (int u = 0; u < labels.cols; ++u) row[u] = becomes[static_cast<std::size_t>(row[u])];
+  });
+  return first;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,106 @@
+#include "mapper/segment/depth_segments.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "mapper/segment/background.h"
+#include "mapper/segment/components.h"
+
+namespace tsdfpp {
+
+Expected<Segments> DepthSegments::Segment(const Frame& frame) {
+  const cv::Mat& depth = frame.depth;
+  if (depth.type() != CV_32FC1 || depth.cols != frame.intrinsics.width ||
+      depth.rows != frame.intrinsics.height) {
+    return DataError("frame {}: depth is {} x {} of OpenCV type {}, expected {} x {} floats",
+                     frame.index, depth.cols, depth.rows, depth.type(), frame.intrinsics.width,
+                     frame.intrinsics.height);
+  }
+  maps_ = &mapper_.Compute(depth, frame.intrinsics, config_);
+  FindInner();
+  const PixelLinks links{maps_->reach_right, maps_->reach_down};
+  labels_.create(depth.size(), CV_32SC1);
+  labels_.setTo(0);
+  std::int32_t end = LabelComponents(inner_, links, kBackgroundLabel + 1, labels_);
+  GrowLabels(maps_->inverse_depth, links, labels_);
+  // What is too thin to have an inside.
+  ForEachRow(depth.rows, [&](int v) {
+    const auto* q = maps_->inverse_depth.ptr<float>(v);
+    const auto* label = labels_.ptr<std::int32_t>(v);
+    auto* to = inner_.ptr<std::uint8_t>(v);
+    for (int u = 0; u < depth.cols; ++u) to[u] = q[u] != 0 && label[u] == 0 ? 255 : 0;
+  });
+  end = LabelComponents(inner_, links, end, labels_);
+  const double pixels = static_cast<double>(depth.rows) * depth.cols;
+  const PartSize least{static_cast<std::int64_t>(std::ceil(config_.min_share * pixels)),
+                       config_.min_m2};
+  end = JoinSmall(links, least, kBackgroundLabel + 1,
+                  MeasureParts(labels_, maps_->depth, maps_->rays.pixel_width, end), labels_);
+  end = PartBackground(*maps_, links, least, end, config_, labels_);
+  return Segments{IdsOf(depth, end)};
+}
+
+void DepthSegments::FindInner() {
+  const SurfaceMaps& maps = *maps_;
+  const int rows = maps.concave.rows;
+  const int cols = maps.concave.cols;
+  edge_.create(maps.concave.size(), CV_8UC1);
+  inner_.create(maps.concave.size(), CV_8UC1);
+  ForEachRow(rows, [&](int v) {
+    const auto* concave = maps.concave.ptr<std::uint8_t>(v);
+    const auto* right = maps.reach_right.ptr<std::uint8_t>(v);
+    const auto* down = maps.reach_down.ptr<std::uint8_t>(v);
+    const auto* above = maps.reach_down.ptr<std::uint8_t>(std::max(v - 1, 0));
+    const bool is_last = v + 1 == rows;
+    auto* to = edge_.ptr<std::uint8_t>(v);
+    for (int u = 0; u < cols; ++u) {
+      const bool cut = (!is_last & (down[u] == 0)) | ((v > 0) & (above[u] == 0));
+      to[u] = (concave[u] != 0) | cut ? 255 : 0;
+    }
+    for (int u = 0; u + 1 < cols; ++u) {
+      const std::uint8_t cut = right[u] == 0 ? 255 : 0;
+      to[u] |= cut;
+      to[u + 1] |= cut;
+    }
+  });
+  ForEachRow(rows, [&](int v) {
+    const auto* q = maps.inverse_depth.ptr<float>(v);
+    const auto* row = edge_.ptr<std::uint8_t>(v);
+    const auto* above = edge_.ptr<std::uint8_t>(std::max(v - 1, 0));
+    const auto* below = edge_.ptr<std::uint8_t>(std::min(v + 1, rows - 1));
+    auto* to = inner_.ptr<std::uint8_t>(v);
+    const auto column = [&](int u) { return above[u] | row[u] | below[u]; };
+    for (int u = 0; u < cols; ++u) {
+      const int around = column(std::max(u - 1, 0)) | column(u) | column(std::min(u + 1, cols - 1));
+      to[u] = around == 0 && q[u] != 0 ? 255 : 0;
+    }
+  });
+}
+
+cv::Mat DepthSegments::IdsOf(const cv::Mat& depth, std::int32_t end) const {
+  const std::vector<std::int32_t> pixels = CountLabels(labels_, end);
+  std::vector<std::size_t> order;
+  for (std::size_t label = kBackgroundLabel + 1; label < pixels.size(); ++label) {
+    if (pixels[label] > 0) order.push_back(label);
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return pixels[a] > pixels[b]; });
+  std::vector<InstanceId> id_of(pixels.size(), kNoInstance);
+  id_of[kBackgroundLabel] = kBackground;
+  for (std::size_t i = 0; i < order.size() && i + 1 < kNoInstance; ++i) {
+    id_of[order[i]] = static_cast<InstanceId>(i + 1);
+  }
+  cv::Mat ids(depth.size(), CV_16UC1);
+  ForEachRow(depth.rows, [&](int v) {
+    const auto* z = depth.ptr<float>(v);
+    const auto* label = labels_.ptr<std::int32_t>(v);
+    auto* to = ids.ptr<InstanceId>(v);
+    for (int u = 0; u < depth.cols; ++u) {
+      to[u] = IsValidDepth(z[u]) ? id_of[static_cast<std::size_t>(label[u])] : kNoInstance;
+    }
+  });
+  return ids;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,119 @@
+// --associate of map and compare, on a set whose masks draw their ids anew in every frame.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tests/cli/run_command.h"
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+using test::CommandOutput;
+using test::kUsage;
+using test::RunTsdfpp;
+
+class Associate : public testing::Test {
+ protected:
+  // scenes/mini.toml, small, with a car and a house; rendered once for all tests.
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<test::TempFolder>();
+    const CommandOutput made =
+        RunTsdfpp({"generate", TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--sensor", "masks_redrawn",
+                   "--no-antialias", "--out", *folder_ / "redrawn"},
+                  folder_->path());
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static CommandOutput Run(const std::string& command, const std::string& out,
+                           const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{command, *folder_ / "redrawn", "--out", *folder_ / out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTsdfpp(arguments, folder_->path());
+  }
+  static nlohmann::json Json(const std::string& file) {
+    return nlohmann::json::parse(std::ifstream(*folder_ / file));
+  }
+
+  static std::unique_ptr<test::TempFolder> folder_;
+};
+
+std::unique_ptr<test::TempFolder> Associate::folder_;
+
+TEST_F(Associate, IsByVotesWhereIdsAreOfOneFrame) {
+  const CommandOutput output = Run("map", "map", {"--until", "12", "--remove", "object2"});
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_NE(output.err.find("mini: the map's ids are its own, found by votes; poses are tracked"),
+            std::string::npos)
+      << output.err;
+  const nlohmann::json stats = Json("map/stats.json");
+  EXPECT_EQ(stats["associate"], "votes");
+  EXPECT_EQ(stats["poses"], "icp");
+  EXPECT_EQ(stats["removed"], nlohmann::json::array({2}));
+  EXPECT_TRUE(fs::exists(*folder_ / "map/mesh/background-0.ply"));
+  EXPECT_TRUE(fs::exists(*folder_ / "map/mesh/object1-1.ply"));
+  EXPECT_FALSE(fs::exists(*folder_ / "map/mesh/object2-2.ply"));
+  EXPECT_FALSE(fs::exists(*folder_ / "map/mesh/object3-3.ply")) << "a third object";
+  EXPECT_TRUE(fs::exists(*folder_ / "map/trajectories/object2-2.txt"));
+}
+
+TEST_F(Associate, GoesOnFromASavedMap) {
+  ASSERT_EQ(Run("map", "half", {"--until", "6", "--save", *folder_ / "half.map"}).exit_code, 0);
+  const CommandOutput output =
+      Run("map", "rest", {"--load", *folder_ / "half.map", "--until", "10"});
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(Json("rest/stats.json")["associate"], "votes");
+  EXPECT_TRUE(fs::exists(*folder_ / "rest/mesh/object2-2.ply"));
+  EXPECT_FALSE(fs::exists(*folder_ / "rest/mesh/object3-3.ply")) << "a known object was born again";
+}
+
+TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
+  const auto sentence = [](const CommandOutput& output) {
+    EXPECT_EQ(output.exit_code, kUsage);
+    return output.err;
+  };
+  EXPECT_NE(sentence(Run("map", "no", {"--associate", "given"}))
+                .find("--associate given: the ids in the masks of mini are drawn anew in every "
+                      "frame, expected --associate votes"),
+            std::string::npos);
+  EXPECT_NE(sentence(Run("map", "no", {"--poses", "gt"}))
+                .find("--poses gt are the poses of given ids, and --associate votes gives ids of "
+                      "its own: expected --poses icp, or --associate given"),
+            std::string::npos);
+  EXPECT_NE(
+      sentence(Run("compare", "no", {"--poses", "gt"})).find("given poses are those of given"),
+      std::string::npos);
+  EXPECT_NE(sentence(Run("map", "no", {"--load", *folder_ / "half.map", "--associate", "votes"}))
+                .find("--associate cannot be given with --load, whose map has its own"),
+            std::string::npos);
+}
+
+TEST_F(Associate, IsMatchedToTheTruthByOverlap) {
+  const CommandOutput output =
+      Run("compare", "compare",
+          {"--until", "10", "--every", "5", "--methods", "tsdf++/anchored", "--profiles", "close"});
+  ASSERT_EQ(output.exit_code, 0) << output.err;
+  const nlohmann::json run = Json("compare/summary.json")["runs"][0];
+  EXPECT_EQ(run["associate"], "votes");
+  EXPECT_EQ(run["title"], "tsdf++/anchored, close, ICP, ids by votes");
+  ASSERT_EQ(run["matched_ids"].size(), 2U) << run["matched_ids"];
+  std::set<int> objects;
+  for (const nlohmann::json& match : run["matched_ids"]) {
+    objects.insert(match["object"].get<int>());
+    EXPECT_EQ(match["share"], 1.0);
+  }
+  EXPECT_EQ(objects, (std::set<int>{1, 2}));
+  // The objects' own surfaces are there under the truth's ids.
+  for (const nlohmann::json& object : run["examined"]["objects"]) {
+    EXPECT_GT(object["completion"].get<double>(), 0.5) << object["name"];
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp
