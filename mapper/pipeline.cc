@@ -46,15 +46,25 @@ std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config) {
   std::abort();
 }
 
-// New objects get ids above those that the map has had.
+// The least id above those that a map has had.
+InstanceId NextId(const std::vector<ObjectInfo>& born,
+                  const std::map<InstanceId, std::map<int, Pose>>& trajectories) {
+  int next = kBackground + 1;
+  for (const ObjectInfo& object : born) next = std::max(next, object.id + 1);
+  if (!trajectories.empty()) next = std::max(next, trajectories.rbegin()->first + 1);
+  return static_cast<InstanceId>(next);
+}
+
 std::unique_ptr<Associator> MakeAssociator(
     const PipelineConfig& config, const std::vector<ObjectInfo>& born,
     const std::map<InstanceId, std::map<int, Pose>>& trajectories) {
-  if (config.associate == AssociationMode::kGiven) return std::make_unique<GivenIds>();
-  int first = kBackground + 1;
-  for (const ObjectInfo& object : born) first = std::max(first, object.id + 1);
-  if (!trajectories.empty()) first = std::max(first, trajectories.rbegin()->first + 1);
-  return std::make_unique<VoxelVotes>(config.votes, static_cast<InstanceId>(first));
+  switch (config.associate) {
+    case AssociationMode::kGiven:
+      return std::make_unique<GivenIds>();
+    case AssociationMode::kVotes:
+      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories));
+  }
+  std::abort();
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // The mapping pipeline, a frame at a time (paper section III): segment, associate, track, update
 // poses, fuse. Each verb but the last two, which are the map's own, is an object behind an
-// interface of one function; PipelineConfig says which.
+// interface with one function that does it; PipelineConfig says which.
 #pragma once
 
 #include <map>
