@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 
+#include <set>
+#include <string>
+
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/limits.h"
@@ -89,6 +92,23 @@ TEST(FuzzTargets, EveryCorpusAndEverySourceIsThere) {
     }
   }
 #endif
+}
+
+TEST(FuzzTargets, EveryReaderOfASequenceIsFuzzed) {
+  const fs::path root = TSDFPP_SOURCE_DIR;
+  std::set<std::string> fuzzed;
+  for (const Target& target : AllTargets()) {
+    fuzzed.insert(target.sources.begin(), target.sources.end());
+  }
+  const std::string built = ReadFile(root / "tests" / "fuzz" / "readers.cmake").value();
+  for (const fs::path& file : EntriesOf(root / "sequence")) {
+    const std::string name = file.filename().string();
+    if (!name.ends_with("_reader.cc")) continue;
+    EXPECT_TRUE(fuzzed.contains("sequence/" + name))
+        << name << " has no target in tests/fuzz/targets_sequences.cc";
+    EXPECT_NE(built.find(" " + name), std::string::npos)
+        << name << " is not in tests/fuzz/readers.cmake";
+  }
 }
 
 TEST(FuzzComplaint, IsMadeOfWhatUsersMustNotSee) {
