@@ -55,9 +55,8 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
                                const MapRepresentation& map, const ObjectPoses& before) {
   TrackedPoses after{before};
   const double voxel_m = map.config().voxel_m;
-  for (const auto& [id, box] : BoxesOf(labels)) {
-    if (id == kBackground) continue;
-    const auto points = SegmentPointsOf(frame, labels, id, box, voxel_m, config_);
+  for (const auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
+    const auto points = SegmentPointsOf(frame, pixels, voxel_m, config_);
     TrackStatus& status = after.seen[id];
     status = TrackStatus::kFrozen;
     if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
