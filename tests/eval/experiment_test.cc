@@ -131,6 +131,22 @@ TEST(Experiment, TheReadyOnesFitTheirScenes) {
   EXPECT_GE(experiments, 11);
 }
 
+// Masks whose ids are of one frame alone are no objects' masks.
+TEST(Experiment, SensorsThatDrawEveryIdAreRefused) {
+  VariantMaker maker(TSDFPP_SOURCE_DIR "/scenes", {});
+  CellSettings settings;
+  settings.scene = "mini.toml";
+  settings.sensor = "masks_mild";
+  ASSERT_TRUE(maker.Make(settings).has_value());
+  settings.sensor = "masks_redrawn";
+  const auto variant = maker.Make(settings);
+  ASSERT_FALSE(variant.has_value());
+  EXPECT_EQ(variant.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(variant.error().message.find("draws the ids of masks anew in every frame"),
+            std::string::npos)
+      << variant.error().message;
+}
+
 TEST(Experiment, CellsAreAllCombinationsGridByGrid) {
   const auto config = Parse(R"(name = "e"
 question = "?"
