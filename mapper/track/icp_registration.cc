@@ -172,6 +172,8 @@ TrackResult TrackObject(const std::vector<Eigen::Vector3d>& segment_W, const Tri
   double radius_m = 0;
   for (const Eigen::Vector3d& p_W : segment_W) {
     const Eigen::Vector3d p_S = p_W - centroid_W;
+    // PCL aborts where a number is none.
+    if (!p_S.cast<float>().allFinite()) return result;
     radius_m = std::max(radius_m, p_S.norm());
     Point point;
     point.getVector3fMap() = p_S.cast<float>();
