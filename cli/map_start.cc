@@ -155,6 +155,9 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     }
   } else if (until >= 0) {
     return UsageError("--until {} needs a sequence to map", until);
+  } else if (wishes.track.tracked != TrackChoice::kAuto || wishes.track.config) {
+    return UsageError("{} needs a sequence to map",
+                      wishes.track.config ? "--track-config" : "--track");
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(

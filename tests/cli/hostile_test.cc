@@ -339,6 +339,9 @@ TEST_F(Hostile, SettingsOfTrackingAreNotLeftOut) {
   ASSERT_TRUE(WriteFile(folder_ / "track.toml", "min_points = 40\n").has_value());
   ExpectSentence(go_on({"--track-config", folder_ / "track.toml"}), kUsage,
                  "--track-config needs --poses track");
+  ExpectSentence(RunTsdfpp({"map", "--load", file, "--track", "all", "--out", folder_ / "a/b/out"},
+                           folder_.path()),
+                 kUsage, "--track needs a sequence to map");
   ExpectSentence(Map(folder_ / "set", {"--method", "surfels", "--associate", "votes"}), kUsage,
                  "association by votes asks a map for its voxels, which method 'surfels' has not");
 }
