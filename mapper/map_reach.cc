@@ -90,6 +90,22 @@ Expected<void> CheckFarthest(const Pose& T, const std::string& what) {
                    kFarthest_m);
 }
 
+// The camera, and what its pixels can show.
+Expected<void> CheckFarthestSeen(const Frame& frame) {
+  TSDFPP_RETURN_IF_ERROR(
+      CheckFarthest(frame.T_WC, fmt::format("frame {}: the camera", frame.index)));
+  const Intrinsics& k = frame.intrinsics;
+  const double aside_m =
+      double{kMaxValidDepth_m} *
+      std::max({std::abs(k.cx) / k.fx, std::abs(k.cy) / k.fy, std::abs(k.width - k.cx) / k.fx,
+                std::abs(k.height - k.cy) / k.fy});
+  if (aside_m <= kFarthest_m) return {};
+  return DataError(
+      "frame {}: its camera with focal lengths ({:g}, {:g}) and the middle ({:g}, {:g}) sees up to "
+      "{:g} m aside, expected at most {:g}",
+      frame.index, k.fx, k.fy, k.cx, k.cy, aside_m, kFarthest_m);
+}
+
 }  // namespace
 
 Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
@@ -101,17 +117,6 @@ Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
         "frame {}: its camera has {}x{} pixels, focal lengths ({:g}, {:g}) and the middle "
         "({:g}, {:g}), expected {} pixels a side at least and focal lengths above 0",
         frame.index, k.width, k.height, k.fx, k.fy, k.cx, k.cy, kLeastSide_px);
-  }
-  // Trackers and associators look at points before it is known where they may lie in the map.
-  const double aside_m =
-      double{kMaxValidDepth_m} *
-      std::max({std::abs(k.cx) / k.fx, std::abs(k.cy) / k.fy, std::abs(k.width - k.cx) / k.fx,
-                std::abs(k.height - k.cy) / k.fy});
-  if (!(aside_m <= kFarthest_m)) {
-    return DataError(
-        "frame {}: its camera with focal lengths ({:g}, {:g}) and the middle ({:g}, {:g}) sees up "
-        "to {:g} m aside, expected at most {:g}",
-        frame.index, k.fx, k.fy, k.cx, k.cy, aside_m, kFarthest_m);
   }
   struct Image {
     const char* name;
@@ -127,9 +132,7 @@ Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
                      frame.index, of.name, of.image.cols, of.image.rows, of.image.type(), k.width,
                      k.height, of.type_name, of.type);
   }
-  TSDFPP_RETURN_IF_ERROR(
-      CheckRigid(frame.T_WC, fmt::format("frame {}: the camera's", frame.index)));
-  return CheckFarthest(frame.T_WC, fmt::format("frame {}: the camera", frame.index));
+  return CheckRigid(frame.T_WC, fmt::format("frame {}: the camera's", frame.index));
 }
 
 Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,
@@ -143,14 +146,16 @@ Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, cons
     const std::string what = fmt::format("frame {}: object {}", frame.index, id);
     if (id == kNoInstance) return DataError("{} has a pose and is none", what);
     TSDFPP_RETURN_IF_ERROR(CheckRigid(pose, what + "'s"));
-    TSDFPP_RETURN_IF_ERROR(CheckFarthest(pose, what));
-    if (moves == nullptr) continue;
+    if (moves == nullptr) {
+      TSDFPP_RETURN_IF_ERROR(CheckFarthest(pose, what));
+      continue;
+    }
     TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, pose, what + " is posed at"));
     const ObjectMove move = moves->MoveTo(id, pose);
     TSDFPP_RETURN_IF_ERROR(CheckMoved(range, move, 0, what + "'s pose takes a part of it to"));
     T_WL.insert_or_assign(id, move.T_WL);
   }
-  if (moves == nullptr) return {};
+  if (moves == nullptr) return CheckFarthestSeen(frame);
   std::erase_if(T_WL, [](const auto& lattice) {
     return lattice.second.matrix() == Pose::Identity().matrix();
   });

@@ -309,7 +309,7 @@ TEST_F(Hostile, ObjectsThatNobodyListsAreKept) {
   Spoil("sequence.json", "\"id\": 8", "\"id\": 9");
   fs::remove(folder_ / "set/trajectories/gt-right-8.txt");
   const fs::path file = folder_ / "a/b/out.map";
-  const CommandOutput begun = Map(folder_ / "set", {"--until", "2", "--save", file});
+  const CommandOutput begun = Map(folder_ / "set", {"--until", "1", "--save", file});
   ASSERT_EQ(begun.exit_code, 0) << begun.err;
   EXPECT_TRUE(fs::exists(folder_ / "a/b/out/mesh/object8-8.ply"));
   const std::string out = folder_ / "a/b/out";
@@ -325,7 +325,7 @@ TEST_F(Hostile, ObjectsThatNobodyListsAreKept) {
 // What a loaded map cannot say is asked for again, or said to be wrong.
 TEST_F(Hostile, SettingsOfTrackingAreNotLeftOut) {
   const fs::path file = folder_ / "a/b/out.map";
-  ASSERT_EQ(Map(folder_ / "set", {"--until", "2", "--save", file, "--poses", "icp"}).exit_code, 0);
+  ASSERT_EQ(Map(folder_ / "set", {"--until", "1", "--save", file, "--poses", "icp"}).exit_code, 0);
   const auto go_on = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments{"map", folder_ / "set", "--load",
                                        file,  "--out",         folder_ / "a/b/out"};

@@ -138,9 +138,9 @@ TEST(PipelineRemarks, ALoadedMapCounts) {
   EXPECT_TRUE(loaded.Remarks().empty());
 }
 
-// Trackers and associators see a frame before it is known whether the map can take it: what no
-// number of single precision can hold is refused before them, of a map without a range, too.
-TEST(PipelineForm, WhatNoTrackerCouldTakeIsRefusedBefore) {
+// Trackers see a frame before it is known whether the map can take it, and PCL's points have single
+// precision; a map without blocks has no range of its own.
+TEST(PipelineForm, WhatNoNumberCanHoldIsRefused) {
   const std::vector<std::function<void(Frame&)>> faults{
       [](Frame& f) { f.intrinsics.fx = 1e-300; }, [](Frame& f) { f.intrinsics.cx = 1e300; },
       [](Frame& f) { f.T_WC.translation().x() = 1e300; },
