@@ -48,20 +48,14 @@ constexpr std::array<const char*, 8> kSettingsOfTheMap = {
     "--method", "--profile", "--trunc-front", "--trunc-back",
     "--layers", "--voxel",   "--poses",       "--associate"};
 
-// What is tracked, and how.
-Expected<void> ReadTracking(const MapArguments& options, PipelineConfig& config) {
-  TSDFPP_ASSIGN(config.tracked, TrackChoiceFromName(options.track));
-  if (config.poses == PoseSource::kGiven && config.tracked != TrackChoice::kAuto) {
-    return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
-                      options.track);
-  }
-  if (options.track_config.empty()) return {};
-  if (config.poses != PoseSource::kTrack) {
-    return UsageError("--track-config needs --poses track");
-  }
+// What is tracked, and how. A loaded map does not keep it, so it may be given again.
+Expected<TrackWishes> ReadTracking(const MapArguments& options) {
+  TrackWishes wishes;
+  TSDFPP_ASSIGN(wishes.tracked, TrackChoiceFromName(options.track));
+  if (options.track_config.empty()) return wishes;
   TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.track_config));
-  TSDFPP_ASSIGN(config.track, SdfTrackConfig::FromToml(table, options.track_config));
-  return {};
+  TSDFPP_ASSIGN(wishes.config, SdfTrackConfig::FromToml(table, options.track_config));
+  return wishes;
 }
 
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
@@ -69,7 +63,6 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
   TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
-  TSDFPP_RETURN_IF_ERROR(ReadTracking(options, config));
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -104,6 +97,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
       return UsageError("--segmentation {} needs a sequence to map", options.segmentation);
     }
   }
+  TSDFPP_ASSIGN(wishes.track, ReadTracking(options));
   if (options.load.empty()) {
     if (options.source.path.empty()) {
       return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
@@ -116,19 +110,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
       return UsageError("{} cannot be given with --load, whose map has its own", option);
     }
   }
-  return StartLoaded(options.load, options.source, wishes.segmentation, options.until);
-}
-
-// The command with what was given.
-std::string CommandText(const CLI::App& app) {
-  std::string text = "tsdfpp map";
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->count() == 0) continue;
-    if (!option->get_positional()) text += " " + option->get_name();
-    if (option->get_items_expected_max() == 0) continue;  // a flag
-    for (const std::string& value : option->results()) text += " " + value;
-  }
-  return text;
+  return StartLoaded(options.load, options.source, wishes, options.until);
 }
 
 // Whether the file is, or lies below, what the run itself writes to its folder.

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace tsdfpp {
 namespace {
@@ -132,28 +131,21 @@ toml::table IcpConfig::ToToml() const {
                      {"max_rotation_rad", max_rotation_rad}};
 }
 
-std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const cv::Mat& labels, InstanceId id,
+std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const std::vector<int>& pixels,
                                            const IcpConfig& config) {
-  cv::Mat mask = labels == static_cast<double>(id);
-  if (config.mask_erosion_px > 0) {
-    const int side = 2 * config.mask_erosion_px + 1;
-    cv::erode(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
+  std::vector<int> valid;
+  valid.reserve(pixels.size());
+  const int cols = frame.depth.cols;
+  for (const int pixel : pixels) {
+    if (IsValidDepth(frame.depth.at<float>(pixel / cols, pixel % cols))) valid.push_back(pixel);
   }
-  const auto is_taken = [&](int v, int u) {
-    return mask.at<std::uint8_t>(v, u) != 0 && IsValidDepth(frame.depth.at<float>(v, u));
-  };
-  std::vector<cv::Point> pixels;
-  for (int v = 0; v < mask.rows; ++v) {
-    for (int u = 0; u < mask.cols; ++u) {
-      if (is_taken(v, u)) pixels.emplace_back(u, v);
-    }
-  }
-  const std::size_t count = std::min(pixels.size(), static_cast<std::size_t>(config.max_points));
+  const std::size_t count = std::min(valid.size(), static_cast<std::size_t>(config.max_points));
   const Intrinsics& camera = frame.intrinsics;
   std::vector<Eigen::Vector3d> points_W;
   points_W.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const cv::Point& pixel = pixels[i * pixels.size() / count];
+    const int at = valid[i * valid.size() / count];
+    const cv::Point pixel(at % cols, at / cols);
     const double z = frame.depth.at<float>(pixel);
     const Eigen::Vector3d p_C((pixel.x - camera.cx) / camera.fx * z,
                               (pixel.y - camera.cy) / camera.fy * z, z);
@@ -180,6 +172,8 @@ TrackResult TrackObject(const std::vector<Eigen::Vector3d>& segment_W, const Tri
   double radius_m = 0;
   for (const Eigen::Vector3d& p_W : segment_W) {
     const Eigen::Vector3d p_S = p_W - centroid_W;
+    // PCL aborts where a number is none.
+    if (!p_S.cast<float>().allFinite()) return result;
     radius_m = std::max(radius_m, p_S.norm());
     Point point;
     point.getVector3fMap() = p_S.cast<float>();
