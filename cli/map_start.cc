@@ -100,7 +100,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.config.map = loaded.map->config();
   TSDFPP_ASSIGN(start.config.poses, PoseSourceFromName(run.poses));
   start.config.associate = run.associate;
-  const bool votes = run.associate == AssociationMode::kVotes;
+  const bool votes = start.by_votes();
   start.info.name = run.sequence;
   start.info.objects = run.objects;
   start.first = run.last_frame + 1;
@@ -143,8 +143,7 @@ Expected<Frame> ReadToMap(const MapStart& start, int index) {
 }
 
 std::vector<ObjectInfo> ObjectsOf(const MapStart& start) {
-  return start.config.associate == AssociationMode::kVotes ? start.pipeline->Objects()
-                                                           : start.info.objects;
+  return start.by_votes() ? start.pipeline->Objects() : start.info.objects;
 }
 
 MappedRun RunOf(const MapStart& start, int last_frame) {
