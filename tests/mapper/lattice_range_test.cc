@@ -12,6 +12,7 @@
 #include "mapper/map_file.h"
 #include "mapper/map_query.h"
 #include "mapper/map_reach.h"
+#include "mapper/mesh/join_parts.h"
 #include "mapper/methods/map_objects.h"
 #include "mapper/store/byte_stream.h"
 #include "mapper/store/volume_store.h"
