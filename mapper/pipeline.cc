@@ -152,11 +152,10 @@ std::vector<std::string> Pipeline::Remarks() const {
         farthest_m_, voxels * std::numeric_limits<float>::epsilon() / 2));
   }
   if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
-    remarks.push_back(
-        fmt::format("objects were to be tracked (--poses {}) and none was: no frame shows one of "
-                    "those that are "
-                    "({})",
-                    PoseSourceName(config_.poses), TrackChoiceName(tracked_.choice())));
+    remarks.push_back(fmt::format(
+        "objects were to be tracked (--poses {}) and none was: no frame shows an object {}",
+        PoseSourceName(config_.poses),
+        tracked_.choice() == TrackChoice::kAll ? "beside the background" : "that has a class"));
   }
   for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;
