@@ -10,6 +10,7 @@
 #include "mapper/map_query.h"
 #include "mapper/map_reach.h"
 #include "mapper/methods/map_objects.h"
+#include "mapper/volume/lattice_range.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/dyadic_scene.h"
 #include "tests/mapper/every_method.h"
