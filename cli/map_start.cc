@@ -132,7 +132,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   const auto fits = poses ? start.config.Validate() : tl::unexpected(poses.error());
   if (!fits) return DataError("{}: its run cannot go on: {}", file, fits.error().message);
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
-  const bool votes = run.associate == AssociationMode::kVotes;
+  const bool votes = start.by_votes();
   start.info.name = run.sequence;
   start.info.objects = run.objects;
   start.first = run.last_frame + 1;
@@ -179,7 +179,7 @@ Expected<Frame> ReadToMap(const MapStart& start, int index) {
 
 std::vector<ObjectInfo> ObjectsOf(const MapStart& start) {
   std::vector<ObjectInfo> objects = start.pipeline->Objects();
-  if (start.config.associate == AssociationMode::kVotes) return objects;
+  if (start.by_votes()) return objects;
   const std::vector<ObjectInfo>& listed = start.info.objects;
   std::erase_if(objects, [&](const ObjectInfo& object) {
     return std::any_of(listed.begin(), listed.end(),

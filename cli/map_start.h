@@ -34,6 +34,10 @@ struct MapStart {
   int first = 1;                        // frames to map, none where last < first
   int last = 0;
   std::unique_ptr<Pipeline> pipeline;
+
+  int frames() const { return last - first + 1; }  // to map
+  // Whether the map's objects are its own, found by votes.
+  bool by_votes() const { return config.associate == AssociationMode::kVotes; }
 };
 
 // With an empty map. `until` is the last frame, or below 0 for the sequence's. Where nothing is

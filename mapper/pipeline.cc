@@ -168,12 +168,13 @@ std::vector<std::string> Pipeline::Remarks() const {
   }
   if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
     const std::size_t seen = track_log_.objects().size();
+    const std::string_view which =
+        tracked_.choice() == TrackChoice::kAll ? "beside the background" : "that has a class";
     remarks.push_back(fmt::format(
-        "objects were to be tracked (--poses {}) and none was: {} ({})",
-        PoseSourceName(config_.poses),
-        seen == 0 ? "no frame shows one of those that are"
-                  : fmt::format("frames show {}, of which none could be registered", seen),
-        TrackChoiceName(tracked_.choice())));
+        "objects were to be tracked (--poses {}) and none was: {}", PoseSourceName(config_.poses),
+        seen == 0 ? fmt::format("no frame shows an object {}", which)
+                  : fmt::format("frames show {} objects {}, of which none could be registered",
+                                seen, which)));
   }
   for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;

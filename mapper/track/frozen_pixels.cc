@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "mapper/track/object_model.h"
+#include "mapper/volume/fusion_kernels.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kNearest_m = 0.05;  // docs/map.md, "Observation of a voxel"
 
 // The pixels that the voxels of a block fall on; the whole image where some are beside the camera.
 cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const Intrinsics& camera) {
@@ -24,7 +23,7 @@ cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const I
     const Index3 corner =
         VoxelAt(block, (i & 1) * 7 + ((i >> 1) & 1) * 7 * kBlockSide + (i >> 2) * 7 * 64);
     const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(corner.x, corner.y, corner.z));
-    if (p_C.z() < kNearest_m) {
+    if (p_C.z() < double{kNearest_m}) {
       ++behind;
       continue;
     }
