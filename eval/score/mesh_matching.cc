@@ -39,6 +39,7 @@ PartOverlap Measure(const TriangleMesh& part, const SceneTruth& truth, double re
     const std::vector<std::size_t>& here = near[one.surface->id()];
     const Pose T_OW = one.T_WO.inverse();
     std::vector<Eigen::Vector3f> points_O;
+    points_O.reserve(here.size());
     for (const std::size_t i : here) {
       points_O.push_back((T_OW * samples.points[i].cast<double>()).cast<float>());
     }

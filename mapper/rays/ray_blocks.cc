@@ -199,6 +199,7 @@ std::vector<std::uint32_t> NumberInView(const std::vector<BlockFootprint>& footp
 RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& camera,
                         double voxel_m, double near_m, const ContestedBox& contested) {
   std::vector<LatticeView> views;
+  views.reserve(volumes.size());
   for (const RayVolume& volume : volumes) views.emplace_back(camera, volume, voxel_m, near_m);
   const std::vector<Candidate> candidates = FindCandidates(volumes, views);
   // First the crossed cubes, then, for the blocks that have some, the distances.
