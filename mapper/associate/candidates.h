@@ -42,7 +42,9 @@ class Candidates {
   struct CellOfCandidate {
     Index3 cell;
     std::size_t candidate = 0;
-    auto operator<=>(const CellOfCandidate&) const = default;
+    bool operator<(const CellOfCandidate& other) const {
+      return cell == other.cell ? candidate < other.candidate : cell < other.cell;
+    }
   };
   struct Pair {
     double overlap = 0;
