@@ -239,10 +239,7 @@ NormalEquations DistanceTerm::Sums(const Pose& T_LC) const {
         },
         tbb::simple_partitioner());
     for (std::size_t chunk = first; chunk < last; ++chunk) {
-      const NormalEquations& part = parts[chunk - first];
-      sums.H += part.H;
-      sums.g += part.g;
-      sums.cost += part.cost;
+      sums += parts[chunk - first];
     }
   }
   return sums;

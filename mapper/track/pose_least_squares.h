@@ -30,6 +30,13 @@ struct NormalEquations {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
   double cost = 0;
+
+  NormalEquations& operator+=(const NormalEquations& other) {
+    H += other.H;
+    g += other.g;
+    cost += other.cost;
+    return *this;
+  }
 };
 
 // A quadratic that adds to the terms: (x - expected)^T P (x - expected) / 2, x the motion from

@@ -50,6 +50,21 @@ MotionPrior PriorFor(const Matrix6& H, const Pose& expected, double weak_share) 
   return prior;
 }
 
+// `points` are those of the term beside it.
+OutlineTerm OutlineTermOf(const SdfRegistration& task, const SdfTrackConfig& config,
+                          const MotionFrame& frame, int max_places, double points) {
+  static const std::vector<SurfacePlace> nowhere;
+  static const SegmentOutline none;
+  const bool has_one = task.places != nullptr && task.outline != nullptr;
+  OutlineTerm::Options options;
+  options.weight = config.outline_weight * points;
+  options.max_places = has_one && config.outline_weight > 0 ? max_places : 0;
+  options.margin_m = task.voxel_m;
+  options.slack_m = config.outline_slack_voxels * task.voxel_m;
+  options.huber_m = config.huber_voxels * task.voxel_m;
+  return {has_one ? *task.places : nowhere, has_one ? *task.outline : none, frame, options};
+}
+
 }  // namespace
 
 KnownDirections DirectionsOf(const Matrix6& information) {
@@ -89,12 +104,19 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   const std::size_t stride =
       std::max<std::size_t>(1, task.points.size() / static_cast<std::size_t>(config.coarse_points));
   const DistanceTerm coarse = term_of(stride);
-  const auto coarse_sums = [&](const Pose& T) { return coarse.Sums(T); };
+  const OutlineTerm coarse_outline =
+      OutlineTermOf(task, config, result.frame, config.coarse_points,
+                    static_cast<double>(task.points.size()) / static_cast<double>(stride));
+  const auto coarse_sums = [&](const Pose& T) {
+    NormalEquations sums = coarse.Sums(T);
+    sums += coarse_outline.Sums(T);
+    return sums;
+  };
   LeastSquaresOptions coarse_options = options;
   coarse_options.settled_m *= 10;
   double least = std::numeric_limits<double>::infinity();
   const auto try_seed = [&](const Pose& seed) {
-    const MotionPrior prior = PriorFor(coarse.Sums(seed).H, task.T_LC_expected, config.weak_share);
+    const MotionPrior prior = PriorFor(coarse_sums(seed).H, task.T_LC_expected, config.weak_share);
     const LeastSquaresResult found =
         MinimiseOverPose(coarse_sums, seed, result.frame, prior, coarse_options);
     result.iterations += found.iterations;
@@ -108,6 +130,13 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   // Fine: all points, with as narrow a Huber function as the residuals ask for. Sags hold near
   // where they were read, so they are read once more.
   DistanceTerm fine = term_of(1);
+  const OutlineTerm fine_outline = OutlineTermOf(task, config, result.frame, config.outline_places,
+                                                 static_cast<double>(task.points.size()));
+  const auto fine_sums = [&](const Pose& T) {
+    NormalEquations sums = fine.Sums(T);
+    sums += fine_outline.Sums(T);
+    return sums;
+  };
   MotionPrior prior;
   LeastSquaresResult found;
   for (int pass = 0; pass < (config.curved ? 2 : 1); ++pass) {
@@ -117,9 +146,8 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
     fine.SetHuber(
         std::min(config.huber_voxels * task.voxel_m, config.huber_deviations * deviation_m));
     if (pass == 0)
-      prior = PriorFor(fine.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
-    found = MinimiseOverPose([&](const Pose& T) { return fine.Sums(T); }, result.T_LC, result.frame,
-                             prior, options);
+      prior = PriorFor(fine_sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
+    found = MinimiseOverPose(fine_sums, result.T_LC, result.frame, prior, options);
     result.iterations += found.iterations;
     result.T_LC = found.T;
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapper/track/distance_term.h"
+#include "mapper/track/outline_term.h"
 
 namespace tsdfpp {
 
@@ -17,6 +18,9 @@ struct SdfRegistration {
   std::span<const SegmentPoint> points{};
   double voxel_m = 0;
   Intrinsics camera{};
+  // The model's surface and the segment's outline; nullptr for no term of it.
+  const std::vector<SurfacePlace>* places = nullptr;
+  const SegmentOutline* outline = nullptr;
   // Where the motion that the object is expected to go on with would bring it.
   Pose T_LC_expected = Pose::Identity();
   // Further places to begin at.

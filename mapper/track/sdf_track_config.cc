@@ -28,12 +28,16 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("coarse_points", coarse_points, 10, 1000000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_iterations", max_iterations, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("settled_voxels", settled_voxels, 1e-6, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("outline_weight", outline_weight, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("outline_places", outline_places, 10, 1000000));
+  TSDFPP_RETURN_IF_ERROR(InRange("outline_slack_voxels", outline_slack_voxels, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("weak_share", weak_share, 0, 0.1));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_turn_rad", keyframe_turn_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_points", keyframe_points, 10, 1000000));
   TSDFPP_RETURN_IF_ERROR(InRange("inlier_voxels", inlier_voxels, 0.01, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("min_inlier_share", min_inlier_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("min_observed_share", min_observed_share, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_seen_through_share", max_seen_through_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("max_translation_voxels", max_translation_voxels, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_rotation_rad", max_rotation_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
@@ -58,12 +62,16 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("coarse_points", config.coarse_points)
       .Get("max_iterations", config.max_iterations)
       .Get("settled_voxels", config.settled_voxels)
+      .Get("outline_weight", config.outline_weight)
+      .Get("outline_places", config.outline_places)
+      .Get("outline_slack_voxels", config.outline_slack_voxels)
       .Get("weak_share", config.weak_share)
       .Get("keyframe_turn_rad", config.keyframe_turn_rad)
       .Get("keyframe_points", config.keyframe_points)
       .Get("inlier_voxels", config.inlier_voxels)
       .Get("min_inlier_share", config.min_inlier_share)
       .Get("min_observed_share", config.min_observed_share)
+      .Get("max_seen_through_share", config.max_seen_through_share)
       .Get("max_translation_voxels", config.max_translation_voxels)
       .Get("max_rotation_rad", config.max_rotation_rad)
       .Get("rest_voxels", config.rest_voxels);
@@ -89,12 +97,16 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"coarse_points", coarse_points},
                      {"max_iterations", max_iterations},
                      {"settled_voxels", settled_voxels},
+                     {"outline_weight", outline_weight},
+                     {"outline_places", outline_places},
+                     {"outline_slack_voxels", outline_slack_voxels},
                      {"weak_share", weak_share},
                      {"keyframe_turn_rad", keyframe_turn_rad},
                      {"keyframe_points", keyframe_points},
                      {"inlier_voxels", inlier_voxels},
                      {"min_inlier_share", min_inlier_share},
                      {"min_observed_share", min_observed_share},
+                     {"max_seen_through_share", max_seen_through_share},
                      {"max_translation_voxels", max_translation_voxels},
                      {"max_rotation_rad", max_rotation_rad},
                      {"rest_voxels", rest_voxels}};

@@ -33,6 +33,13 @@ struct SdfTrackConfig {
   int max_iterations = 15;        // of each pass
   double settled_voxels = 0.002;  // settled: an iteration moves no point by more than this
 
+  // The model's surface may not lie beside the segment. All of it together, of at most so many
+  // places, weighs as much as `outline_weight` times the points; 0 switches this off. What lies
+  // beside it by less than the slack, and a pixel, is not pulled.
+  double outline_weight = 1;
+  int outline_places = 2000;
+  double outline_slack_voxels = 0.5;
+
   // Along a direction of which less than this share of the points' information speaks, the object
   // is expected to move on as it did; 0 switches this off.
   double weak_share = 0.02;
@@ -47,8 +54,9 @@ struct SdfTrackConfig {
   double inlier_voxels = 1;         // a point nearer than this to the model's surface is an inlier
   double min_inlier_share = 0.6;    // of the points at which the model is observed
   double min_observed_share = 0.3;  // of all points
-  double max_translation_voxels = 10;  // of the segment's centre, for each frame since the last
-  double max_rotation_rad = 0.35;      // for each frame since the last
+  double max_seen_through_share = 0.05;  // of the model's surface that should be in sight
+  double max_translation_voxels = 10;    // of the segment's centre, for each frame since the last
+  double max_rotation_rad = 0.35;        // for each frame since the last
 
   // A motion that moves no point by more than this is none: the pose keeps its numbers, so that a
   // map that resamples what moves does not blur what stands still.

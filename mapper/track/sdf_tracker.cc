@@ -3,13 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapper/track/free_space.h"
+
 namespace tsdfpp {
 namespace {
 
 // A seed nearer than this to another begins in the same valley.
 constexpr double kSameSeed_voxels = 0.5;
+constexpr double kSameSeed_rad = 0.05;
 // Motions that were not measured for longer than this are not extrapolated.
 constexpr int kLongestExtrapolation_frames = 5;
+// Pixels around a segment that are looked at for its outline.
+constexpr int kOutlineMargin_px = 48;
+// Fewer places of the model in free space are outlines that are a little off.
+constexpr int kFewSeenThrough = 3;
 
 // With a rotation again after a product of many, whose rounding would else grow.
 Pose AsRigid(Pose T) {
@@ -61,6 +68,8 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     TrackStatus& status = after.seen[id];
     status = TrackStatus::kFrozen;
     if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
+    const SegmentOutline outline =
+        OutlineOf(labels, id, box, frame.depth, frame.intrinsics, kOutlineMargin_px);
     Memory& memory = memory_[id];
     const auto known = before.find(id);
     if (known == before.end()) {
@@ -68,13 +77,13 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
       after.T_WO[id] = Pose::Identity();
       memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), std::nullopt};
       if (config_.keyframe_turn_rad > 0) {
-        memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
+        memory.keyframe = KeyframeOf(points, outline, frame.T_WC, frame.intrinsics);
       }
       continue;
     }
     const std::optional<ObjectModel> model = ModelOf(map, id);
     if (!model) continue;
-    const auto T_WL = Register(frame, points, *model, voxel_m, known->second, memory);
+    const auto T_WL = Register(frame, points, outline, *model, map, known->second, memory);
     if (!T_WL) continue;
     status = TrackStatus::kTracked;
     if (SameNumbers(*T_WL, model->T_WL)) continue;  // at rest
@@ -85,11 +94,21 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
 
 std::optional<Pose> SdfTracker::Register(const Frame& frame,
                                          const std::vector<SegmentPoint>& points,
-                                         const ObjectModel& model, double voxel_m, const Pose& T_WO,
+                                         const SegmentOutline& outline, const ObjectModel& model,
+                                         const MapRepresentation& map, const Pose& T_WO,
                                          Memory& memory) const {
+  const double voxel_m = map.config().voxel_m;
   const SurfaceReader reader(*model.grid, voxel_m);
-  Sight sight{&frame,  &points,    CentreOf(points),           &reader,
-              voxel_m, model.T_WL, model.T_WL.inverse() * T_WO};
+  Sight sight;
+  sight.frame = &frame;
+  sight.points = &points;
+  sight.outline = outline;
+  sight.centre_C = CentreOf(points);
+  sight.model = &reader;
+  if (!IsOneField(map.method())) sight.places = PlacesOf(*model.grid, reader, voxel_m);
+  sight.voxel_m = voxel_m;
+  sight.T_WL = model.T_WL;
+  sight.T_LO = model.T_WL.inverse() * T_WO;
   // An object from a map's file has no memory yet.
   if (memory.centre_L) sight.passed = std::max(1, frame.index - memory.frame);
 
@@ -107,20 +126,29 @@ std::optional<Pose> SdfTracker::Register(const Frame& frame,
 }
 
 SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) const {
-  SdfRegistration task{sight.model, *sight.points, sight.voxel_m, sight.frame->intrinsics};
+  SdfRegistration task{sight.model,   *sight.points, sight.voxel_m, sight.frame->intrinsics,
+                       &sight.places, &sight.outline};
   const int times = std::min(sight.passed, kLongestExtrapolation_frames);
   const Pose T_LC_stay = sight.T_WL.inverse() * sight.frame->T_WC;
   task.T_LC_expected = Repeated(memory.motion_L, times).inverse() * T_LC_stay;
   const Eigen::Vector3d expected_L = task.T_LC_expected * sight.centre_C;
   const auto add_seed = [&](const Pose& seed) {
-    if ((seed * sight.centre_C - expected_L).norm() > kSameSeed_voxels * sight.voxel_m) {
-      task.T_LC_seeds.push_back(seed);
-    }
+    const auto is_near = [&](const Pose& other) {
+      const Eigen::Matrix3d turn = other.linear().transpose() * seed.linear();
+      return (seed * sight.centre_C - other * sight.centre_C).norm() <
+                 kSameSeed_voxels * sight.voxel_m &&
+             Eigen::AngleAxisd(turn).angle() < kSameSeed_rad;
+    };
+    if (is_near(task.T_LC_expected)) return;
+    if (std::any_of(task.T_LC_seeds.begin(), task.T_LC_seeds.end(), is_near)) return;
+    task.T_LC_seeds.push_back(seed);
   };
   add_seed(T_LC_stay);
-  // As if the same part of it were in sight.
+  // As if the same part of it were in sight, turned as it is expected or not at all; and not moved
+  // but turned.
   if (memory.centre_L) {
     add_seed(Eigen::Translation3d(*memory.centre_L - expected_L) * task.T_LC_expected);
+    add_seed(Eigen::Translation3d(*memory.centre_L - T_LC_stay * sight.centre_C) * T_LC_stay);
   }
   return task;
 }
@@ -129,7 +157,8 @@ void SdfTracker::Calibrate(const Sight& sight, const Memory& memory,
                            SdfRegistrationResult& found) const {
   if (!memory.keyframe) return;
   const Keyframe& keyframe = *memory.keyframe;
-  SdfRegistration task{sight.model, keyframe.points, sight.voxel_m, keyframe.camera};
+  SdfRegistration task{sight.model,     keyframe.points, sight.voxel_m,
+                       keyframe.camera, &sight.places,   &keyframe.outline};
   task.T_LC_expected = sight.T_LO * keyframe.T_OC;
   task.is_near = true;
   const SdfRegistrationResult apparent = RegisterToDistances(task, config_);
@@ -142,6 +171,12 @@ bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& fo
   if (!way.allFinite()) return false;
   const double turn_rad = way.tail<3>().norm() / found.frame.radius_m;
   const DistanceCounts& counts = found.counts;
+  const FreeSpaceCounts seen =
+      CountInFront(sight.places, found.T_LC, sight.frame->depth, sight.frame->intrinsics,
+                   sight.voxel_m, sight.voxel_m, config_.outline_places);
+  if (seen.in_front >= kFewSeenThrough && seen.Share() > config_.max_seen_through_share) {
+    return false;
+  }
   return way.head<3>().norm() <= config_.max_translation_voxels * sight.voxel_m * sight.passed &&
          turn_rad <= config_.max_rotation_rad * sight.passed &&
          counts.observed >= config_.min_observed_share * counts.points &&
@@ -155,7 +190,7 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
     const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
     const Eigen::Matrix3d turn = memory.keyframe->T_OC.linear().transpose() * T_OC.linear();
     if (Eigen::AngleAxisd(turn).angle() > config_.keyframe_turn_rad) {
-      memory.keyframe = KeyframeOf(*sight.points, T_OC, sight.frame->intrinsics);
+      memory.keyframe = KeyframeOf(*sight.points, sight.outline, T_OC, sight.frame->intrinsics);
     }
   }
   memory.frame = sight.frame->index;
@@ -168,10 +203,11 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
 }
 
 SdfTracker::Keyframe SdfTracker::KeyframeOf(const std::vector<SegmentPoint>& points,
-                                            const Pose& T_OC, const Intrinsics& camera) const {
+                                            const SegmentOutline& outline, const Pose& T_OC,
+                                            const Intrinsics& camera) const {
   const std::size_t count =
       std::min(points.size(), static_cast<std::size_t>(config_.keyframe_points));
-  Keyframe keyframe{{}, T_OC, camera};
+  Keyframe keyframe{{}, outline, T_OC, camera};
   keyframe.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     keyframe.points.push_back(points[i * points.size() / count]);

@@ -28,6 +28,7 @@ class SdfTracker : public Tracker {
   // model as it is now says how far off the model makes others.
   struct Keyframe {
     std::vector<SegmentPoint> points;
+    SegmentOutline outline;
     Pose T_OC = Pose::Identity();
     Intrinsics camera;
   };
@@ -44,8 +45,10 @@ class SdfTracker : public Tracker {
   struct Sight {
     const Frame* frame = nullptr;
     const std::vector<SegmentPoint>* points = nullptr;
+    SegmentOutline outline;
     Eigen::Vector3d centre_C = Eigen::Vector3d::Zero();  // of the points
     const SurfaceReader* model = nullptr;
+    std::vector<SurfacePlace> places;  // of the model; none where its voxels are also others'
     double voxel_m = 0;
     Pose T_WL = Pose::Identity();
     Pose T_LO = Pose::Identity();
@@ -54,15 +57,16 @@ class SdfTracker : public Tracker {
 
   // The object's T_WL after the frame; nothing where it is frozen. T_WO is that before it.
   std::optional<Pose> Register(const Frame& frame, const std::vector<SegmentPoint>& points,
-                               const ObjectModel& model, double voxel_m, const Pose& T_WO,
+                               const SegmentOutline& outline, const ObjectModel& model,
+                               const MapRepresentation& map, const Pose& T_WO,
                                Memory& memory) const;
   SdfRegistration TaskOf(const Sight& sight, const Memory& memory) const;
   // Takes off `found` what the keyframe says that the model adds.
   void Calibrate(const Sight& sight, const Memory& memory, SdfRegistrationResult& found) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
   void Remember(const Sight& sight, const SdfRegistrationResult& found, Memory& memory) const;
-  Keyframe KeyframeOf(const std::vector<SegmentPoint>& points, const Pose& T_OC,
-                      const Intrinsics& camera) const;
+  Keyframe KeyframeOf(const std::vector<SegmentPoint>& points, const SegmentOutline& outline,
+                      const Pose& T_OC, const Intrinsics& camera) const;
 
   SdfTrackConfig config_;
   std::map<InstanceId, Memory> memory_;
