@@ -137,4 +137,15 @@ std::vector<std::string> SplitList(const std::string& text) {
   return words;
 }
 
+std::string CommandText(const CLI::App& app) {
+  std::string text = "tsdfpp " + app.get_name();
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0) continue;
+    if (!option->get_positional()) text += " " + option->get_name();
+    if (option->get_items_expected_max() == 0) continue;  // a flag
+    for (const std::string& value : option->results()) text += " " + value;
+  }
+  return text;
+}
+
 }  // namespace tsdfpp

@@ -79,6 +79,9 @@ CLI::Validator NotEmpty(const std::string& expected);
 // The flag --follow-links, for subcommands that read data with paths in it or folders of data.
 void AddFollowLinks(CLI::App& app);
 
+// A subcommand as it was typed: its name and what was given, as run.json notes it.
+std::string CommandText(const CLI::App& app);
+
 // The words between commas. Empty text gives none.
 std::vector<std::string> SplitList(const std::string& text);
 

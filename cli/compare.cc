@@ -78,8 +78,8 @@ std::string PoseNames(const CompareArguments& options, const FrameSource& source
   return std::string(PoseSourceName(votes ? PoseSource::kIcp : PoseSource::kGiven));
 }
 
-Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
-  CompareConfig config = options.config;
+// What is compared: maps of this program, and those of others.
+Expected<void> ReadMappers(const CompareArguments& options, CompareConfig& config) {
   config.methods.clear();
   const std::vector<std::string> known = AdapterNames();
   for (const std::string& name : SplitList(options.methods)) {
@@ -101,20 +101,24 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
       return UsageError("two adapters have the name {}", adapter.name);
     }
   }
-  config.profiles = SplitList(options.profiles);
-  if (!options.associate.empty()) {
-    TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
-  }
-  TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
-  const std::string pose_names = PoseNames(options, *opened.source);
+  return {};
+}
+
+Expected<void> ReadPoses(const std::string& names, CompareConfig& config) {
   config.poses.clear();
-  for (const std::string& name : SplitList(pose_names)) {
+  for (const std::string& name : SplitList(names)) {
     TSDFPP_ASSIGN(const PoseSource poses, PoseSourceFromName(name));
     for (const Method method : config.methods) {
       TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
     }
     config.poses.push_back(poses);
   }
+  return {};
+}
+
+// Whether each list has something, and nothing twice, and the profiles fit the voxels.
+Expected<void> CheckLists(const CompareArguments& options, const std::string& pose_names,
+                          const CompareConfig& config) {
   if ((config.methods.empty() && config.adapters.empty()) || config.profiles.empty() ||
       config.poses.empty()) {
     return UsageError("--methods, --profiles and --poses each need one name at least");
@@ -134,10 +138,12 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));
     TSDFPP_RETURN_IF_ERROR(probe.Validate());
   }
-  TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened.source), options, config));
-  if (!opened.remark.empty()) {
-    config.truth_note += (config.truth_note.empty() ? "" : " ") + opened.remark;
-  }
+  return {};
+}
+
+// The command with what was given.
+std::string CommandText(const CompareArguments& options, const std::string& pose_names) {
+  const CompareConfig& config = options.config;
   std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
       "--until {}{}",
@@ -148,35 +154,61 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   if (!options.removed.empty()) command += " --removed " + options.removed;
   if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
-  ProgressBar bar("compare");
-  const auto show = [&](int done, int total) { bar.Show(done, total); };
-  TSDFPP_ASSIGN(const CompareResult result,
-                RunCompare(*source, config, options.out, command, show));
+  return command;
+}
+
+void LogRemarks(const CompareResult& result) {
   for (const auto& run : result.runs) {
     for (const std::string& remark : run->pipeline.Remarks()) {
       spdlog::warn("{}: {}", run->Title(), remark);
     }
   }
-  // What was finished is the result; that something was not decides the exit code.
   for (const std::string& line : FailureLines(result)) spdlog::error("{}", line);
+}
+
+// What was finished is the result; that something was not decides the exit code.
+CommandResult ResultOf(const CompareResult& result, const std::string& out,
+                       const std::string& command) {
   int exit_code = 0;
   std::string complaint;
   if (!result.failed.empty()) {
     exit_code = static_cast<int>(result.failed.front().error.kind);
-    complaint =
-        fmt::format("{} of {} maps failed, {} has what the others did", result.failed.size(),
-                    result.failed.size() + result.runs.size(), options.out);
+    complaint = fmt::format("{} of {} maps failed, {} has what the others did",
+                            result.failed.size(), result.failed.size() + result.runs.size(), out);
   }
   if (result.stopped) {
     exit_code = static_cast<int>(result.stopped->kind);
     complaint = fmt::format("the frames ended after frame {}, {} has what was done until then",
-                            result.last_frame, options.out);
+                            result.last_frame, out);
   }
-  return CommandResult{
-      SummaryJson(result, command),
-      FrontTable(result) + "\n" + SummaryTable(result) +
-          fmt::format("report: {}/report.html ({:.0f} s)\n", options.out, result.total_s),
-      exit_code, complaint};
+  return {SummaryJson(result, command),
+          FrontTable(result) + "\n" + SummaryTable(result) +
+              fmt::format("report: {}/report.html ({:.0f} s)\n", out, result.total_s),
+          exit_code, complaint};
+}
+
+Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
+  CompareConfig config = options.config;
+  TSDFPP_RETURN_IF_ERROR(ReadMappers(options, config));
+  config.profiles = SplitList(options.profiles);
+  if (!options.associate.empty()) {
+    TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
+  }
+  TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
+  const std::string pose_names = PoseNames(options, *opened.source);
+  TSDFPP_RETURN_IF_ERROR(ReadPoses(pose_names, config));
+  TSDFPP_RETURN_IF_ERROR(CheckLists(options, pose_names, config));
+  TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened.source), options, config));
+  if (!opened.remark.empty()) {
+    config.truth_note += (config.truth_note.empty() ? "" : " ") + opened.remark;
+  }
+  const std::string command = CommandText(options, pose_names);
+  ProgressBar bar("compare");
+  const auto show = [&](int done, int total) { bar.Show(done, total); };
+  TSDFPP_ASSIGN(const CompareResult result,
+                RunCompare(*source, config, options.out, command, show));
+  LogRemarks(result);
+  return ResultOf(result, options.out, command);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "cli/map_start.h"
+#include "cli/map_stats.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "core/json_text.h"
@@ -16,7 +17,6 @@
 #include "eval/run/open_source.h"
 #include "eval/run/run_folder.h"
 #include "mapper/index/voxel_list.h"
-#include "mapper/kernels.h"
 #include "sequence/sequence_json.h"
 
 namespace tsdfpp {
@@ -48,20 +48,14 @@ constexpr std::array<const char*, 8> kSettingsOfTheMap = {
     "--method", "--profile", "--trunc-front", "--trunc-back",
     "--layers", "--voxel",   "--poses",       "--associate"};
 
-// What is tracked, and how.
-Expected<void> ReadTracking(const MapArguments& options, PipelineConfig& config) {
-  TSDFPP_ASSIGN(config.tracked, TrackChoiceFromName(options.track));
-  if (config.poses == PoseSource::kGiven && config.tracked != TrackChoice::kAuto) {
-    return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
-                      options.track);
-  }
-  if (options.track_config.empty()) return {};
-  if (config.poses != PoseSource::kTrack) {
-    return UsageError("--track-config needs --poses track");
-  }
+// What is tracked, and how. A loaded map does not keep it, so it may be given again.
+Expected<TrackWishes> ReadTracking(const MapArguments& options) {
+  TrackWishes wishes;
+  TSDFPP_ASSIGN(wishes.tracked, TrackChoiceFromName(options.track));
+  if (options.track_config.empty()) return wishes;
   TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.track_config));
-  TSDFPP_ASSIGN(config.track, SdfTrackConfig::FromToml(table, options.track_config));
-  return {};
+  TSDFPP_ASSIGN(wishes.config, SdfTrackConfig::FromToml(table, options.track_config));
+  return wishes;
 }
 
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
@@ -69,7 +63,6 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
   TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
-  TSDFPP_RETURN_IF_ERROR(ReadTracking(options, config));
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -90,11 +83,6 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   MapWishes wishes;
   wishes.poses = app.count("--poses") > 0;
-  if (options.segmentation == "depth") {
-    return UsageError(
-        "--segmentation depth is not for map yet: its segments are not checked with --associate "
-        "votes; expected gt or none; `tsdfpp segment` writes them");
-  }
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -104,6 +92,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
       return UsageError("--segmentation {} needs a sequence to map", options.segmentation);
     }
   }
+  TSDFPP_ASSIGN(wishes.track, ReadTracking(options));
   if (options.load.empty()) {
     if (options.source.path.empty()) {
       return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
@@ -116,19 +105,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
       return UsageError("{} cannot be given with --load, whose map has its own", option);
     }
   }
-  return StartLoaded(options.load, options.source, wishes.segmentation, options.until);
-}
-
-// The command with what was given.
-std::string CommandText(const CLI::App& app) {
-  std::string text = "tsdfpp map";
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->count() == 0) continue;
-    if (!option->get_positional()) text += " " + option->get_name();
-    if (option->get_items_expected_max() == 0) continue;  // a flag
-    for (const std::string& value : option->results()) text += " " + value;
-  }
-  return text;
+  return StartLoaded(options.load, options.source, wishes, options.until);
 }
 
 // Whether the file is, or lies below, what the run itself writes to its folder.
@@ -144,7 +121,11 @@ bool IsOfTheRun(const std::filesystem::path& save, const std::filesystem::path& 
 }
 
 // Before anything is mapped, which may take long.
-Expected<void> CheckOutputs(const MapArguments& options) {
+Expected<void> CheckOutputs(const MapArguments& options, int frames) {
+  if (options.views > 0 && frames == 0) {
+    return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
+                      options.views);
+  }
   if (!options.remove.empty() && SplitList(options.remove).empty()) {
     return UsageError("--remove '{}' names no object", options.remove);
   }
@@ -168,131 +149,125 @@ Expected<void> CheckOutputs(const MapArguments& options) {
   return save.has_parent_path() ? MakeWritableFolder(save.parent_path()) : Expected<void>{};
 }
 
-// What was tracked, from when to when.
-nlohmann::json TrackingJson(const Pipeline& pipeline, const SequenceInfo& info) {
-  nlohmann::json objects = nlohmann::json::array();
-  for (const auto& [id, span] : pipeline.track_log().objects()) {
-    std::string name;
-    for (const ObjectInfo& object : info.objects) {
-      if (object.id == id) name = object.name;
-    }
-    objects.push_back({{"id", id},
-                       {"name", name},
-                       {"first_frame", span.first},
-                       {"last_frame", span.last},
-                       {"tracked_frames", span.tracked},
-                       {"stayed_frames", span.stayed},
-                       {"frozen_frames", span.frozen}});
+// Before the sequence's frames are read: whether its map can have removed and saved what is asked.
+Expected<void> CheckStart(const MapArguments& options, const MapStart& start,
+                          const std::vector<InstanceId>& removed) {
+  if (!removed.empty() && !start.mask_remark.empty() && options.load.empty()) {
+    return UsageError("--remove {} has nothing to remove: {}", options.remove, start.mask_remark);
   }
-  return {{"which", TrackChoiceName(pipeline.tracked().choice())}, {"objects", objects}};
+  return options.save.empty() ? Expected<void>{} : CheckCanBeSaved(start.pipeline->map());
+}
+
+void LogStart(const MapStart& start) {
+  if (!start.mask_remark.empty()) spdlog::warn("{}", start.mask_remark);
+  if (start.config.poses != PoseSource::kGiven) {
+    const bool all = start.pipeline->tracked().choice() == TrackChoice::kAll;
+    spdlog::info("{}: tracked is {}", start.info.name,
+                 all ? "all that is not background" : "what has a class");
+  }
+  if (start.by_votes()) {
+    spdlog::info("{}: the map's ids are its own, found by votes; poses are tracked ({})",
+                 start.info.name, PoseSourceName(start.config.poses));
+  }
+}
+
+Expected<RunFolder> BeginRun(const MapArguments& options, const CLI::App& app) {
+  TSDFPP_ASSIGN(RunFolder folder, RunFolder::Begin(options.out, CommandText(app)));
+  std::set<std::string> files{"stats.json", fmt::format("mesh/scene.{}", options.mesh_format)};
+  if (options.views > 0) files.insert("views/1");
+  TSDFPP_RETURN_IF_ERROR(folder.CheckPlaces(std::move(files)));
+  return folder;
+}
+
+struct MappedFrames {
+  RunTimes times;
+  Pose T_WC = Pose::Identity();  // of the last frame
+};
+
+Expected<MappedFrames> MapFrames(const MapStart& start) {
+  MappedFrames mapped;
+  ProgressBar bar("map");
+  for (int index = start.first; index <= start.last; ++index) {
+    TSDFPP_ASSIGN(const Frame frame, ReadToMap(start, index));
+    TSDFPP_ASSIGN(const StepTimes step, start.pipeline->Process(frame));
+    mapped.times.Add(step);
+    mapped.T_WC = frame.T_WC;
+    bar.Show(index - start.first + 1, start.frames());
+  }
+  return mapped;
+}
+
+void LogRemarks(const MapArguments& options, const MapStart& start) {
+  if (start.frames() > 0 && start.mask_remark.empty() && start.config.poses == PoseSource::kGiven &&
+      start.info.objects.size() > 1 && start.pipeline->trajectories().empty()) {
+    spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
+                 options.source.path);
+  }
+  for (const std::string& remark : start.pipeline->Remarks()) {
+    spdlog::warn("{}: {}", start.info.name, remark);
+  }
+}
+
+// Writes the map, after the removals, to --save, and says so.
+Expected<nlohmann::json> Save(const MapArguments& options, const MapStart& start,
+                              const MapRepresentation& map) {
+  const MappedRun run = RunOf(start, start.last);
+  TSDFPP_RETURN_IF_ERROR(SaveMap(options.save, map, &run));
+  std::error_code ignored;
+  return nlohmann::json{{"file", options.save},
+                        {"bytes", std::filesystem::file_size(options.save, ignored)}};
+}
+
+CommandResult ResultOf(const MapArguments& options, const MapStart& start, nlohmann::json stats) {
+  const std::string fusion = start.frames() == 0
+                                 ? ""
+                                 : fmt::format("; fusion median {:.1f} ms a frame",
+                                               stats["times"]["fuse"]["median_ms"].get<double>());
+  std::string line = fmt::format(
+      "{}: {} frames of {} mapped with {}; {} blocks, {:.1f} MB{}\n", options.out, start.frames(),
+      start.info.name, MethodName(start.config.method), stats["map"]["blocks"].get<std::size_t>(),
+      stats["map"]["bytes"].get<double>() / 1e6, fusion);
+  return {std::move(stats), std::move(line)};
 }
 
 Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app) {
   TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
   TSDFPP_ASSIGN(const MapStart start, Start(options, app));
-  SequenceInfo info = start.info;
-  const PipelineConfig& config = start.config;
-  Pipeline& pipeline = *start.pipeline;
-  const bool votes = config.associate == AssociationMode::kVotes;
   std::vector<InstanceId> removed;
   // With votes the map's objects are known once it is made.
-  if (!votes) {
-    TSDFPP_ASSIGN(removed, FindObjects(info, SplitList(options.remove)));
+  if (!start.by_votes()) {
+    TSDFPP_ASSIGN(removed, FindObjects(start.info, SplitList(options.remove)));
   }
-  if (!removed.empty() && !start.mask_remark.empty() && options.load.empty()) {
-    return UsageError("--remove {} has nothing to remove: {}", options.remove, start.mask_remark);
-  }
-  if (!options.save.empty()) TSDFPP_RETURN_IF_ERROR(CheckCanBeSaved(pipeline.map()));
-  if (!start.mask_remark.empty()) spdlog::warn("{}", start.mask_remark);
-  if (config.poses != PoseSource::kGiven) {
-    const bool all = pipeline.tracked().choice() == TrackChoice::kAll;
-    spdlog::info("{}: tracked is {}", info.name,
-                 all ? "all that is not background" : "what has a class");
-  }
-  if (votes) {
-    spdlog::info("{}: the map's ids are its own, found by votes; poses are tracked ({})", info.name,
-                 PoseSourceName(config.poses));
-  }
-  const int frames = start.last - start.first + 1;
-  if (options.views > 0 && frames == 0) {
-    return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
-                      options.views);
-  }
-  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options));
-  TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, CommandText(app)));
+  TSDFPP_RETURN_IF_ERROR(CheckStart(options, start, removed));
+  LogStart(start);
+  TSDFPP_RETURN_IF_ERROR(CheckOutputs(options, start.frames()));
+  TSDFPP_ASSIGN(RunFolder run_folder, BeginRun(options, app));
   const std::filesystem::path& out = run_folder.path();
-  std::set<std::string> files{"stats.json", fmt::format("mesh/scene.{}", options.mesh_format)};
-  if (options.views > 0) files.insert("views/1");
-  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files)));
 
-  RunTimes times;
-  Pose T_WC = Pose::Identity();  // of the last frame
-  {
-    ProgressBar bar("map");
-    for (int index = start.first; index <= start.last; ++index) {
-      TSDFPP_ASSIGN(const Frame frame, ReadToMap(start, index));
-      TSDFPP_ASSIGN(const StepTimes step, pipeline.Process(frame));
-      times.Add(step);
-      T_WC = frame.T_WC;
-      bar.Show(index - start.first + 1, frames);
-    }
-  }
-  if (frames > 0 && start.mask_remark.empty() && config.poses == PoseSource::kGiven &&
-      info.objects.size() > 1 && pipeline.trajectories().empty()) {
-    spdlog::warn("{}: it holds no poses of objects, so all are mapped as standing still",
-                 options.source.path);
-  }
-  const std::vector<std::string> remarks = pipeline.Remarks();
-  for (const std::string& remark : remarks) spdlog::warn("{}: {}", info.name, remark);
+  TSDFPP_ASSIGN(const MappedFrames mapped, MapFrames(start));
+  LogRemarks(options, start);
+  SequenceInfo info = start.info;
   info.objects = ObjectsOf(start);
-  if (votes) {
+  if (start.by_votes()) {
     TSDFPP_ASSIGN(removed, FindObjects(info, SplitList(options.remove)));
   }
-  const std::unique_ptr<MapRepresentation> map = pipeline.map().Clone();
+  const std::unique_ptr<MapRepresentation> map = start.pipeline->map().Clone();
   for (const InstanceId id : removed) map->Remove(id);
-  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, pipeline, info, out, mesh_format));
+
+  TSDFPP_RETURN_IF_ERROR(WriteMap(*map, *start.pipeline, info, out, mesh_format));
   if (options.views > 0) {
-    TSDFPP_RETURN_IF_ERROR(WriteViews(*map, info.intrinsics, T_WC, options.views, out / "views"));
+    TSDFPP_RETURN_IF_ERROR(
+        WriteViews(*map, info.intrinsics, mapped.T_WC, options.views, out / "views"));
   }
-  const MapMemory memory = map->Memory();
-  nlohmann::json stats{
-      {"run", run_folder.id()},
-      {"method", MethodName(config.method)},
-      {"poses", PoseSourceName(config.poses)},
-      {"segmentation", SegmentationName(config.segmentation)},
-      {"associate", AssociationModeName(config.associate)},
-      {"sequence", info.name},
-      {"frames", frames},
-      {"removed", removed},
-      {"voxel_m", config.map.voxel_m},
-      {"trunc_front_voxels", config.map.trunc_front_voxels},
-      {"trunc_back_voxels", config.map.trunc_back_voxels},
-      {"layers", LayersOf(config.method, config.map)},
-      {"kernels", KernelsName(UsedKernels())},
-      {"times", times.ToJson()},
-      {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
-  };
-  if (config.poses != PoseSource::kGiven) stats["tracking"] = TrackingJson(pipeline, info);
-  if (!start.mask_remark.empty()) stats["remarks"] = {start.mask_remark};
-  for (const std::string& remark : remarks) stats["remarks"].push_back(remark);
+  nlohmann::json stats = StatsOf(start, mapped.times, removed, map->Memory());
+  stats["run"] = run_folder.id();
   if (!options.load.empty()) stats["loaded"] = options.load;
   if (!options.save.empty()) {
-    const MappedRun run = RunOf(start, start.last);
-    TSDFPP_RETURN_IF_ERROR(SaveMap(options.save, *map, &run));
-    std::error_code ignored;
-    stats["saved"] = {{"file", options.save},
-                      {"bytes", std::filesystem::file_size(options.save, ignored)}};
+    TSDFPP_ASSIGN(stats["saved"], Save(options, start, *map));
   }
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "stats.json", JsonText(stats, 2) + "\n"));
   TSDFPP_RETURN_IF_ERROR(run_folder.Commit());
-  const std::string fusion = frames == 0
-                                 ? ""
-                                 : fmt::format("; fusion median {:.1f} ms a frame",
-                                               stats["times"]["fuse"]["median_ms"].get<double>());
-  return CommandResult{
-      stats, fmt::format("{}: {} frames of {} mapped with {}; {} blocks, {:.1f} MB{}\n",
-                         options.out, frames, info.name, MethodName(config.method), memory.blocks,
-                         static_cast<double>(memory.bytes) / 1e6, fusion)};
+  return ResultOf(options, start, std::move(stats));
 }
 
 }  // namespace
@@ -305,8 +280,8 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
       ->capture_default_str();
   app.add_option("--segmentation", options->segmentation,
                  "Where masks come from: gt (the sequence) or none (all is background); by default "
-                 "gt where the sequence has masks")
-      ->check(OneOf({"gt", "none", "depth"}));
+                 "gt where the sequence has masks. Segments of depth: tsdfpp segment")
+      ->check(OneOf({"gt", "none"}));
   app.add_option("--associate", options->associate,
                  "Which objects segments are: given (the masks' ids) or votes (their points vote, "
                  "ids are the map's own; poses are then tracked); by default given unless ids are "

@@ -1,5 +1,6 @@
 #include "cli/map_start.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -57,6 +58,32 @@ Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
   return {};
 }
 
+// What is tracked, and how.
+Expected<void> ChooseTracking(MapStart& start, const TrackWishes& wishes) {
+  const PoseSource poses = start.config.poses;
+  if (poses == PoseSource::kGiven && wishes.tracked != TrackChoice::kAuto) {
+    return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
+                      TrackChoiceName(wishes.tracked));
+  }
+  if (poses != PoseSource::kTrack && wishes.config) {
+    return UsageError("--track-config needs --poses track");
+  }
+  start.config.tracked = wishes.tracked;
+  if (wishes.config) start.config.track = *wishes.config;
+  return {};
+}
+
+// Whether a map's objects are those of its sequence, and then what masks showed besides.
+bool AreOfSequence(const std::vector<ObjectInfo>& objects, const std::vector<ObjectInfo>& listed) {
+  return objects.size() >= listed.size() &&
+         std::equal(listed.begin(), listed.end(), objects.begin()) &&
+         std::all_of(objects.begin() + static_cast<std::ptrdiff_t>(listed.size()), objects.end(),
+                     [](const ObjectInfo& object) {
+                       return object.semantic_class.empty() &&
+                              object.name.starts_with(NameOfUnlisted(object.id));
+                     });
+}
+
 // What the masks' ids stand for.
 std::vector<ObjectInfo> ObjectsOfMasks(const SequenceInfo& info) {
   return info.mask_ids_are_objects ? info.objects : std::vector<ObjectInfo>{};
@@ -70,6 +97,8 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
   start.config = config;
   TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
+  TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
+  TSDFPP_RETURN_IF_ERROR(start.config.Validate());
   start.first = start.info.first_index;
   const int end = start.info.first_index + start.info.frame_count - 1;
   start.last = until < 0 ? end : until;
@@ -82,7 +111,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
 }
 
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,
-                               std::optional<Segmentation> segmentation, int until) {
+                               const MapWishes& wishes, int until) {
   TSDFPP_ASSIGN(LoadedMap loaded, LoadMap(file));
   MappedRun run;
   if (loaded.run) {
@@ -91,25 +120,28 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     // Saved by another program, which had no sequence.
     run.poses = PoseSourceName(PoseSource::kGiven);
     for (const InstanceId id : loaded.map->Objects()) {
-      run.objects.push_back(
-          {id, id == kBackground ? "background" : fmt::format("object{}", id), ""});
+      run.objects.push_back({id, NameOfUnlisted(id), ""});
     }
   }
   MapStart start;
   start.config.method = loaded.map->method();
   start.config.map = loaded.map->config();
-  TSDFPP_ASSIGN(start.config.poses, PoseSourceFromName(run.poses));
   start.config.associate = run.associate;
-  const bool votes = run.associate == AssociationMode::kVotes;
+  const auto poses = PoseSourceFromName(run.poses);
+  if (poses) start.config.poses = *poses;
+  const auto fits = poses ? start.config.Validate() : tl::unexpected(poses.error());
+  if (!fits) return DataError("{}: its run cannot go on: {}", file, fits.error().message);
+  TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
+  const bool votes = start.by_votes();
   start.info.name = run.sequence;
   start.info.objects = run.objects;
   start.first = run.last_frame + 1;
   start.last = run.last_frame;
   if (!source.path.empty()) {
-    TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, segmentation));
+    TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
     // With votes the map's objects are its own.
-    const bool is_other =
-        start.info.name != run.sequence || (!votes && start.info.objects != run.objects);
+    const bool is_other = start.info.name != run.sequence ||
+                          (!votes && !AreOfSequence(run.objects, start.info.objects));
     if (!loaded.run || is_other) {
       return UsageError("--load {} is a map of '{}', expected one of {}, '{}'", file, run.sequence,
                         source.path, start.info.name);
@@ -123,6 +155,9 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     }
   } else if (until >= 0) {
     return UsageError("--until {} needs a sequence to map", until);
+  } else if (wishes.track.tracked != TrackChoice::kAuto || wishes.track.config) {
+    return UsageError("{} needs a sequence to map",
+                      wishes.track.config ? "--track-config" : "--track");
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(
@@ -143,8 +178,17 @@ Expected<Frame> ReadToMap(const MapStart& start, int index) {
 }
 
 std::vector<ObjectInfo> ObjectsOf(const MapStart& start) {
-  return start.config.associate == AssociationMode::kVotes ? start.pipeline->Objects()
-                                                           : start.info.objects;
+  std::vector<ObjectInfo> objects = start.pipeline->Objects();
+  if (start.by_votes()) return objects;
+  const std::vector<ObjectInfo>& listed = start.info.objects;
+  std::erase_if(objects, [&](const ObjectInfo& object) {
+    return std::any_of(listed.begin(), listed.end(),
+                       [&](const ObjectInfo& other) { return other.id == object.id; });
+  });
+  std::sort(objects.begin(), objects.end(),
+            [](const ObjectInfo& a, const ObjectInfo& b) { return a.id < b.id; });
+  objects.insert(objects.begin(), listed.begin(), listed.end());
+  return objects;
 }
 
 MappedRun RunOf(const MapStart& start, int last_frame) {

@@ -11,11 +11,18 @@
 
 namespace tsdfpp {
 
+// Of poses that are tracked.
+struct TrackWishes {
+  TrackChoice tracked = TrackChoice::kAuto;
+  std::optional<SdfTrackConfig> config;
+};
+
 // What was asked for beside a config; nothing: as the sequence is.
 struct MapWishes {
   std::optional<Segmentation> segmentation;
   std::optional<AssociationMode> associate;
   bool poses = false;  // the config's poses are what was asked for
+  TrackWishes track;
 };
 
 struct MapStart {
@@ -27,28 +34,34 @@ struct MapStart {
   int first = 1;                        // frames to map, none where last < first
   int last = 0;
   std::unique_ptr<Pipeline> pipeline;
+
+  int frames() const { return last - first + 1; }  // to map
+  // Whether the map's objects are its own, found by votes.
+  bool by_votes() const { return config.associate == AssociationMode::kVotes; }
 };
 
 // With an empty map. `until` is the last frame, or below 0 for the sequence's. Where nothing is
 // wished, masks are those of the sequence if its first frame has one, association is by votes if
 // the masks' ids are of one frame alone, and poses are tracked (PoseSource::kIcp) if it is.
 // Errors: those of OpenArguments; kUsage where `until` is out of range, ids of one frame are to be
-// those of objects, or given poses are to go with votes; kData where masks are asked for and there
-// are none.
+// those of objects, given poses are to go with votes, or what is wished of tracking does not fit
+// the poses; kData where masks are asked for and there are none.
 Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArguments& source,
                             const MapWishes& wishes, int until);
 
-// With the map in `file`; goes on after its last frame where `source` names a sequence.
+// With the map in `file`; goes on after its last frame where `source` names a sequence. Of `wishes`
+// only segmentation and tracking are looked at, as the file has the rest.
 // Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than the map's,
-// or nothing is left to map.
+// or nothing is left to map; kData where what the file says does not go together.
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,
-                               std::optional<Segmentation> segmentation, int until);
+                               const MapWishes& wishes, int until);
 
 // Reads a frame to be mapped. Errors: kData also where it has a mask and others have none, or the
 // other way round.
 Expected<Frame> ReadToMap(const MapStart& start, int index);
 
-// The objects of the map: those of the sequence, or with votes the map's own.
+// The objects of the map: those of the sequence and then, by id, those that masks showed besides;
+// or with votes the map's own.
 std::vector<ObjectInfo> ObjectsOf(const MapStart& start);
 
 // What a file says beside the map, so that the run can go on.

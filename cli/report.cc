@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
+#include <vector>
+
 #include "core/files.h"
 #include "eval/report/report_page.h"
 #include "eval/report/report_video.h"
+#include "eval/run/run_folder.h"
 
 namespace tsdfpp {
 namespace {
@@ -18,6 +22,32 @@ struct ReportArguments {
   bool video = false;
 };
 
+// What is read must not be written over: the page would take its place.
+Expected<void> CheckOut(const std::filesystem::path& out,
+                        const std::vector<std::filesystem::path>& folders,
+                        const std::filesystem::path& gates) {
+  std::error_code failure;
+  const auto place = std::filesystem::weakly_canonical(out, failure);
+  const auto is = [&](const std::filesystem::path& file) {
+    return std::filesystem::weakly_canonical(file, failure) == place;
+  };
+  const auto wrong = [&] {
+    return UsageError("--out '{}' is a file that the page is made of, expected another",
+                      out.string());
+  };
+  if (!gates.empty() && is(gates)) return wrong();
+  for (const std::filesystem::path& folder : folders) {
+    if (is(folder / kRunNote)) return wrong();
+    const auto note = ReadRunNote(folder);
+    if (!note || !*note) continue;  // which is said where the run is read
+    for (const auto& [name, bytes] : (*note)->files) {
+      // Without a size it is there to be made anew.
+      if (bytes && is(folder / name)) return wrong();
+    }
+  }
+  return {};
+}
+
 Expected<CommandResult> RunVideo(const ReportArguments& options) {
   const std::filesystem::path out = options.out.empty()
                                         ? std::filesystem::path(options.run) / "report.mp4"
@@ -26,6 +56,7 @@ Expected<CommandResult> RunVideo(const ReportArguments& options) {
     return UsageError("{} is for the page, expected it without --video",
                       options.compare.empty() ? "--gates" : "--compare");
   }
+  TSDFPP_RETURN_IF_ERROR(CheckOut(out, {options.run}, {}));
   TSDFPP_ASSIGN(const ReportVideo video, WriteReportVideo(options.run, out));
   return CommandResult{{{"video", out.string()},
                         {"frames", video.frames},
@@ -56,6 +87,7 @@ Expected<CommandResult> RunReport(const ReportArguments& options) {
                                         ? std::filesystem::path(options.run) / "report.html"
                                         : std::filesystem::path(options.out);
   if (!options.out.empty()) command += " --out " + options.out;
+  TSDFPP_RETURN_IF_ERROR(CheckOut(out, folders, gates));
   TSDFPP_ASSIGN(const ReportPage page, MakeReportPage(folders, command, kLargestPage_bytes, gates));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out, page.html));
   for (const std::string& remark : page.remarks) spdlog::warn("{}", remark);

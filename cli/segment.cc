@@ -116,18 +116,18 @@ std::string ScoreText(const Measured& value) {
   return value.value ? fmt::format("{:.3f}", *value.value) : "-";
 }
 
-Expected<CommandResult> RunSegment(const SegmentArguments& options) {
+Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::App& app) {
   if (IsOurSequence(options.out)) {
     return UsageError("--out '{}' is a sequence, expected another folder", options.out);
   }
   TSDFPP_ASSIGN(const std::unique_ptr<Segmenter> segmenter, MakeSegmenterOf(options));
   TSDFPP_ASSIGN(const std::unique_ptr<FrameSource> source, OpenArguments(options.source));
   const SequenceInfo& info = source->info();
-  const std::string command =
-      fmt::format("tsdfpp segment {} --segmentation {} --out {}", TextOf(options.source),
-                  options.segmentation, options.out);
-  TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, command));
-  std::set<std::string> files{"segments.json", SegmentWriter::NameOf(info.first_index)};
+  TSDFPP_ASSIGN(RunFolder run_folder, RunFolder::Begin(options.out, CommandText(app)));
+  std::set<std::string> files{"segments.json"};
+  for (int i = 0; i < info.frame_count; i += options.every) {
+    files.insert(SegmentWriter::NameOf(info.first_index + i));
+  }
   if (options.colour) files.insert("colour/" + SegmentWriter::NameOf(info.first_index));
   TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files)));
   SegmentWriter writer(options, *source, run_folder.path());
@@ -182,7 +182,7 @@ Run AddSegment(CLI::App& app, const CommonOptions&) {
   app.add_flag("--colour", options->colour, "Pictures for people, too, in colour/");
   app.add_flag("--score", options->score, "Compare with the sequence's masks");
   app.add_option("--out", options->out, "Output folder")->check(NotEmpty("a folder"))->required();
-  return [options] { return RunSegment(*options); };
+  return [options, &app] { return RunSegment(*options, app); };
 }
 
 }  // namespace tsdfpp

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <unordered_set>
+#include <vector>
 
 #include "core/files.h"
 #include "core/one_line.h"
@@ -33,13 +36,33 @@ std::int64_t DepthOf(std::string_view text) {
   return deepest;
 }
 
-// What the text holds; discarded where it is no JSON.
+// What the text holds; discarded where it is no JSON. Errors: too much of it, or an object that
+// names a member twice.
 Expected<nlohmann::json> ParseWithinLimits(std::string_view text, std::string_view where) {
   TSDFPP_RETURN_IF_ERROR(CheckLimit(&Limits::json_bytes, static_cast<std::int64_t>(text.size()),
                                     where, "bytes of JSON"));
   TSDFPP_RETURN_IF_ERROR(
       CheckLimit(&Limits::nesting, DepthOf(text), where, "lists and objects within one another"));
-  return nlohmann::json::parse(text, nullptr, false);
+  std::vector<std::unordered_set<std::string>> names;  // of the objects that are open
+  std::string twice;
+  bool is_twice = false;
+  const auto look = [&](int, nlohmann::json::parse_event_t event, const nlohmann::json& parsed) {
+    using Event = nlohmann::json::parse_event_t;
+    if (event == Event::object_start) names.emplace_back();
+    if (event == Event::object_end) names.pop_back();
+    if (event == Event::key && !is_twice) {
+      const auto& name = parsed.get_ref<const std::string&>();
+      is_twice = !names.back().insert(name).second;
+      if (is_twice) twice = name;
+    }
+    return true;
+  };
+  nlohmann::json value = nlohmann::json::parse(text, look, false);
+  // The library would take the last one in silence.
+  if (is_twice && !value.is_discarded()) {
+    return DataError("{}: an object has {} twice", where, Quoted(twice));
+  }
+  return value;
 }
 
 template <typename Json>

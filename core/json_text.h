@@ -16,8 +16,8 @@
 
 namespace tsdfpp {
 
-// What the text holds. `where` begins the sentence. Errors: kData where it is no JSON, or over the
-// limits of size and nesting (core/limits.h).
+// What the text holds. `where` begins the sentence. Errors: kData where it is no JSON, over the
+// limits of size and nesting (core/limits.h), or an object names a member twice.
 Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view where);
 
 // The same, of a JSON object: "<where>: not a JSON object" covers what is no JSON, too.

@@ -1,5 +1,5 @@
 // Maps a ball in front of a wall from a synthetic depth image, moves the ball, asks the map how far
-// away its surface is, and saves the map.
+// away its surface is, saves the map, and reads it again.
 #include <iostream>
 
 #include "mapper/map_file.h"
@@ -26,6 +26,11 @@ Frame Render() {
   return frame;
 }
 
+int Fail(const tsdfpp::Error& error) {
+  std::cerr << error.message << "\n";
+  return 1;
+}
+
 int main() {
   const auto map = tsdfpp::MakeMap(tsdfpp::Method::kTsdfppAnchored, {});
   const Frame frame = Render();
@@ -37,6 +42,13 @@ int main() {
   std::cout << "object " << ball.id << " is " << ball.distance_m << " m away, towards "
             << -ball.gradient_W.transpose() << "\n";
   const auto saved = tsdfpp::SaveMap("ball.tsdfpp", *map);
-  if (!saved) std::cerr << saved.error().message << "\n";
-  return saved ? 0 : 1;
+  if (!saved) return Fail(saved.error());
+
+  const auto loaded = tsdfpp::LoadMap("ball.tsdfpp");
+  if (!loaded) return Fail(loaded.error());
+  for (const InstanceId id : loaded->map->Objects()) {
+    std::cout << "object " << id << " has " << loaded->map->ObjectMesh(id).triangles.size()
+              << " triangles\n";
+  }
+  return 0;
 }

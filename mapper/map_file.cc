@@ -1,5 +1,7 @@
 #include "mapper/map_file.h"
 
+#include <set>
+
 #include "core/files.h"
 #include "core/plain_name.h"
 #include "mapper/map_persistence.h"
@@ -64,10 +66,16 @@ Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range
   }
   const auto trajectories = bytes.Get<std::uint32_t>();
   for (std::uint32_t i = 0; i < trajectories && bytes.ok(); ++i) {
-    auto& poses = run.trajectories[bytes.Get<InstanceId>()];
+    const auto id = bytes.Get<InstanceId>();
+    if (run.trajectories.contains(id)) return DataError("object {} has two trajectories", id);
+    auto& poses = run.trajectories[id];
     const auto count = bytes.Get<std::uint32_t>();
     for (std::uint32_t k = 0; k < count && bytes.ok(); ++k) {
       const auto frame = bytes.Get<std::int32_t>();
+      if (!poses.empty() && frame <= poses.rbegin()->first) {
+        return DataError("the trajectory of object {} has frame {} behind frame {}", id, frame,
+                         poses.rbegin()->first);
+      }
       TSDFPP_ASSIGN(poses[frame], LoadPose(bytes, range));
     }
   }
@@ -77,13 +85,32 @@ Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range
     run.associate = *associate;
   }
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
+  return run;
+}
+
+// What is wrong with a run beside a map of these objects, as a fragment.
+Expected<void> CheckRun(const MappedRun& run, const std::vector<InstanceId>& mapped) {
   TSDFPP_RETURN_IF_ERROR(CheckLabel(run.sequence, "the sequence's name"));
   if (!run.poses.empty()) TSDFPP_RETURN_IF_ERROR(CheckLabel(run.poses, "the source of poses"));
   TSDFPP_RETURN_IF_ERROR(CheckObjects(run.objects, "its list"));
   if (run.last_frame < -1 || run.last_frame > kGreatestFrame) {
     return DataError("its last frame is {}, expected -1 to {}", run.last_frame, kGreatestFrame);
   }
-  return run;
+  std::set<InstanceId> listed;
+  for (const ObjectInfo& object : run.objects) listed.insert(object.id);
+  for (const InstanceId id : mapped) {
+    if (!listed.contains(id)) return DataError("object {} of the map is not in its list", id);
+  }
+  for (const auto& [id, poses] : run.trajectories) {
+    if (!listed.contains(id)) {
+      return DataError("object {} has a trajectory and is not in its list", id);
+    }
+    if (!poses.empty() && poses.rbegin()->first > run.last_frame) {
+      return DataError("the trajectory of object {} goes to frame {}, behind the last one, {}", id,
+                       poses.rbegin()->first, run.last_frame);
+    }
+  }
+  return {};
 }
 
 // The error of a part, whose message is a fragment, as one sentence.
@@ -173,13 +200,8 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
     return DataError("{}: its map is wrong: {}", where, status.error().message);
   }
   if (loaded.run) {
-    for (const InstanceId id : loaded.map->Objects()) {
-      const auto& listed = loaded.run->objects;
-      if (std::none_of(listed.begin(), listed.end(),
-                       [&](const ObjectInfo& object) { return object.id == id; })) {
-        return DataError("{}: section '{}' is wrong: object {} of the map is not in its list",
-                         where, kRunSection, id);
-      }
+    if (const auto fits = CheckRun(*loaded.run, loaded.map->Objects()); !fits) {
+      return tl::unexpected(InSection(where, kRunSection, fits.error()));
     }
   }
   return loaded;
@@ -187,6 +209,13 @@ Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& wher
 
 Expected<void> SaveMap(const std::filesystem::path& path, const MapRepresentation& map,
                        const MappedRun* run) {
+  TSDFPP_RETURN_IF_ERROR(CheckCanBeSaved(map));
+  if (run != nullptr) {
+    if (const auto fits = CheckRun(*run, map.Objects()); !fits) {
+      return UsageError("{}: is not written, as nobody could load it: of its run {}", path.string(),
+                        fits.error().message);
+    }
+  }
   TSDFPP_ASSIGN(const std::string bytes, MapToBytes(map, run));
   return WriteFile(path, bytes);
 }

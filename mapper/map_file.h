@@ -38,12 +38,13 @@ Expected<std::string> MapToBytes(const MapRepresentation& map, const MappedRun* 
 
 // `where` names the file in errors, which are kData and one sentence: a foreign, newer, truncated
 // or damaged file, one whose content no map can have, or whose names cannot be shown or be
-// those of files, lack an object of the map, or are there twice (core/plain_name.h). The loaded map
-// is the saved one: whatever happens to both, they stay equal, bit for bit.
+// those of files, lack an object of the map or of a trajectory, or are there twice
+// (core/plain_name.h). The loaded map is the saved one: whatever happens to both, they stay equal,
+// bit for bit.
 Expected<LoadedMap> MapFromBytes(std::string_view bytes, const std::string& where);
 
 // The file appears whole or not at all. Errors: kEnvironment where the disk refuses; those of
-// CheckCanBeSaved.
+// CheckCanBeSaved; kUsage where LoadMap would refuse what the run says.
 Expected<void> SaveMap(const std::filesystem::path& path, const MapRepresentation& map,
                        const MappedRun* run = nullptr);
 

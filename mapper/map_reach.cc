@@ -5,11 +5,15 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/farthest.h"
 #include "mapper/block_moves.h"
 #include "mapper/volume/lattice_range.h"
 
 namespace tsdfpp {
 namespace {
+
+// As those that files may have (docs/limits.md): normals and smoothing look at a pixel beside.
+constexpr int kLeastSide_px = 2;
 
 // Lattices of objects in which a frame is fused, and the map's, which is the world's.
 using Lattices = std::map<InstanceId, Pose>;
@@ -79,17 +83,40 @@ Expected<void> CheckTranslation(const LatticeRange& range, const Pose& T, const 
   return DataError("{} {}", what, range.Beyond(T.translation()));
 }
 
+Expected<void> CheckFarthest(const Pose& T, const std::string& what) {
+  const double far_m = T.translation().cwiseAbs().maxCoeff();
+  if (far_m <= kFarthest_m) return {};
+  return DataError("{} is {:g} m from the origin along an axis, expected at most {:g}", what, far_m,
+                   kFarthest_m);
+}
+
+// The camera, and what its pixels can show.
+Expected<void> CheckFarthestSeen(const Frame& frame) {
+  TSDFPP_RETURN_IF_ERROR(
+      CheckFarthest(frame.T_WC, fmt::format("frame {}: the camera", frame.index)));
+  const Intrinsics& k = frame.intrinsics;
+  const double aside_m =
+      double{kMaxValidDepth_m} *
+      std::max({std::abs(k.cx) / k.fx, std::abs(k.cy) / k.fy, std::abs(k.width - k.cx) / k.fx,
+                std::abs(k.height - k.cy) / k.fy});
+  if (aside_m <= kFarthest_m) return {};
+  return DataError(
+      "frame {}: its camera with focal lengths ({:g}, {:g}) and the middle ({:g}, {:g}) sees up to "
+      "{:g} m aside, expected at most {:g}",
+      frame.index, k.fx, k.fy, k.cx, k.cy, aside_m, kFarthest_m);
+}
+
 }  // namespace
 
 Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
   const Intrinsics& k = frame.intrinsics;
   const auto number = [](double x) { return std::isfinite(x); };
-  if (k.width < 1 || k.height < 1 || !(k.fx > 0) || !(k.fy > 0) || !number(k.fx) || !number(k.fy) ||
-      !number(k.cx) || !number(k.cy)) {
+  if (k.width < kLeastSide_px || k.height < kLeastSide_px || !(k.fx > 0) || !(k.fy > 0) ||
+      !number(k.fx) || !number(k.fy) || !number(k.cx) || !number(k.cy)) {
     return DataError(
         "frame {}: its camera has {}x{} pixels, focal lengths ({:g}, {:g}) and the middle "
-        "({:g}, {:g}), expected a pixel at least and focal lengths above 0",
-        frame.index, k.width, k.height, k.fx, k.fy, k.cx, k.cy);
+        "({:g}, {:g}), expected {} pixels a side at least and focal lengths above 0",
+        frame.index, k.width, k.height, k.fx, k.fy, k.cx, k.cy, kLeastSide_px);
   }
   struct Image {
     const char* name;
@@ -117,14 +144,18 @@ Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, cons
   if (moves != nullptr) T_WL = moves->MovedLattices();
   for (const auto& [id, pose] : T_WO) {
     const std::string what = fmt::format("frame {}: object {}", frame.index, id);
+    if (id == kNoInstance) return DataError("{} has a pose and is none", what);
     TSDFPP_RETURN_IF_ERROR(CheckRigid(pose, what + "'s"));
-    if (moves == nullptr) continue;
+    if (moves == nullptr) {
+      TSDFPP_RETURN_IF_ERROR(CheckFarthest(pose, what));
+      continue;
+    }
     TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, pose, what + " is posed at"));
     const ObjectMove move = moves->MoveTo(id, pose);
     TSDFPP_RETURN_IF_ERROR(CheckMoved(range, move, 0, what + "'s pose takes a part of it to"));
     T_WL.insert_or_assign(id, move.T_WL);
   }
-  if (moves == nullptr) return {};
+  if (moves == nullptr) return CheckFarthestSeen(frame);
   std::erase_if(T_WL, [](const auto& lattice) {
     return lattice.second.matrix() == Pose::Identity().matrix();
   });

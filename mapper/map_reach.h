@@ -10,13 +10,15 @@
 namespace tsdfpp {
 
 // Whether the frame is one at all: images of the camera's size and of the types that core/types.h
-// states, a camera with focal lengths, a rigid camera pose. The mask is that which is given.
+// states and two pixels a side at least, a camera with focal lengths, a rigid camera pose. The mask
+// is that which is given.
 // Errors: kData, a sentence beginning with the frame's number. No pixel is looked at.
 Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels);
 
 // Whether the map can take these poses of objects and then this frame, whose form is right: the
 // poses, what they move, the camera, and all that the frame's depth may show lie in the range.
-// A map that is not made of blocks has no range; then only the poses have to be rigid.
+// A map that is not made of blocks has no range; then poses have to be rigid, and they and what
+// pixels can show at most kFarthest_m (core/farthest.h) away.
 // Errors: kData, a sentence. Costs a few rays and boxes, and a look at the pixels only where the
 // image's corners, as far away as depth is valid, do not all lie in the range.
 Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "mapper/associate/given_ids.h"
@@ -46,15 +47,25 @@ std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config) {
   std::abort();
 }
 
-// New objects get ids above those that the map has had.
+// The least id above those that a map has had.
+InstanceId NextId(const std::vector<ObjectInfo>& born,
+                  const std::map<InstanceId, std::map<int, Pose>>& trajectories) {
+  int next = kBackground + 1;
+  for (const ObjectInfo& object : born) next = std::max(next, object.id + 1);
+  if (!trajectories.empty()) next = std::max(next, trajectories.rbegin()->first + 1);
+  return static_cast<InstanceId>(next);
+}
+
 std::unique_ptr<Associator> MakeAssociator(
     const PipelineConfig& config, const std::vector<ObjectInfo>& born,
     const std::map<InstanceId, std::map<int, Pose>>& trajectories) {
-  if (config.associate == AssociationMode::kGiven) return std::make_unique<GivenIds>();
-  int first = kBackground + 1;
-  for (const ObjectInfo& object : born) first = std::max(first, object.id + 1);
-  if (!trajectories.empty()) first = std::max(first, trajectories.rbegin()->first + 1);
-  return std::make_unique<VoxelVotes>(config.votes, static_cast<InstanceId>(first));
+  switch (config.associate) {
+    case AssociationMode::kGiven:
+      return std::make_unique<GivenIds>();
+    case AssociationMode::kVotes:
+      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories));
+  }
+  std::abort();
 }
 
 }  // namespace
@@ -77,6 +88,10 @@ Expected<void> PipelineConfig::Validate() const {
         "expected objects that are tracked, or given ids");
   }
   return {};
+}
+
+std::string NameOfUnlisted(InstanceId id) {
+  return id == kBackground ? "background" : fmt::format("object{}", id);
 }
 
 Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects)
@@ -152,11 +167,14 @@ std::vector<std::string> Pipeline::Remarks() const {
         farthest_m_, voxels * std::numeric_limits<float>::epsilon() / 2));
   }
   if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
-    remarks.push_back(
-        fmt::format("objects were to be tracked (--poses {}) and none was: no frame shows one of "
-                    "those that are "
-                    "({})",
-                    PoseSourceName(config_.poses), TrackChoiceName(tracked_.choice())));
+    const std::size_t seen = track_log_.objects().size();
+    const std::string_view which =
+        tracked_.choice() == TrackChoice::kAll ? "beside the background" : "that has a class";
+    remarks.push_back(fmt::format(
+        "objects were to be tracked (--poses {}) and none was: {}", PoseSourceName(config_.poses),
+        seen == 0 ? fmt::format("no frame shows an object {}", which)
+                  : fmt::format("frames show {} objects {}, of which none could be registered",
+                                seen, which)));
   }
   for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;
@@ -164,15 +182,26 @@ std::vector<std::string> Pipeline::Remarks() const {
 
 std::vector<ObjectInfo> Pipeline::Objects() const {
   std::vector<ObjectInfo> objects = objects_;
-  if (config_.associate == AssociationMode::kGiven) return objects;
-  const auto is_known = [&](InstanceId id) {
-    return std::any_of(objects.begin(), objects.end(),
-                       [id](const ObjectInfo& object) { return object.id == id; });
-  };
-  if (!is_known(kBackground)) objects.push_back({kBackground, "background", ""});
-  for (const InstanceId id : map_->Objects()) {
-    if (!is_known(id)) objects.push_back({id, fmt::format("object{}", id), ""});
+  const bool votes = config_.associate == AssociationMode::kVotes;
+  std::set<InstanceId> ids;
+  std::set<std::string> names;
+  for (const ObjectInfo& object : objects) {
+    ids.insert(object.id);
+    names.insert(object.name);
   }
+  if (votes && ids.insert(kBackground).second) {
+    objects.push_back({kBackground, NameOfUnlisted(kBackground), ""});
+  }
+  std::set<InstanceId> others;
+  for (const InstanceId id : map_->Objects()) others.insert(id);
+  for (const auto& [id, poses] : trajectories_) others.insert(id);
+  for (const InstanceId id : others) {
+    if (!ids.insert(id).second) continue;
+    std::string name = NameOfUnlisted(id);
+    while (!names.insert(name).second) name += "_";
+    objects.push_back({id, name, ""});
+  }
+  if (!votes) return objects;
   std::sort(objects.begin(), objects.end(),
             [](const ObjectInfo& a, const ObjectInfo& b) { return a.id < b.id; });
   for (ObjectInfo& object : objects) {

@@ -1,6 +1,6 @@
 // The mapping pipeline, a frame at a time (paper section III): segment, associate, track, update
 // poses, fuse. Each verb but the last two, which are the map's own, is an object behind an
-// interface of one function; PipelineConfig says which.
+// interface with one function that does it; PipelineConfig says which.
 #pragma once
 
 #include <map>
@@ -48,6 +48,9 @@ struct StepTimes {
   double Total_s() const { return segment_s + associate_s + track_s + update_poses_s + fuse_s; }
 };
 
+// The name of an object that nobody named: "background", or "object" and its id.
+std::string NameOfUnlisted(InstanceId id);
+
 class Pipeline {
  public:
   // `objects` are what the ids of the frames' masks stand for; none where those are of one frame
@@ -76,8 +79,10 @@ class Pipeline {
   // The objects of the pixels of the frame mapped last, as associated; empty before the first.
   const cv::Mat& labels() const { return labels_; }
 
-  // The objects of the map, by id, the background first: with given ids those that the pipeline was
-  // made with, with votes those that were born ("object1", ...), with the classes that segments
+  // The objects of the map. With given ids those that the pipeline was made with, and then those
+  // that masks showed besides, by id (NameOfUnlisted(), and underscores where another is named so).
+  // With votes those
+  // that were born ("object1", ...), by id, the background first, with the classes that segments
   // brought.
   std::vector<ObjectInfo> Objects() const;
 

@@ -1,6 +1,10 @@
 // Truth to reconstruction: completion, occlusion preservation, retention, hole area
 // (docs/sources.md, "Preservation and retention"). Nothing is aligned before: an object's samples
 // go to the world by its true pose.
+//
+// Occlusion preservation OP(t, tau): of an object's samples that were seen before and are hidden at
+// frame t, the share, by area, that the map has: surface of that object within tau that faces
+// within 60 degrees of the sample's way. The map is looked at after the movers were removed.
 #pragma once
 
 #include <array>

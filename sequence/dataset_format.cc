@@ -23,10 +23,14 @@ const char* DatasetFormatName(DatasetFormat format) {
 }
 
 const std::vector<DatasetFormat>& AllDatasetFormats() {
-  static const std::vector<DatasetFormat> all = {
-      DatasetFormat::kCofusion,   DatasetFormat::kTum,     DatasetFormat::kBop,
-      DatasetFormat::kKlg,        DatasetFormat::kScannet, DatasetFormat::kReplica,
-      DatasetFormat::kSevenScenes};
+  static const std::vector<DatasetFormat> all = [] {
+    std::vector<DatasetFormat> formats;
+    // What has no name is no format any more.
+    for (int i = 0; *DatasetFormatName(static_cast<DatasetFormat>(i)) != '\0'; ++i) {
+      formats.push_back(static_cast<DatasetFormat>(i));
+    }
+    return formats;
+  }();
   return all;
 }
 

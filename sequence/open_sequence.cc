@@ -63,17 +63,37 @@ bool LooksLike(const fs::path& path, DatasetFormat format) {
   return false;
 }
 
+// What LooksLike() looks for, in words.
+const char* MarksOf(DatasetFormat format) {
+  switch (format) {
+    case DatasetFormat::kCofusion:
+      return "calibration.txt and colour/";
+    case DatasetFormat::kTum:
+      return "rgb.txt and depth.txt";
+    case DatasetFormat::kBop:
+      return "scene_camera.json";
+    case DatasetFormat::kKlg:
+      return "a .klg";
+    case DatasetFormat::kScannet:
+      return "color/, depth/ and pose/";
+    case DatasetFormat::kReplica:
+      return "traj.txt and results/";
+    case DatasetFormat::kSevenScenes:
+      return "frame-*.depth.png";
+  }
+  return "";
+}
+
 Expected<DatasetFormat> DetectFormat(const fs::path& path) {
   const std::vector<DatasetFormat> fitting = DetectFormats(path);
   if (fitting.size() == 1) return fitting.front();
   if (fitting.empty()) {
-    return DataError(
-        "{}: not a sequence; expected calibration.txt and colour/ (cofusion), rgb.txt and "
-        "depth.txt "
-        "(tum), scene_camera.json (bop), a .klg (klg), color/, depth/ and pose/ (scannet), "
-        "traj.txt "
-        "and results/ (replica), or frame-*.depth.png (7scenes)",
-        path.string());
+    std::string marks;
+    for (const DatasetFormat format : AllDatasetFormats()) {
+      if (!marks.empty()) marks += format == AllDatasetFormats().back() ? ", or " : ", ";
+      marks += fmt::format("{} ({})", MarksOf(format), DatasetFormatName(format));
+    }
+    return DataError("{}: not a sequence; expected {}", path.string(), marks);
   }
   std::string names;
   for (const DatasetFormat format : fitting) {

@@ -237,7 +237,8 @@ Expected<SequenceRecord> ReadSequenceJson(const std::filesystem::path& path) {
     }
     return record;
   } catch (const std::exception& exception) {
-    return DataError("{}: a field is missing or of another type ({})", file, exception.what());
+    return DataError("{}: a field is missing or of another type ({})", file,
+                     WithoutTag(exception.what()));
   }
 }
 

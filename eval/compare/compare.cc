@@ -61,6 +61,12 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
                                                             const SequenceInfo& info,
                                                             const SceneTruth& truth) {
   std::vector<std::unique_ptr<CompareRun>> runs;
+  if (!info.mask_ids_are_objects && AssociationOf(config, info) == AssociationMode::kGiven) {
+    return UsageError(
+        "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
+        "--associate votes",
+        info.name);
+  }
   for (const PoseSource poses : config.poses) {
     for (const std::string& profile : config.profiles) {
       for (const Method method : config.methods) {
@@ -298,7 +304,7 @@ class FrameWalk {
         if (run.IdOf(id) != kNoInstance) copy->Remove(run.IdOf(id));
       }
       SequenceInfo info = result_.info;
-      if (votes) info.objects = run.pipeline.Objects();
+      info.objects = run.pipeline.Objects();
       TSDFPP_RETURN_IF_ERROR(WriteMap(*copy, run.pipeline, info, out_ / run.FolderName()));
     }
     DropMeshes(evaluation);

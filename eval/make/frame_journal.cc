@@ -7,6 +7,7 @@
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/json_text.h"
+#include "core/one_line.h"
 #include "core/pose_text.h"
 
 namespace tsdfpp {
@@ -72,7 +73,7 @@ Expected<JournalEntry> FrameJournal::Read(int index) const {
   try {
     return FromJson(json);
   } catch (const std::exception& exception) {
-    return DataError("{}: not a frame's entry ({})", path.string(), exception.what());
+    return DataError("{}: not a frame's entry ({})", path.string(), WithoutTag(exception.what()));
   }
 }
 

@@ -118,6 +118,21 @@ std::vector<fs::path> FilesIn(const fs::path& folder, std::error_code& failure) 
   return files;
 }
 
+// Removes a folder of folders alone, which stands where a file goes: a rename would fail.
+void RemoveFolders(const fs::path& folder) {
+  std::error_code failure;
+  if (!fs::is_directory(fs::symlink_status(folder, failure))) return;
+  std::vector<fs::path> folders{folder};
+  for (fs::recursive_directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    folders.push_back(entry->path());
+  }
+  // The inner ones first. What is no folder, or has something in it, stays.
+  for (auto inner = folders.rbegin(); inner != folders.rend(); ++inner) {
+    if (fs::is_directory(fs::symlink_status(*inner, failure))) fs::remove(*inner, failure);
+  }
+}
+
 Expected<void> MoveTo(const fs::path& from, const fs::path& to) {
   std::error_code failure;
   fs::rename(from, to, failure);
@@ -210,7 +225,7 @@ Expected<void> RunFolder::CheckPlaces(std::set<std::string> files) const {
       }
     }
     if (!fs::is_directory(fs::symlink_status(out_ / name, failure))) continue;
-    // A folder of the old run's files alone goes with them.
+    // A folder of the old run's files alone goes with them, and one without files.
     for (const fs::path& file : FilesIn(out_ / name, failure)) {
       if (!old.contains(file.lexically_relative(out_).string())) {
         return UsageError("{}: is a folder with files in it, expected a file or nothing",
@@ -233,6 +248,7 @@ Expected<void> RunFolder::MoveFiles(const std::set<std::string>& old) const {
       return EnvironmentError("{}: the folder cannot be made ({})", to.parent_path().string(),
                               failure.message());
     }
+    RemoveFolders(to);
     TSDFPP_RETURN_IF_ERROR(MoveTo(staging_ / name, to));
   }
   return {};

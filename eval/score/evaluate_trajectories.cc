@@ -45,13 +45,8 @@ nlohmann::json SummaryJson(const std::optional<ErrorSummary>& summary) {
           {"max", summary->largest}};
 }
 
-}  // namespace
-
-Expected<TrajectoryEvaluation> EvaluateTrajectories(const fs::path& folder,
-                                                    const std::vector<ObjectInfo>& objects,
-                                                    const std::vector<PartMatch>& matches,
-                                                    const std::map<InstanceId, Trajectory>& truth,
-                                                    const Trajectory& camera) {
+// The folder's trajectories, by name.
+Expected<std::vector<fs::path>> ListTrajectories(const fs::path& folder) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) {
     return UsageError("--trajectories {}: no such folder", folder.string());
@@ -67,23 +62,63 @@ Expected<TrajectoryEvaluation> EvaluateTrajectories(const fs::path& folder,
   if (files.empty()) {
     return DataError("{}: holds no trajectory, expected <name>-<id>.txt", folder.string());
   }
+  return files;
+}
 
+Expected<PosePairs> PairsOf(const fs::path& file, const Trajectory& estimate,
+                            const Trajectory& truth) {
+  PosePairs pairs = PairByFrame(estimate, truth);
+  if (pairs.size() > 0) return pairs;
+  return DataError("{}: has no frame in common with the sequence's, expected frame numbers",
+                   file.string());
+}
+
+Expected<void> ScoreCamera(const fs::path& file, const Trajectory& estimate,
+                           const Trajectory& camera, TrajectoryEvaluation& out) {
+  TSDFPP_ASSIGN(const PosePairs pairs, PairsOf(file, estimate, camera));
+  out.camera_m = SummariseErrors(TranslationErrors_m(pairs));
+  std::vector<double> degrees = RotationErrors_rad(pairs);
+  for (double& angle : degrees) angle *= 180 / M_PI;
+  out.camera_deg = SummariseErrors(degrees);
+  return {};
+}
+
+struct ObjectEstimate {
+  fs::path file;
+  Trajectory poses;
+};
+
+// `camera_estimate`: the camera as the mapper has it, where it wrote that, else as it is.
+Expected<void> ScoreObject(InstanceId id, const ObjectEstimate& estimate, const Trajectory& truth,
+                           const Trajectory& camera_estimate, const Trajectory& camera,
+                           TrajectoryEvaluation& out) {
+  TSDFPP_ASSIGN(const PosePairs pairs, PairsOf(estimate.file, estimate.poses, truth));
+  const int first = pairs.frames.front();
+  if (!camera_estimate.contains(first) || !camera.contains(first)) {
+    return DataError("{}: begins at frame {}, of which there is no camera pose",
+                     estimate.file.string(), first);
+  }
+  out.objects[id] =
+      ScoreObjectTrajectory(estimate.poses, truth, camera_estimate.at(first), camera.at(first));
+  return {};
+}
+
+}  // namespace
+
+Expected<TrajectoryEvaluation> EvaluateTrajectories(const fs::path& folder,
+                                                    const std::vector<ObjectInfo>& objects,
+                                                    const std::vector<PartMatch>& matches,
+                                                    const std::map<InstanceId, Trajectory>& truth,
+                                                    const Trajectory& camera) {
+  TSDFPP_ASSIGN(const std::vector<fs::path> files, ListTrajectories(folder));
   TrajectoryEvaluation out;
   Trajectory camera_estimate = camera;
-  std::map<InstanceId, std::pair<fs::path, Trajectory>> estimates;
+  std::map<InstanceId, ObjectEstimate> estimates;
   for (const fs::path& file : files) {
     TSDFPP_ASSIGN(Trajectory estimate, ReadTrajectory(file));
     const std::string stem = file.stem().string();
     if (stem == kCamera) {
-      const PosePairs pairs = PairByFrame(estimate, camera);
-      if (pairs.size() == 0) {
-        return DataError("{}: has no frame in common with the sequence's, expected frame numbers",
-                         file.string());
-      }
-      out.camera_m = SummariseErrors(TranslationErrors_m(pairs));
-      std::vector<double> degrees = RotationErrors_rad(pairs);
-      for (double& angle : degrees) angle *= 180 / M_PI;
-      out.camera_deg = SummariseErrors(degrees);
+      TSDFPP_RETURN_IF_ERROR(ScoreCamera(file, estimate, camera, out));
       camera_estimate = std::move(estimate);
       continue;
     }
@@ -93,33 +128,21 @@ Expected<TrajectoryEvaluation> EvaluateTrajectories(const fs::path& folder,
           fmt::format("{}: is of no object of the sequence and is left out", file.string()));
       continue;
     }
-    if (!estimates.emplace(id, std::pair(file, std::move(estimate))).second) {
+    if (!estimates.emplace(id, ObjectEstimate{file, std::move(estimate)}).second) {
       return DataError("{}: is of object {}, as is {}", file.string(), id,
-                       estimates.at(id).first.string());
+                       estimates.at(id).file.string());
     }
   }
   for (const auto& [id, estimate] : estimates) {
     const auto true_one = truth.find(id);
-    if (true_one == truth.end()) {
+    if (true_one != truth.end()) {
+      TSDFPP_RETURN_IF_ERROR(
+          ScoreObject(id, estimate, true_one->second, camera_estimate, camera, out));
+    } else if (id != kBackground) {
       // The background has no pose; whoever writes one says nothing wrong.
-      if (id != kBackground) {
-        out.remarks.push_back(
-            fmt::format("{}: the sequence has no pose of object {}", estimate.first.string(), id));
-      }
-      continue;
+      out.remarks.push_back(
+          fmt::format("{}: the sequence has no pose of object {}", estimate.file.string(), id));
     }
-    const PosePairs pairs = PairByFrame(estimate.second, true_one->second);
-    if (pairs.size() == 0) {
-      return DataError("{}: has no frame in common with the sequence's, expected frame numbers",
-                       estimate.first.string());
-    }
-    const int first = pairs.frames.front();
-    if (!camera_estimate.contains(first) || !camera.contains(first)) {
-      return DataError("{}: begins at frame {}, of which there is no camera pose",
-                       estimate.first.string(), first);
-    }
-    out.objects[id] = ScoreObjectTrajectory(estimate.second, true_one->second,
-                                            camera_estimate.at(first), camera.at(first));
   }
   return out;
 }

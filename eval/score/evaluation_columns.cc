@@ -54,14 +54,20 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.preservation_behind_other;
        }},
-      {"retention", "table_retention_behind_other", "retention of the hidden table", "",
-       Better::kHigher, 3,
+      {"retention",
+       "table_retention_behind_other",
+       "retention of the hidden table",
+       "",
+       Better::kHigher,
+       3,
        "the same over the share that was reconstructed when an evaluation last "
        "saw those samples: it isolates forgetting from never having mapped; "
        "above 1 where the map gained. Empty until such samples exist",
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.retention_behind_other;
-       }},
+       },
+       {},
+       true},
       {"hole cm2", "table_hole_area_cm2", "hole in the table", "cm²", Better::kLower, 0,
        "(1 - kept) x the area hidden behind another object",
        [](const Movers&, const Evaluation& e) {

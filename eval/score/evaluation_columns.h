@@ -36,6 +36,8 @@ struct EvaluationColumn {
   // Its standard error, of sampling alone, in the same unit; empty where none is known. In
   // frames.csv the column after it, with "_se" after its name.
   std::function<Measured(const Evaluation&)> error = {};
+  // Of what has no unit: a share ends at 1, and results above are refused; a ratio does not.
+  bool can_exceed_one = false;
 };
 
 const std::vector<EvaluationColumn>& EvaluationColumns();

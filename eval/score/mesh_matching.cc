@@ -39,6 +39,7 @@ PartOverlap Measure(const TriangleMesh& part, const SceneTruth& truth, double re
     const std::vector<std::size_t>& here = near[one.surface->id()];
     const Pose T_OW = one.T_WO.inverse();
     std::vector<Eigen::Vector3f> points_O;
+    points_O.reserve(here.size());
     for (const std::size_t i : here) {
       points_O.push_back((T_OW * samples.points[i].cast<double>()).cast<float>());
     }
@@ -94,6 +95,77 @@ void RemarkOnWhole(const std::string& source, const PartOverlap& whole, double r
   }
 }
 
+struct Largest {
+  InstanceId id = kNoInstance;
+  double area_m2 = 0;
+};
+
+// The object on which most of a part lies.
+Largest LargestOf(const PartOverlap& overlap) {
+  Largest best;
+  for (const auto& [id, area] : overlap.area_of) {
+    if (area > best.area_m2) best.id = id;
+    best.area_m2 = std::max(best.area_m2, area);
+  }
+  return best;
+}
+
+// The object that a part is, or nullptr; says in `match` how it was found.
+const ObjectInfo* ObjectOf(PartMatch& match, const PartOverlap& overlap, const Largest& best,
+                           const std::vector<ObjectInfo>& objects, MatchMode mode) {
+  if (mode == MatchMode::kNames) {
+    const ObjectInfo* named = Named(match.part, objects, match.how);
+    if (named != nullptr) return named;
+    // A label that says "no object" is believed, too.
+    if (match.part.id == kNoInstance && match.part.name.empty()) return nullptr;
+  }
+  if (!(best.area_m2 >= kLeastShare * overlap.area_m2)) return nullptr;
+  const ObjectInfo* object = Find(objects, best.id);
+  if (object != nullptr) match.how = "overlap";
+  return object;
+}
+
+// Matches one part, and remarks on a name that speaks against where the part lies.
+PartMatch MatchOf(const ScenePart& part, const PartOverlap& overlap,
+                  const std::vector<ObjectInfo>& objects, MatchMode mode,
+                  std::vector<std::string>& remarks) {
+  const Largest best = LargestOf(overlap);
+  PartMatch match{part, kNoInstance, "", "nothing", overlap.area_m2, {}};
+  const ObjectInfo* object = ObjectOf(match, overlap, best, objects, mode);
+  if (object != nullptr) {
+    match.object = object->id;
+    match.object_name = object->name;
+  }
+  const auto own = overlap.area_of.find(object != nullptr ? object->id : best.id);
+  const double own_area = own == overlap.area_of.end() ? 0 : own->second;
+  match.share = overlap.area_m2 > 0 ? Measured::Of(own_area / overlap.area_m2)
+                                    : Measured::Undefined("its faces have no area");
+  if (object != nullptr && match.how != "overlap" && best.id != object->id &&
+      best.area_m2 > overlap.area_m2 / 2 && own_area < kLeastShare * overlap.area_m2) {
+    const ObjectInfo* other = Find(objects, best.id);
+    remarks.push_back(fmt::format(
+        "{} counts as {} ({}), but {:.0f} % of it lies on {} ({}). If names and labels are the "
+        "mapper's own, give --match overlap",
+        match.part.source, object->name, object->id, 100 * best.area_m2 / overlap.area_m2,
+        other == nullptr ? "an object without a name" : other->name, best.id));
+  }
+  return match;
+}
+
+// Objects that the sequence has shown and that no part is.
+void RemarkOnMissing(const std::string& source, const SceneTruth& truth,
+                     const std::vector<ObjectInfo>& objects, MatchedScene& out) {
+  for (const SeenTracker& tracker : truth.trackers()) {
+    const bool there =
+        std::any_of(out.matches.begin(), out.matches.end(),
+                    [&](const PartMatch& match) { return match.object == tracker.id(); });
+    const ObjectInfo* object = Find(objects, tracker.id());
+    if (there || object == nullptr) continue;
+    out.remarks.push_back(
+        fmt::format("{}: nothing of it is {} ({})", source, object->name, object->id));
+  }
+}
+
 }  // namespace
 
 Expected<MatchMode> MatchModeFromName(const std::string& name) {
@@ -115,53 +187,10 @@ MatchedScene MatchScene(const LoadedScene& scene, const SceneTruth& truth,
     whole.near_m2 += overlap.near_m2;
     whole.away_m2 += overlap.away_m2;
     whole.nearest_m = std::min(whole.nearest_m, overlap.nearest_m);
-    InstanceId best = kNoInstance;
-    double best_area = 0;
-    for (const auto& [id, area] : overlap.area_of) {
-      if (area > best_area) best = id;
-      best_area = std::max(best_area, area);
-    }
-    PartMatch match{scene.parts[p], kNoInstance, "", "nothing", overlap.area_m2, {}};
-    const ObjectInfo* object =
-        mode == MatchMode::kNames ? Named(match.part, objects, match.how) : nullptr;
-    // A label that says "no object" is believed, too.
-    const bool none =
-        mode == MatchMode::kNames && match.part.id == kNoInstance && match.part.name.empty();
-    if (object == nullptr && !none && best_area >= kLeastShare * overlap.area_m2) {
-      object = Find(objects, best);
-      if (object != nullptr) match.how = "overlap";
-    }
-    if (object != nullptr) {
-      match.object = object->id;
-      match.object_name = object->name;
-    }
-    const auto own = overlap.area_of.find(object != nullptr ? object->id : best);
-    const double own_area = own == overlap.area_of.end() ? 0 : own->second;
-    match.share = overlap.area_m2 > 0 ? Measured::Of(own_area / overlap.area_m2)
-                                      : Measured::Undefined("its faces have no area");
-    if (object != nullptr && match.how != "overlap" && best != object->id &&
-        best_area > overlap.area_m2 / 2 && own_area < kLeastShare * overlap.area_m2) {
-      const ObjectInfo* other = Find(objects, best);
-      out.remarks.push_back(fmt::format(
-          "{} counts as {} ({}), but {:.0f} % of it lies on {} ({}). If names and labels are the "
-          "mapper's own, give --match overlap",
-          match.part.source, object->name, object->id, 100 * best_area / overlap.area_m2,
-          other == nullptr ? "an object without a name" : other->name, best));
-    }
-    out.matches.push_back(std::move(match));
+    out.matches.push_back(MatchOf(scene.parts[p], overlap, objects, mode, out.remarks));
   }
   RemarkOnWhole(scene.source, whole, reach_m, out.remarks);
-  if (!scene.parts.empty()) {
-    for (const SeenTracker& tracker : truth.trackers()) {
-      const bool there =
-          std::any_of(out.matches.begin(), out.matches.end(),
-                      [&](const PartMatch& match) { return match.object == tracker.id(); });
-      const ObjectInfo* object = Find(objects, tracker.id());
-      if (there || object == nullptr) continue;
-      out.remarks.push_back(
-          fmt::format("{}: nothing of it is {} ({})", scene.source, object->name, object->id));
-    }
-  }
+  if (!scene.parts.empty()) RemarkOnMissing(scene.source, truth, objects, out);
   out.mesh = scene.mesh;
   for (InstanceId& label : out.mesh.face_ids) label = out.matches[label].object;
   return out;

@@ -116,6 +116,10 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     TSDFPP_RETURN_IF_ERROR(CheckPlainName(recorded.id, where + ": a cell"));
     const json& cell = results->at("cells").at(recorded.id);
     TSDFPP_ASSIGN(recorded.settings, SettingsFromJson(cell.at("settings")));
+    if (const auto map = recorded.settings.Pipeline(); !map) {
+      return DataError("{}: a field is missing or wrong (cell {}: {})", where, recorded.id,
+                       map.error().message);
+    }
     const json& sequence = results->at("sequences").at(cell.at("sequence").get<std::string>());
     TSDFPP_ASSIGN(const fs::path scene,
                   DataFolder(folder).Find(sequence.at("scene").get<std::string>()));

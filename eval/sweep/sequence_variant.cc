@@ -12,6 +12,7 @@
 #include "sequence/sequence_json.h"
 #include "sim/load_scene.h"
 #include "sim/scene/scene_inputs.h"
+#include "sim/sensor/mask_faults.h"
 
 namespace tsdfpp {
 namespace {
@@ -56,6 +57,12 @@ Expected<void> SetSensor(const CellSettings& settings, SensorConfig& sensor) {
                           drift.camera_pose.drift_deg * settings.camera_error,
                           drift.camera_pose.jitter_m * settings.camera_error,
                           drift.camera_pose.jitter_deg * settings.camera_error};
+  }
+  if (DrawsEveryId(sensor.masks)) {
+    return UsageError(
+        "its sensor draws the ids of masks anew in every frame, and experiments take them for "
+        "those "
+        "of objects: expected another sensor; `tsdfpp compare` associates them by votes");
   }
   return ValidateSensorConfig(sensor);
 }

@@ -163,12 +163,14 @@ Expected<SweepPlan> PlanSweep(const ExperimentConfig& config) {
   VariantMaker maker(config.file.parent_path(), config.frames);
   std::vector<std::pair<PlannedCell, SequenceVariant>> planned;
   for (PlannedCell& cell : CellsOf(config)) {
+    const auto in_grid = [&](const Error& error) {
+      return tl::unexpected(Error{error.kind, fmt::format("{}: grid '{}': {}", config.file.string(),
+                                                          cell.grid, error.message)});
+    };
+    // Each value is sound by itself; together they may not be.
+    if (const auto map = cell.settings.Pipeline(); !map) return in_grid(map.error());
     auto variant = maker.Make(cell.settings);
-    if (!variant) {
-      return tl::unexpected(
-          Error{variant.error().kind, fmt::format("{}: grid '{}': {}", config.file.string(),
-                                                  cell.grid, variant.error().message)});
-    }
+    if (!variant) return in_grid(variant.error());
     planned.emplace_back(std::move(cell), std::move(*variant));
   }
   TSDFPP_ASSIGN(plan.renderer, AskForRenderer());

@@ -94,7 +94,7 @@ const std::vector<SweepMetric>& SweepMetrics() {
     std::vector<SweepMetric> all;
     for (const EvaluationColumn& column : EvaluationColumns()) {
       all.push_back({column.csv, column.title, column.words, column.unit, column.better,
-                     column.decimals, column.definition});
+                     column.decimals, column.definition, column.can_exceed_one});
     }
     for (const RunMetric& of_run : RunMetrics()) all.push_back(of_run.metric);
     return all;
@@ -103,9 +103,7 @@ const std::vector<SweepMetric>& SweepMetrics() {
 }
 
 std::optional<double> MostOf(const SweepMetric& metric) {
-  // Retention is relative to an earlier score, which a map can exceed.
-  const bool share = metric.unit.empty() && metric.name.find("retention") == std::string::npos;
-  return share ? std::optional(1.0) : std::nullopt;
+  return metric.unit.empty() && !metric.can_exceed_one ? std::optional(1.0) : std::nullopt;
 }
 
 const SweepMetric* FindMetric(std::string_view name) {

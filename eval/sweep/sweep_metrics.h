@@ -26,7 +26,8 @@ struct SweepMetric {
   std::string unit;   // empty: a share or a count
   Direction better;
   int decimals;
-  std::string definition;  // as docs/metrics.md prints it
+  std::string definition;       // as docs/metrics.md prints it
+  bool can_exceed_one = false;  // of what has no unit
 };
 
 // Those of an evaluation first, in the order of EvaluationColumns().

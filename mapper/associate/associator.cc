@@ -1,5 +1,7 @@
 #include "mapper/associate/associator.h"
 
+#include <cstdlib>
+
 namespace tsdfpp {
 
 Expected<AssociationMode> AssociationModeFromName(std::string_view name) {
@@ -9,7 +11,13 @@ Expected<AssociationMode> AssociationModeFromName(std::string_view name) {
 }
 
 std::string_view AssociationModeName(AssociationMode mode) {
-  return mode == AssociationMode::kGiven ? "given" : "votes";
+  switch (mode) {
+    case AssociationMode::kGiven:
+      return "given";
+    case AssociationMode::kVotes:
+      return "votes";
+  }
+  std::abort();
 }
 
 }  // namespace tsdfpp

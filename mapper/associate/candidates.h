@@ -16,6 +16,10 @@ namespace tsdfpp {
 // points are in a cell of that one's points, or in one beside it.
 class Candidates {
  public:
+  // Far more than a scene shows at a time: they bound what a frame of very many segments costs.
+  static constexpr std::size_t kMostCandidates = 1000;
+  static constexpr std::size_t kMostPairs = 16;
+
   // The config must be valid.
   Candidates(const VoteConfig& config, double voxel_m);
 
@@ -24,7 +28,8 @@ class Candidates {
   // or more, in confirm_frames of the last confirm_window frames. Who is confirmed is a candidate
   // no longer, and who cannot be any more is forgotten. A candidate is one segment of a frame at
   // most: pairs with the greatest overlap (that share times the share of the candidate's cells that
-  // are near the segment's) are made first.
+  // are near the segment's) are made first, and of a segment's only the kMostPairs greatest are
+  // looked at. While there are kMostCandidates, no segment becomes a further one.
   std::vector<bool> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W);
 
   std::size_t size() const { return candidates_.size(); }
@@ -34,11 +39,23 @@ class Candidates {
     std::deque<int> seen;       // frames, within the window
     std::vector<Index3> cells;  // of the points that it showed last, sorted
   };
+  struct CellOfCandidate {
+    Index3 cell;
+    std::size_t candidate = 0;
+    bool operator<(const CellOfCandidate& other) const {
+      return cell == other.cell ? candidate < other.candidate : cell < other.cell;
+    }
+  };
+  struct Pair {
+    double overlap = 0;
+    std::size_t segment = 0;
+    std::size_t candidate = 0;
+  };
+  static bool OverlapsMore(const Pair& a, const Pair& b) { return a.overlap > b.overlap; }
   std::vector<Index3> CellsOf(const std::vector<Eigen::Vector3d>& points_W) const;
-  double ShareNear(const std::vector<Eigen::Vector3d>& points_W,
-                   const std::vector<Index3>& cells) const;
-  // Whether the cell or one beside it is among `cells`.
-  static bool IsNear(const Index3& cell, const std::vector<Index3>& cells);
+  // The candidates that a segment can be, at most kMostPairs; `index` has all cells, sorted.
+  std::vector<Pair> PairsOf(std::size_t segment, const std::vector<Eigen::Vector3d>& points_W,
+                            const std::vector<CellOfCandidate>& index) const;
 
   VoteConfig config_;
   double cell_m_;

@@ -34,6 +34,23 @@ float DistanceFromObserved(const VoxelReader& reader, const Eigen::Vector3d& q) 
   return known >= kLeastKnown ? std::abs(sum / known) : kUnknown;
 }
 
+// Around the points whose eight voxels are not all outside of the blocks.
+Eigen::AlignedBox3d BoxOf(const VoxelReader& reader, const Pose& T_WL, double voxel_m) {
+  Eigen::AlignedBox3d box;
+  if (reader.empty()) return box;
+  const auto corner = [](const Index3& block) -> Eigen::Vector3d {
+    return Eigen::Vector3d(block.x, block.y, block.z) * kBlockSide;
+  };
+  const Eigen::AlignedBox3d of_blocks(
+      corner(reader.low()) - Eigen::Vector3d::Ones(),
+      corner(reader.high()) + Eigen::Vector3d::Constant(kBlockSide));
+  for (int i = 0; i < 8; ++i) {
+    const auto at = static_cast<Eigen::AlignedBox3d::CornerType>(i);
+    box.extend(T_WL * (voxel_m * of_blocks.corner(at)));
+  }
+  return box;
+}
+
 }  // namespace
 
 ObjectLookup::ObjectLookup(const MapRepresentation& map)
@@ -44,34 +61,55 @@ ObjectLookup::ObjectLookup(const MapRepresentation& map)
   std::erase(ids_, kBackground);
   std::erase_if(
       ids_, [&](InstanceId id) { return voxels_ == nullptr || voxels_->GridOf(id) == nullptr; });
+  const auto add_place = [&](InstanceId id, const Pose& T_WL) {
+    VoxelReader reader(*voxels_->GridOf(id));
+    const Eigen::AlignedBox3d box_W = BoxOf(reader, T_WL, voxel_m_);
+    places_.push_back({std::move(reader), T_WL.inverse(), box_W});
+  };
   if (one_field_ && !ids_.empty()) {
-    places_.push_back({VoxelReader(*voxels_->GridOf(ids_.front())), Pose::Identity()});
+    add_place(ids_.front(), Pose::Identity());
     return;
   }
-  for (const InstanceId id : ids_) {
-    places_.push_back({VoxelReader(*voxels_->GridOf(id)), map.ObjectLattice(id).inverse()});
-  }
+  for (const InstanceId id : ids_) add_place(id, map.ObjectLattice(id));
 }
 
-void ObjectLookup::Distances(const Eigen::Vector3d& p_W, std::vector<float>& distances) const {
-  distances.assign(ids_.size(), kUnknown);
-  if (ids_.empty()) return;
+std::vector<std::size_t> ObjectLookup::Around(const std::vector<Eigen::Vector3d>& points_W) const {
+  Eigen::AlignedBox3d box_W;
+  for (const Eigen::Vector3d& p_W : points_W) box_W.extend(p_W);
+  // A voxel more, for rounding.
+  const Eigen::Vector3d rim = Eigen::Vector3d::Constant(voxel_m_);
+  const Eigen::AlignedBox3d wide_W(box_W.min() - rim, box_W.max() + rim);
+  std::vector<std::size_t> objects;
+  for (std::size_t i = 0; i < ids_.size(); ++i) {
+    if (one_field_ || wide_W.intersects(places_[i].box_W)) objects.push_back(i);
+  }
+  return objects;
+}
+
+void ObjectLookup::Distances(const Eigen::Vector3d& p_W, std::span<const std::size_t> objects,
+                             std::vector<Distance>& distances) const {
+  distances.clear();
+  if (objects.empty()) return;
   const auto at = [&](const Place& place) {
     const Eigen::Vector3d q = place.T_LW * p_W / voxel_m_;
     return DistanceFromObserved(place.reader, q) / static_cast<float>(voxel_m_);
   };
   if (!one_field_) {
-    for (std::size_t i = 0; i < ids_.size(); ++i) distances[i] = at(places_[i]);
+    for (const std::size_t i : objects) {
+      const float voxels = at(places_[i]);
+      if (voxels != kUnknown) distances.push_back({i, voxels});
+    }
     return;
   }
-  const float distance = at(places_.front());
-  if (distance == kUnknown) return;
+  const float voxels = at(places_.front());
+  if (voxels == kUnknown) return;
   const Index3 nearest = FloorOf(p_W / voxel_m_ + Eigen::Vector3d::Constant(0.5));
   const std::vector<Listing> list = voxels_->ListAt({nearest.x, nearest.y, nearest.z});
   if (list.empty()) return;
   const auto of = std::lower_bound(ids_.begin(), ids_.end(), list.front().id);
   if (of == ids_.end() || *of != list.front().id) return;
-  distances[static_cast<std::size_t>(of - ids_.begin())] = distance;
+  const auto i = static_cast<std::size_t>(of - ids_.begin());
+  if (std::binary_search(objects.begin(), objects.end(), i)) distances.push_back({i, voxels});
 }
 
 }  // namespace tsdfpp

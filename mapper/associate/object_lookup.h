@@ -1,6 +1,7 @@
 // How far points are from the surfaces of a map's objects: all that association asks of a map.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "core/types.h"
@@ -21,16 +22,25 @@ class ObjectLookup {
   // The map's objects that have a volume (none of a map without voxels), but the background, by id.
   const std::vector<InstanceId>& ids() const { return ids_; }
 
-  // The distances of a point of the world's frame to the surfaces of ids(), in voxels without sign,
-  // each at the object's last pose; infinity where the object's volume says nothing there. They are
-  // interpolated between those of the eight voxels around the point that are observed, which must
-  // make up half of the coefficients.
-  void Distances(const Eigen::Vector3d& p_W, std::vector<float>& distances) const;
+  // Which of ids() may have a surface where one of the points is, all of the world's frame.
+  std::vector<std::size_t> Around(const std::vector<Eigen::Vector3d>& points_W) const;
+
+  struct Distance {
+    std::size_t object = 0;  // of ids()
+    float voxels = 0;        // without sign
+  };
+
+  // The distances of a point to the surfaces of those objects (some of ids(), increasing) that say
+  // something there, each at its last pose. They are interpolated between those of the eight voxels
+  // around the point that are observed, which must make up half of the coefficients.
+  void Distances(const Eigen::Vector3d& p_W, std::span<const std::size_t> objects,
+                 std::vector<Distance>& distances) const;
 
  private:
   struct Place {
     VoxelReader reader;
     Pose T_LW;
+    Eigen::AlignedBox3d box_W;  // around all points that it can say something about
   };
 
   const VoxelInspection* voxels_;

@@ -9,6 +9,8 @@ namespace tsdfpp {
 namespace {
 
 constexpr std::size_t kIds = std::size_t{kNoInstance} + 1;
+// No voxel is farther out.
+constexpr double kFarthest_voxels = double{kBlockSide} * (kFurthestBlock + 1);
 
 Eigen::Vector3d PointOf(const Frame& frame, int pixel) {
   const int v = pixel / frame.depth.cols;
@@ -29,8 +31,8 @@ VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id) : config_(
   state_.next_id = first_id;
 }
 
-std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
-                                                          const cv::Mat& ids) const {
+std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame, const cv::Mat& ids,
+                                                          double voxel_m) const {
   std::vector<std::vector<int>> pixels(kIds);
   std::vector<bool> is_there(kIds);
   for (int v = 0; v < ids.rows; ++v) {
@@ -51,7 +53,10 @@ std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
     const std::size_t all = segment.pixels.size();
     const std::size_t count = std::min(all, static_cast<std::size_t>(config_.max_points));
     for (std::size_t i = 0; i < count; ++i) {
-      segment.points_W.push_back(PointOf(frame, segment.pixels[i * all / count]));
+      const Eigen::Vector3d p_W = PointOf(frame, segment.pixels[i * all / count]);
+      // Beyond all voxels: CheckReach() refuses the frame, or the segment is of no use.
+      if (!(p_W.cwiseAbs().maxCoeff() < kFarthest_voxels * voxel_m)) continue;
+      segment.points_W.push_back(p_W);
     }
     segments.push_back(std::move(segment));
   }
@@ -59,19 +64,28 @@ std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
 }
 
 void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const {
-  segment.at.assign(lookup.ids().size(), 0);
-  segment.near.assign(lookup.ids().size(), 0);
-  std::vector<float> distances;
+  const std::vector<std::size_t> around = lookup.Around(segment.points_W);
+  if (around.empty()) return;
+  std::vector<Votes> counts(around.size());
+  for (std::size_t i = 0; i < around.size(); ++i) counts[i].object = around[i];
+  std::vector<ObjectLookup::Distance> distances;
   for (const Eigen::Vector3d& p_W : segment.points_W) {
-    lookup.Distances(p_W, distances);
-    const auto nearest = std::min_element(distances.begin(), distances.end());
-    if (nearest == distances.end()) return;
-    if (*nearest <= config_.at_voxels) {
-      ++segment.at[static_cast<std::size_t>(nearest - distances.begin())];
+    lookup.Distances(p_W, around, distances);
+    Votes* nearest = nullptr;
+    float least = 0;
+    for (const auto& [object, voxels] : distances) {
+      const auto place = std::lower_bound(around.begin(), around.end(), object) - around.begin();
+      Votes& votes = counts[static_cast<std::size_t>(place)];
+      if (voxels <= config_.near_voxels) ++votes.near;
+      if (nearest == nullptr ? voxels <= config_.at_voxels : voxels < least) {
+        nearest = &votes;
+        least = voxels;
+      }
     }
-    for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] <= config_.near_voxels) ++segment.near[i];
-    }
+    if (nearest != nullptr) ++nearest->at;
+  }
+  for (const Votes& votes : counts) {
+    if (votes.at > 0 || votes.near > 0) segment.votes.push_back(votes);
   }
 }
 
@@ -79,10 +93,11 @@ void VoxelVotes::Claim(const ObjectLookup& lookup, std::vector<Segment>& segment
   tbb::parallel_for(std::size_t{0}, segments.size(),
                     [&](std::size_t s) { CountVotes(lookup, segments[s]); });
   for (Segment& segment : segments) {
-    const auto most = std::max_element(segment.at.begin(), segment.at.end());
-    if (most == segment.at.end()) continue;
-    if (IsShare(*most, config_.min_share, segment.points_W.size())) {
-      segment.object = static_cast<std::size_t>(most - segment.at.begin());
+    const auto most = std::max_element(segment.votes.begin(), segment.votes.end(),
+                                       [](const Votes& a, const Votes& b) { return a.at < b.at; });
+    if (most == segment.votes.end()) continue;
+    if (IsShare(most->at, config_.min_share, segment.points_W.size())) {
+      segment.object = most->object;
     }
   }
 }
@@ -100,15 +115,15 @@ void VoxelVotes::ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& se
   std::vector<Pair> pairs;
   for (Segment& segment : segments) {
     if (segment.object) continue;
-    for (std::size_t o = 0; o < lookup.ids().size(); ++o) {
-      const auto seen = next_.last_seen.find(lookup.ids()[o]);
+    for (const Votes& votes : segment.votes) {
+      const auto seen = next_.last_seen.find(lookup.ids()[votes.object]);
       const bool is_recent =
           seen != next_.last_seen.end() && seen->second >= next_.frame - config_.recent_frames;
-      if (has_segment[o] || !is_recent) continue;
-      if (!IsShare(segment.near[o], config_.near_share, segment.points_W.size())) continue;
+      if (has_segment[votes.object] || !is_recent) continue;
+      if (!IsShare(votes.near, config_.near_share, segment.points_W.size())) continue;
       pairs.push_back(
-          {static_cast<double>(segment.near[o]) / static_cast<double>(segment.points_W.size()),
-           &segment, o});
+          {static_cast<double>(votes.near) / static_cast<double>(segment.points_W.size()), &segment,
+           votes.object});
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(),
@@ -120,19 +135,19 @@ void VoxelVotes::ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& se
   }
 }
 
-void VoxelVotes::FindCuts(std::vector<Segment>& segments) const {
-  std::vector<bool> has_segment;
+void VoxelVotes::FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segments) const {
+  std::vector<bool> has_segment(lookup.ids().size());
   for (const Segment& segment : segments) {
-    has_segment.resize(segment.at.size());
     if (segment.object) has_segment[*segment.object] = true;
   }
   for (Segment& segment : segments) {
     if (!segment.object) continue;
-    for (std::size_t o = 0; o < segment.at.size(); ++o) {
-      if (has_segment[o] || !IsShare(segment.at[o], config_.cut_share, segment.points_W.size())) {
+    for (const Votes& votes : segment.votes) {
+      if (has_segment[votes.object] ||
+          !IsShare(votes.at, config_.cut_share, segment.points_W.size())) {
         continue;
       }
-      segment.shared_with.push_back(o);
+      segment.shared_with.push_back(votes.object);
     }
   }
 }
@@ -162,20 +177,21 @@ void VoxelVotes::Cut(const Frame& frame, const ObjectLookup& lookup, const Segme
   std::vector<std::size_t> sharers = segment.shared_with;
   sharers.push_back(*segment.object);
   std::sort(sharers.begin(), sharers.end());
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        std::vector<float> distances;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          const int pixel = segment.pixels[i];
-          lookup.Distances(PointOf(frame, pixel), distances);
-          const std::size_t nearest = *std::min_element(
-              sharers.begin(), sharers.end(),
-              [&](std::size_t a, std::size_t b) { return distances[a] < distances[b]; });
-          labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) =
-              distances[nearest] <= config_.near_voxels ? lookup.ids()[nearest] : kNoInstance;
-        }
-      });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      std::vector<ObjectLookup::Distance> distances;
+                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        const int pixel = segment.pixels[i];
+                        lookup.Distances(PointOf(frame, pixel), sharers, distances);
+                        const auto nearest = std::min_element(
+                            distances.begin(), distances.end(),
+                            [](const auto& a, const auto& b) { return a.voxels < b.voxels; });
+                        const bool is_near =
+                            nearest != distances.end() && nearest->voxels <= config_.near_voxels;
+                        labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) =
+                            is_near ? lookup.ids()[nearest->object] : kNoInstance;
+                      }
+                    });
 }
 
 AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segments,
@@ -184,10 +200,10 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   ++next_.frame;
   const ObjectLookup lookup(map);
   if (!lookup.ids().empty()) next_.next_id = std::max(next_.next_id, lookup.ids().back() + 1);
-  std::vector<Segment> found = FindSegments(frame, segments.ids);
+  std::vector<Segment> found = FindSegments(frame, segments.ids, map.config().voxel_m);
   Claim(lookup, found);
   ClaimMoved(lookup, found);
-  FindCuts(found);
+  FindCuts(lookup, found);
   GiveBirth(found, map.config().voxel_m);
 
   AssociatedObjects association;

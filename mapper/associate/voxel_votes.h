@@ -45,23 +45,29 @@ class VoxelVotes : public Associator {
   std::vector<std::string> Remarks() const override;
 
  private:
+  // What a segment's points say of an object.
+  struct Votes {
+    std::size_t object = 0;  // of ObjectLookup::ids()
+    int at = 0;              // votes
+    int near = 0;            // points within near_voxels
+  };
+
   // A segment of the frame, and what becomes of it.
   struct Segment {
     InstanceId id = kNoInstance;            // in the frame's segments
     std::vector<int> pixels;                // with valid depth, by rows
     std::vector<Eigen::Vector3d> points_W;  // of them, thinned
-    std::vector<int> at;                    // votes, by ObjectLookup::ids()
-    std::vector<int> near;                  // points within near_voxels
+    std::vector<Votes> votes;               // of objects that got any, by ObjectLookup::ids()
     std::optional<std::size_t> object;      // by ObjectLookup::ids()
     std::vector<std::size_t> shared_with;   // objects to be cut off
     InstanceId label = kNoInstance;
   };
 
-  std::vector<Segment> FindSegments(const Frame& frame, const cv::Mat& ids) const;
+  std::vector<Segment> FindSegments(const Frame& frame, const cv::Mat& ids, double voxel_m) const;
   void CountVotes(const ObjectLookup& lookup, Segment& segment) const;
   void Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   void ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
-  void FindCuts(std::vector<Segment>& segments) const;
+  void FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   void GiveBirth(std::vector<Segment>& segments, double voxel_m);
   void Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
            cv::Mat& labels) const;

@@ -1,5 +1,7 @@
 #include "mapper/mesh/field_mesh.h"
 
+#include "mapper/mesh/join_parts.h"
+
 namespace tsdfpp {
 
 MeshWork FieldMesh::Update(const FieldSurface& surface, float voxel) {

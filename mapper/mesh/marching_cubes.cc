@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "mapper/mesh/scene_parts.h"
+#include "mapper/mesh/join_parts.h"
 
 namespace tsdfpp {
 namespace {

@@ -105,26 +105,64 @@ void GridMesh::MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t 
   for (const std::size_t place : offsets) Mark(part.around[place], what, list);
 }
 
-// Makes `owned_` and `order_` those of the grid's blocks.
-void GridMesh::MatchBlocks(const TsdfGrid& grid) {
+// How many parts, from the first on, are where they were: blocks were added behind, or some were
+// erased, or this is another grid.
+std::size_t GridMesh::CountInPlace(const TsdfGrid& grid) const {
   const auto& entries = grid.entries();
   std::size_t same = 0;
   while (same < owned_.size() && same < entries.size() &&
          seen_[same].index == entries[same].index) {
     ++same;
   }
-  // Blocks were added behind, or some were erased, or this is another grid.
-  struct Spare {
-    std::uint64_t key;
-    Seen seen;
-    std::unique_ptr<MeshPart> part;
-  };
+  return same;
+}
+
+// By key, the parts from number `first` on.
+std::vector<GridMesh::Spare> GridMesh::TakeSpares(std::size_t first) {
   std::vector<Spare> spares;
-  for (std::size_t i = same; i < owned_.size(); ++i) {
+  for (std::size_t i = first; i < owned_.size(); ++i) {
     spares.push_back({PackIndex(seen_[i].index), seen_[i], std::move(owned_[i])});
   }
   std::sort(spares.begin(), spares.end(),
             [](const Spare& a, const Spare& b) { return a.key < b.key; });
+  return spares;
+}
+
+// What lay around an erased block has lost what it was made from.
+void GridMesh::Forget(const std::vector<Spare>& erased) {
+  for (const Spare& spare : erased) spare.part->block = nullptr;
+  for (const Spare& spare : erased) {
+    changed_.push_back(spare.part->index);
+    if (spare.part->is_shown) gone_.push_back(spare.part->index);
+    for (MeshPart* part : spare.part->around) {
+      if (part == nullptr || part->block == nullptr) continue;
+      Mark(part, kCubes, cubes_todo_);
+      Mark(part, kEdges, edges_todo_);
+    }
+  }
+  if (erased.empty()) return;
+  for (Parts* list : {&unsettled_, &pending_}) {
+    std::erase_if(*list, [](const MeshPart* part) { return part->block == nullptr; });
+  }
+}
+
+// Makes `order_` and `keys_` those of `owned_`.
+void GridMesh::Order() {
+  std::vector<std::pair<std::uint64_t, MeshPart*>> sorted(owned_.size());
+  for (std::size_t i = 0; i < owned_.size(); ++i) {
+    sorted[i] = {PackIndex(owned_[i]->index), owned_[i].get()};
+  }
+  std::sort(sorted.begin(), sorted.end());
+  order_.resize(sorted.size());
+  keys_.resize(sorted.size());
+  for (std::size_t i = 0; i < sorted.size(); ++i) std::tie(keys_[i], order_[i]) = sorted[i];
+}
+
+// Makes `owned_` and `order_` those of the grid's blocks.
+void GridMesh::MatchBlocks(const TsdfGrid& grid) {
+  const auto& entries = grid.entries();
+  const std::size_t same = CountInPlace(grid);
+  std::vector<Spare> spares = TakeSpares(same);
   owned_.resize(entries.size());
   seen_.resize(entries.size());
   ForEachInParallel(entries.size() - same, [&](std::size_t k) {
@@ -143,37 +181,9 @@ void GridMesh::MatchBlocks(const TsdfGrid& grid) {
       seen_[same + k] = {index, nullptr, kNeverSeen};
     }
   });
-  // What lay around an erased block has lost what it was made from.
-  for (const Spare& spare : spares) {
-    if (spare.part != nullptr) spare.part->block = nullptr;
-  }
-  bool any_erased = false;
-  for (const Spare& spare : spares) {
-    if (spare.part == nullptr) continue;
-    any_erased = true;
-    changed_.push_back(spare.part->index);
-    if (spare.part->is_shown) gone_.push_back(spare.part->index);
-    for (MeshPart* part : spare.part->around) {
-      if (part == nullptr || part->block == nullptr) continue;
-      Mark(part, kCubes, cubes_todo_);
-      Mark(part, kEdges, edges_todo_);
-    }
-  }
-
-  if (any_erased) {
-    for (Parts* list : {&unsettled_, &pending_}) {
-      std::erase_if(*list, [](const MeshPart* part) { return part->block == nullptr; });
-    }
-  }
-
-  std::vector<std::pair<std::uint64_t, MeshPart*>> sorted(owned_.size());
-  for (std::size_t i = 0; i < owned_.size(); ++i) {
-    sorted[i] = {PackIndex(owned_[i]->index), owned_[i].get()};
-  }
-  std::sort(sorted.begin(), sorted.end());
-  order_.resize(sorted.size());
-  keys_.resize(sorted.size());
-  for (std::size_t i = 0; i < sorted.size(); ++i) std::tie(keys_[i], order_[i]) = sorted[i];
+  std::erase_if(spares, [](const Spare& spare) { return spare.part == nullptr; });
+  Forget(spares);
+  Order();
   Link();
 }
 
@@ -263,32 +273,15 @@ void GridMesh::MarkChanged(const std::vector<Change>& change) {
   }
 }
 
-MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel,
-                          std::optional<std::uint64_t> revision) {
-  MeshWork work;
-  work.blocks = grid.size();
-  changed_.clear();
-  remade_.clear();
-  if (revision && revision_ == revision) {
-#ifndef NDEBUG
-    // Somebody changed blocks and did not say so.
-    std::vector<Change> missed(grid.size(), kSame);
-    if (!Compare(grid, missed) || std::count(missed.begin(), missed.end(), kSame) !=
-                                      static_cast<std::ptrdiff_t>(missed.size())) {
-      std::abort();
-    }
-#endif
-    return work;
-  }
-  revision_ = revision;
-  std::vector<Change> change(grid.size(), kSame);
-  if (!Compare(grid, change)) {
-    MatchBlocks(grid);
-    Compare(grid, change);
-  }
-  MarkChanged(change);
-  work.changed = changed_.size();
+// Whether a block of the grid is another one than at the last update.
+bool GridMesh::Misses(const TsdfGrid& grid) {
+  std::vector<Change> missed(grid.size(), kSame);
+  return !Compare(grid, missed) ||
+         std::any_of(missed.begin(), missed.end(), [](Change c) { return c != kSame; });
+}
 
+// Cubes, then edges, which note what is to be made again because these changed.
+void GridMesh::RemakeCubesAndEdges() {
   std::vector<std::uint8_t> changed(cubes_todo_.size());
   ForEachInParallel(cubes_todo_.size(),
                     [&](std::size_t i) { changed[i] = FindCubes(*cubes_todo_[i]) ? 1 : 0; });
@@ -305,24 +298,49 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel,
     Mark(edges_todo_[i], kVertices, vertices_todo_);
     MarkAround(*edges_todo_[i], kReadMyMasks, kTriangles, triangles_todo_);
   }
+}
 
+// Nothing of what is in the list is to be done any more.
+void GridMesh::Finish(Parts& list) {
+  for (MeshPart* part : list) {
+    if ((part->todo & (kVertices | kTriangles)) != 0) {
+      remade_.push_back(part);
+      Unsettle(*part);
+    }
+    part->todo = 0;
+  }
+  list.clear();
+}
+
+MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel,
+                          std::optional<std::uint64_t> revision) {
+  MeshWork work;
+  work.blocks = grid.size();
+  changed_.clear();
+  remade_.clear();
+  if (revision && revision_ == revision) {
+#ifndef NDEBUG
+    // Somebody changed blocks and did not say so.
+    if (Misses(grid)) std::abort();
+#endif
+    return work;
+  }
+  revision_ = revision;
+  std::vector<Change> change(grid.size(), kSame);
+  if (!Compare(grid, change)) {
+    MatchBlocks(grid);
+    Compare(grid, change);
+  }
+  MarkChanged(change);
+  work.changed = changed_.size();
+
+  RemakeCubesAndEdges();
   ForEachInParallel(vertices_todo_.size(),
                     [&](std::size_t i) { MakeVertices(*vertices_todo_[i], voxel); });
   ForEachInParallel(triangles_todo_.size(),
                     [&](std::size_t i) { MakeTriangles(*triangles_todo_[i]); });
-
-  const auto finish = [&](Parts& list) {
-    for (MeshPart* part : list) {
-      if ((part->todo & (kVertices | kTriangles)) != 0) {
-        ++work.remade;
-        remade_.push_back(part);
-        Unsettle(*part);
-      }
-      part->todo = 0;
-    }
-    list.clear();
-  };
-  for (Parts* list : {&vertices_todo_, &triangles_todo_, &cubes_todo_, &edges_todo_}) finish(*list);
+  for (Parts* list : {&vertices_todo_, &triangles_todo_, &cubes_todo_, &edges_todo_}) Finish(*list);
+  work.remade = remade_.size();
   return work;
 }
 

@@ -71,12 +71,25 @@ class GridMesh {
   // What a comparison found of a block.
   enum Change : std::uint8_t { kSame, kValues, kMasks };
   bool Compare(const TsdfGrid& grid, std::vector<Change>& change);
+  // The part of a block that is not where it was among the grid's entries.
+  struct Spare {
+    std::uint64_t key;
+    Seen seen;
+    std::unique_ptr<MeshPart> part;
+  };
+  std::size_t CountInPlace(const TsdfGrid& grid) const;
+  std::vector<Spare> TakeSpares(std::size_t first);
+  void Forget(const std::vector<Spare>& erased);
+  void Order();
   void MatchBlocks(const TsdfGrid& grid);
   void Link();
   void Mark(MeshPart* part, std::uint32_t what, Parts& list);
   template <typename Offsets>
   void MarkAround(MeshPart& part, const Offsets& offsets, std::uint32_t what, Parts& list);
   void MarkChanged(const std::vector<Change>& change);
+  bool Misses(const TsdfGrid& grid);
+  void RemakeCubesAndEdges();
+  void Finish(Parts& list);
   void Unsettle(MeshPart& part);
 
   std::vector<std::unique_ptr<MeshPart>> owned_;  // part i is that of the grid's entry i

@@ -74,6 +74,9 @@ inline std::size_t UpperPlace(std::size_t which) {
 // The same in the other direction.
 inline std::size_t LowerPlace(std::size_t which) { return 26 - UpperPlace(which); }
 
+// In MeshPart::renamed, of a vertex that no visible triangle names: more than any vertex of a part.
+inline constexpr std::uint16_t kNotShown = 0xFFFF;
+
 // Brings `complete` and `crossed` in line with the masks of the part and of the seven upper ones.
 // True where `complete` changed.
 bool FindCubes(MeshPart& part);

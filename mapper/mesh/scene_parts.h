@@ -1,5 +1,5 @@
-// From the cached parts of one or more grids to one mesh: placed in the world, labelled, without
-// what is hidden (docs/map.md, "Scene mesh of both").
+// What the scene adds to the cached parts of a grid's mesh: where they are in the world, which
+// triangles are hidden, which object each is of (docs/map.md, "Scene mesh of both").
 #pragma once
 
 #include <functional>
@@ -9,7 +9,6 @@
 
 #include "mapper/index/voxel_labels.h"
 #include "mapper/mesh/mesh_cache.h"
-#include "mapper/mesh/scene_changes.h"
 #include "mapper/volume/object_volume.h"
 
 namespace tsdfpp {
@@ -63,19 +62,5 @@ std::vector<MeshPart*> HideTriangles(const std::vector<MeshPart*>& parts, float 
 // Labels the triangles of the parts whose values changed by what labels of each part's own say of
 // the voxels nearest to their centroids in the lattice; `voxel` in metres.
 void LabelTriangles(GridMesh& mesh, float voxel, const std::function<VoxelLabels()>& make_labels);
-
-// One of the meshes that are put together.
-struct JoinedMesh {
-  const GridMesh* mesh = nullptr;
-  InstanceId id = kNoInstance;  // of all its faces; kNoInstance: those of its parts, where labelled
-  bool visible_only = false;    // as HideTriangles found
-};
-
-// What changed of a mesh since this was last asked of it, everything the first time: by block, the
-// parts that are no longer there among them, without triangles. They have the id of `of`.
-std::vector<ScenePiece> TakeScenePieces(GridMesh& mesh, const JoinedMesh& of);
-
-// The meshes one after the other, block after block; vertices that no triangle names are left out.
-TriangleMesh Join(const std::vector<JoinedMesh>& meshes);
 
 }  // namespace tsdfpp

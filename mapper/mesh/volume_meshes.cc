@@ -5,6 +5,8 @@
 #include <tuple>
 #include <utility>
 
+#include "mapper/mesh/join_parts.h"
+
 namespace tsdfpp {
 
 bool VolumeMeshes::DropGone(const ObjectVolumes& volumes) {

@@ -2,6 +2,9 @@
 
 #include <map>
 #include <set>
+#include <utility>
+
+#include "mapper/rays/ray_pass.h"
 
 namespace tsdfpp {
 
@@ -39,6 +42,19 @@ std::vector<RaySurface> CastByRemoval(const MapRepresentation& map, std::vector<
     front.push_back(std::move(behind));
   }
   return front;
+}
+
+std::vector<RaySurface> CastField(const MapRepresentation& map, const TsdfGrid& field,
+                                  const std::function<VoxelLabels()>& make_labels,
+                                  const Intrinsics& camera, const Pose& T_WC,
+                                  const RayCastOptions& options) {
+  RayPass pass;
+  pass.voxel_m = map.config().voxel_m;
+  pass.volumes.push_back({kBackground, &field, Pose::Identity(), true});
+  pass.make_labels = make_labels;
+  RayCastOptions first = options;
+  first.surfaces = 1;
+  return CastByRemoval(map, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
 }
 
 }  // namespace tsdfpp

@@ -1,19 +1,11 @@
 #include "mapper/methods/literal_map.h"
 
-#include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "mapper/map_reach.h"
 #include "mapper/methods/cast_by_removal.h"
+#include "mapper/methods/literal_fusion.h"
 #include "mapper/methods/map_invariants.h"
 #include "mapper/methods/voxel_answers.h"
-#include "mapper/rays/ray_pass.h"
 #include "mapper/store/volume_store.h"
-#include "mapper/volume/allocation.h"
 #include "mapper/volume/freeing.h"
 
 namespace tsdfpp {
@@ -21,110 +13,22 @@ namespace {
 
 constexpr const char* kLists = "LIST";
 
-constexpr std::size_t kBlocksPerTask = 16;
-
 }  // namespace
 
 std::unique_ptr<MapRepresentation> LiteralMap::Clone() const {
   return std::make_unique<LiteralMap>(*this);
 }
 
-std::vector<LiteralMap::Task> LiteralMap::PlanTasks(const FrameView& view,
-                                                    const CameraFromLattice& T_CW) {
-  const auto lattice_of = [&](InstanceId) -> LatticeOfLabel {
-    return {Pose::Identity(), &index_.blocks().directory()};
-  };
-  for (const auto& [id, indices] : BlocksAlongRays(view, config_, lattice_of)) {
-    for (const Index3& index : indices) index_.blocks().FindOrAdd(index);
-  }
-  std::vector<Task> tasks;
-  tasks.reserve(index_.blocks().size());
-  const auto sorted = index_.blocks().Sorted();
-  const auto candidate_at = [&](std::size_t k) -> BlockCandidate {
-    return {sorted[k]->index, &T_CW, kNoInstance, true};
-  };
-  for (const PlannedBlock& planned :
-       PlanBlocks(view, sorted.size(), config_.voxel(), config_.back(), candidate_at)) {
-    const auto* entry = sorted[planned.number];
-    tasks.push_back({entry->index, entry->block.get(), planned, {}});
-  }
-  return tasks;
-}
-
 void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   RequireReach(*this, frame, labels);
-  const FrameView view(frame, labels);
   const std::size_t blocks_before = index_.blocks().size();
-  const CameraFromLattice T_CW(frame.T_WC, Pose::Identity(), true);
-  std::vector<Task> tasks = PlanTasks(view, T_CW);
-  const auto for_each_task = [&](const auto& function) {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, tasks.size(), kBlocksPerTask),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) function(tasks[i]);
-        },
-        tbb::simple_partitioner());
-  };
-  for_each_task([&](Task& task) { Vote(view, T_CW, task); });
-  for (const Task& task : tasks) {
-    for (const InstanceId id : task.targets) volumes_[id].grid.FindOrAdd(task.index);
-  }
-  for_each_task([&](Task& task) { FuseActive(view, T_CW, task); });
-  for (auto& [id, volume] : volumes_) volume.revision = NewRevision();
-  std::vector<Index3> changed;
-  for (const Task& task : tasks) {
-    if (task.changed) changed.push_back(task.index);
-  }
+  const std::vector<Index3> changed =
+      FuseIntoActive(FrameView(frame, labels), config_, index_, volumes_);
   field_.Note(changed, index_.blocks().size());
   // A frame empties no list; it may have made blocks in vain.
   index_.blocks().Erase(EmptyFrom(index_.blocks(), blocks_before,
                                   [](const PairIndex::Block& b) { return b.IsEmpty(); }));
   CheckInDebugBuilds(*this);
-}
-
-void LiteralMap::Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const {
-  BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
-  if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
-  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-    const std::int32_t pixel = observation.pixel[i];
-    if (pixel < 0 || observation.distance[i] > config_.front()) continue;
-    index_.Vote(*task.lists, i, frame.kernel.label[pixel]);
-    const InstanceId active = task.lists->active[i].id;
-    auto& targets = task.targets;
-    const auto at = std::lower_bound(targets.begin(), targets.end(), active);
-    if (at == targets.end() || *at != active) targets.insert(at, active);
-  }
-}
-
-void LiteralMap::FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) {
-  BlockObservation observation;
-  const BlockPlace place = PlaceOf(T_CW, task.index, config_.voxel(), task.planned);
-  if (!ObserveVoxels(frame.kernel, place, config_.back(), observation)) return;
-  const auto weight_cap = static_cast<float>(config_.weight_cap);
-  for (auto& [id, volume] : volumes_) {
-    TsdfBlock* block = volume.grid.Find(task.index);
-    if (block == nullptr) continue;
-    bool changed = false;
-    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-      const std::int32_t pixel = observation.pixel[i];
-      if (pixel < 0 || task.lists->active[i].id != id) continue;
-      const float s = observation.distance[i];
-      if (s <= config_.front()) {
-        const bool coloured =
-            std::abs(s) <=
-            (block->ColourCount(i) == 0 ? config_.first_colour_band() : config_.colour_band());
-        FuseVoxel(*block, i, s, coloured ? frame.kernel.colour + 3 * pixel : nullptr, weight_cap);
-        changed = true;
-      } else if (frame.kernel.label[pixel] == id) {
-        FuseVoxel(*block, i, config_.front(), nullptr, weight_cap);
-        changed = true;
-      }
-    }
-    if (!changed) continue;
-    block->UpdateMasks(config_.back());
-    task.changed = true;
-  }
 }
 
 void LiteralMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
@@ -167,13 +71,8 @@ SurfacesInBlocks LiteralMap::Surfaces() const {
 
 std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pose& T_WC,
                                              const RayCastOptions& options) const {
-  RayPass pass;
-  pass.voxel_m = config_.voxel_m;
-  pass.volumes.push_back({kBackground, &Field(), Pose::Identity(), true});
-  pass.make_labels = [&] { return ActiveLabels(index_); };
-  RayCastOptions first = options;
-  first.surfaces = 1;
-  return CastByRemoval(*this, RunRayPass(pass, camera, T_WC, first), camera, T_WC, options);
+  return CastField(
+      *this, Field(), [this] { return ActiveLabels(index_); }, camera, T_WC, options);
 }
 
 std::vector<Listing> LiteralMap::ListAt(const Eigen::Vector3i& voxel) const {

@@ -31,18 +31,6 @@ class LiteralMap final : public ObjectVolumeMap {
   Expected<void> Load(const Sections& sections) override;
 
  private:
-  struct Task {
-    Index3 index;
-    PairIndex::Block* lists = nullptr;
-    PlannedBlock planned;
-    std::vector<InstanceId> targets;  // objects that take an observation here, increasing
-    bool changed = false;  // values; where another object is active now, it took an observation
-  };
-
-  // The blocks of the index that the frame looks at, those that it allocates among them.
-  std::vector<Task> PlanTasks(const FrameView& view, const CameraFromLattice& T_CW);
-  void Vote(const FrameView& frame, const CameraFromLattice& T_CW, Task& task) const;
-  void FuseActive(const FrameView& frame, const CameraFromLattice& T_CW, Task& task);
   const TsdfGrid& Field() const { return field_.Of(index_, volumes_, config_); }
 
   PairIndex index_;

@@ -10,47 +10,28 @@
 
 namespace tsdfpp {
 
-namespace {
-
-template <FieldRule rule>
-std::unique_ptr<MapRepresentation> MakeField(const MapConfig& config, int /*layers*/) {
-  return std::make_unique<SingleFieldMap>(config, rule);
-}
-
-template <typename Map>
-std::unique_ptr<MapRepresentation> MakeFixed(const MapConfig& config, int /*layers*/) {
-  return std::make_unique<Map>(config);
-}
-
-template <typename Map>
-std::unique_ptr<MapRepresentation> MakeLayered(const MapConfig& config, int layers) {
-  return std::make_unique<Map>(config, layers);
-}
-
-struct Maker {
-  Method method;
-  std::unique_ptr<MapRepresentation> (*make)(const MapConfig& config, int layers);
-};
-
-// A row a method, as in mapper/method_info.cc, which readers of names have without the maps.
-constexpr Maker kMakers[] = {
-    {Method::kTsdf, MakeField<FieldRule::kOverwrite>},
-    {Method::kTsdfMin, MakeField<FieldRule::kKeepNearer>},
-    {Method::kTsdfGuarded, MakeField<FieldRule::kGuarded>},
-    {Method::kTsdfStatic, MakeField<FieldRule::kStatic>},
-    {Method::kTsdfpp, MakeLayered<TsdfppMap>},
-    {Method::kTsdfppLiteral, MakeFixed<LiteralMap>},
-    {Method::kTsdfppAnchored, MakeLayered<AnchoredMap>},
-    {Method::kVolumes, MakeFixed<VolumesMap>},
-    {Method::kSurfels, MakeFixed<SurfelMap>},
-};
-
-}  // namespace
-
 std::unique_ptr<MapRepresentation> MakeMap(Method method, const MapConfig& config) {
   if (!config.Validate()) std::abort();
-  for (const Maker& maker : kMakers) {
-    if (maker.method == method) return maker.make(config, LayersOf(method, config));
+  const int layers = LayersOf(method, config);
+  switch (method) {
+    case Method::kTsdf:
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kOverwrite);
+    case Method::kTsdfMin:
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kKeepNearer);
+    case Method::kTsdfGuarded:
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kGuarded);
+    case Method::kTsdfStatic:
+      return std::make_unique<SingleFieldMap>(config, FieldRule::kStatic);
+    case Method::kTsdfpp:
+      return std::make_unique<TsdfppMap>(config, layers);
+    case Method::kTsdfppLiteral:
+      return std::make_unique<LiteralMap>(config);
+    case Method::kTsdfppAnchored:
+      return std::make_unique<AnchoredMap>(config, layers);
+    case Method::kVolumes:
+      return std::make_unique<VolumesMap>(config);
+    case Method::kSurfels:
+      return std::make_unique<SurfelMap>(config);
   }
   std::abort();
 }

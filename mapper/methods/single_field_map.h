@@ -4,7 +4,6 @@
 
 #include "mapper/methods/labelled_field.h"
 #include "mapper/methods/voxel_map.h"
-#include "mapper/volume/volume_fusion.h"
 
 namespace tsdfpp {
 
@@ -49,12 +48,6 @@ class SingleFieldMap final : public VoxelMap {
  private:
   using LabelBlock = LabelledField::LabelBlock;
 
-  // `label` is the one that all the block's pixels have, kNoInstance where there may be several.
-  // `next` as FuseVoxels() takes it.
-  void FuseBlock(const FrameView& frame, const BlockPlace& place, InstanceId label,
-                 const TsdfBlock* next, TsdfBlock& block, LabelBlock& labels) const;
-  // Rims of one field (docs/map.md, `tsdf/guarded`).
-  void CompleteRims(const FrameView& frame);
   // Labels a voxel, or was given a pose.
   bool IsKnown(InstanceId id) const { return T_WO_.contains(id) || field_.Holds(id); }
 

@@ -1,4 +1,4 @@
-// A map of voxels, as all those here are: it can do what only some maps can.
+// A map of voxels, as all those here are but the surfels: it can do what only some maps can.
 #pragma once
 
 #include "mapper/block_moves.h"

@@ -147,55 +147,75 @@ class LatticeView {
   std::array<Eigen::Vector3d, 4> sides_;
 };
 
-}  // namespace
+struct Candidate {
+  std::uint32_t volume;
+  const TsdfGrid::Entry* entry;
+};
 
-RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& camera,
-                        double voxel_m, double near_m, const ContestedBox& contested) {
-  struct Candidate {
-    std::uint32_t volume;
-    const TsdfGrid::Entry* entry;
-  };
-  std::vector<LatticeView> views;
+// The blocks that may be in view, by volume, then index.
+std::vector<Candidate> FindCandidates(const std::vector<RayVolume>& volumes,
+                                      const std::vector<LatticeView>& views) {
   std::vector<Candidate> candidates;
   for (std::uint32_t i = 0; i < volumes.size(); ++i) {
-    views.emplace_back(camera, volumes[i], voxel_m, near_m);
+    const LatticeView& view = views[i];
     const std::size_t first = candidates.size();
     for (const auto& entry : volumes[i].grid->entries()) {
-      if (views.back().MaySee(entry.index)) candidates.push_back({i, &entry});
+      if (view.MaySee(entry.index)) candidates.push_back({i, &entry});
     }
     std::sort(
         candidates.begin() + static_cast<std::ptrdiff_t>(first), candidates.end(),
         [](const Candidate& a, const Candidate& b) { return a.entry->index < b.entry->index; });
   }
+  return candidates;
+}
+
+template <typename Function>
+void ForEachInParallel(std::size_t count, const Function& function) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, count, kBlocksPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
+      },
+      tbb::simple_partitioner());
+}
+
+constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
+
+// Each candidate's number among those in view, or kOutOfView; `in_view` gets their footprints.
+std::vector<std::uint32_t> NumberInView(const std::vector<BlockFootprint>& footprints,
+                                        std::vector<BlockFootprint>& in_view) {
+  std::vector<std::uint32_t> number(footprints.size(), kOutOfView);
+  for (std::size_t i = 0; i < footprints.size(); ++i) {
+    const BlockFootprint& footprint = footprints[i];
+    if (footprint.u_high < footprint.u_low || footprint.v_high < footprint.v_low) continue;
+    number[i] = static_cast<std::uint32_t>(in_view.size());
+    in_view.push_back(footprint);
+  }
+  return number;
+}
+
+}  // namespace
+
+RayBlocks FindRayBlocks(const std::vector<RayVolume>& volumes, const RayCamera& camera,
+                        double voxel_m, double near_m, const ContestedBox& contested) {
+  std::vector<LatticeView> views;
+  views.reserve(volumes.size());
+  for (const RayVolume& volume : volumes) views.emplace_back(camera, volume, voxel_m, near_m);
+  const std::vector<Candidate> candidates = FindCandidates(volumes, views);
   // First the crossed cubes, then, for the blocks that have some, the distances.
-  const auto for_each_candidate = [&](const auto& function) {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, candidates.size(), kBlocksPerTask),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) function(i);
-        },
-        tbb::simple_partitioner());
-  };
   std::vector<UpperBlocks> upper(candidates.size());
   std::vector<CrossedCubes> crossed(candidates.size());
   std::vector<BlockFootprint> footprints(candidates.size());
-  for_each_candidate([&](std::size_t i) {
+  ForEachInParallel(candidates.size(), [&](std::size_t i) {
     const auto& [volume, entry] = candidates[i];
     upper[i] = volumes[volume].grid->FindUpper(entry->index);
     if (!FindCrossed(upper[i], crossed[i])) return;
     footprints[i] = views[volume].FootprintOf(entry->index, crossed[i]);
   });
-  constexpr std::uint32_t kOutOfView = 0xFFFFFFFFU;
   RayBlocks found;
-  std::vector<std::uint32_t> number(candidates.size(), kOutOfView);
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const BlockFootprint& footprint = footprints[i];
-    if (footprint.u_high < footprint.u_low || footprint.v_high < footprint.v_low) continue;
-    number[i] = static_cast<std::uint32_t>(found.footprints.size());
-    found.footprints.push_back(footprint);
-  }
+  const std::vector<std::uint32_t> number = NumberInView(footprints, found.footprints);
   found.blocks = std::make_unique_for_overwrite<RayBlock[]>(found.footprints.size());
-  for_each_candidate([&](std::size_t i) {
+  ForEachInParallel(candidates.size(), [&](std::size_t i) {
     if (number[i] == kOutOfView) return;
     const auto& [volume, entry] = candidates[i];
     RayBlock& block = found.blocks[number[i]];

@@ -1,7 +1,10 @@
 #include "mapper/rays/volume_rays.h"
 
 #include <algorithm>
-#include <limits>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "mapper/mesh/mesh_tools.h"
 #include "mapper/rays/ray_pass.h"
@@ -94,11 +97,6 @@ class Claims {
   std::vector<InstanceId> table_;  // empty where the box is too large
 };
 
-struct LookUp {
-  Index3 voxel;
-  const InstanceId* active = nullptr;  // in the index; nullptr where nothing is listed
-};
-
 // The first one that is not left out, or kNoInstance.
 InstanceId FirstOf(const std::vector<Listing>& list, std::span<const InstanceId> without) {
   for (const Listing& entry : list) {
@@ -106,6 +104,83 @@ InstanceId FirstOf(const std::vector<Listing>& list, std::span<const InstanceId>
   }
   return kNoInstance;
 }
+
+// Points' distances in the objects' volumes.
+class VolumeDistances {
+ public:
+  VolumeDistances(const ObjectVolumes& volumes, double voxel_m) : voxel_m_(voxel_m) {
+    for (const auto& [id, volume] : volumes) {
+      if (volume.grid.empty()) continue;
+      readers_.emplace(
+          id, Reader{VoxelReader(volume.grid), volume.lattice_is_world, volume.T_WL.inverse()});
+    }
+  }
+
+  std::optional<float> At(InstanceId id, const Eigen::Vector3f& p_W) const {
+    const Reader& of = readers_.at(id);
+    const Eigen::Vector3d p = p_W.cast<double>();
+    return DistanceAt(FindCorners(
+        of.reader, (of.lattice_is_world ? p : Eigen::Vector3d(of.T_LW * p)) / voxel_m_));
+  }
+
+ private:
+  struct Reader {
+    VoxelReader reader;
+    bool lattice_is_world;
+    Pose T_LW;
+  };
+  double voxel_m_;
+  std::map<InstanceId, Reader> readers_;
+};
+
+// What a worker asks which surfaces are hidden: those that lie inside the object that is active
+// there.
+class HiddenSearch {
+ public:
+  HiddenSearch(const GlobalIndex& index, const VolumeDistances& distances, float voxel)
+      : index_(&index), distances_(&distances), voxel_(voxel) {}
+
+  void operator()(std::span<HiddenQuery> queries, std::span<const InstanceId> without) {
+    LookUpAll(queries);
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+      const auto& [v, place] = looked_up_[i];
+      if (place == nullptr) continue;
+      const InstanceId active = without.empty() ? *place : FirstOf(index_->ListedAt(v), without);
+      if (active == kNoInstance || active == queries[i].id) continue;
+      const auto distance = distances_->At(active, queries[i].look_up_W);
+      queries[i].hidden = distance && *distance < -voxel_;
+    }
+  }
+
+ private:
+  struct LookUp {
+    Index3 voxel;
+    const InstanceId* active = nullptr;  // in the index; nullptr where nothing is listed
+  };
+
+  // All places first, so that their memory is on its way when it is read; one after another is in
+  // the same block.
+  void LookUpAll(std::span<const HiddenQuery> queries) {
+    looked_up_.clear();
+    Index3 block;
+    const InstanceId* ids = index_->ActiveIn(block);
+    for (const HiddenQuery& query : queries) {
+      const Index3 v = NearestVoxel(query.look_up_W, voxel_);
+      if (BlockOf(v) != block) {
+        block = BlockOf(v);
+        ids = index_->ActiveIn(block);
+      }
+      const InstanceId* place = ids == nullptr ? nullptr : ids + PlaceInBlock(v);
+      __builtin_prefetch(place);
+      looked_up_.push_back({v, place});
+    }
+  }
+
+  const GlobalIndex* index_;
+  const VolumeDistances* distances_;
+  float voxel_;
+  std::vector<LookUp> looked_up_;
+};
 
 std::vector<RaySurface> CastEachAlone(const ObjectVolumes& volumes, double voxel_m,
                                       const Intrinsics& camera, const Pose& T_WC,
@@ -129,19 +204,11 @@ std::vector<RaySurface> CastThroughVolumes(const VolumeSurfaces& surfaces, doubl
     return CastEachAlone(volumes, voxel_m, camera, T_WC, options);
   }
   const GlobalIndex& index = *surfaces.index;
-  struct Reader {
-    VoxelReader reader;
-    bool lattice_is_world;
-    Pose T_LW;
-  };
   RayPass pass;
   pass.voxel_m = voxel_m;
-  std::map<InstanceId, Reader> readers;
   for (const auto& [id, volume] : volumes) {
     if (volume.grid.empty()) continue;
     pass.volumes.push_back({id, &volume.grid, volume.T_WL, volume.lattice_is_world});
-    readers.emplace(
-        id, Reader{VoxelReader(volume.grid), volume.lattice_is_world, volume.T_WL.inverse()});
   }
   const Claims claims(volumes, voxel_m);
   if (pass.volumes.size() > 1) {
@@ -149,41 +216,9 @@ std::vector<RaySurface> CastThroughVolumes(const VolumeSurfaces& surfaces, doubl
       return claims.Contested(volume, low, high);
     };
   }
-  // A point's distance in the volume of an object.
-  const auto distance_at = [&](InstanceId id, const Eigen::Vector3f& p_W) {
-    const Reader& of = readers.at(id);
-    const Eigen::Vector3d p = p_W.cast<double>();
-    return DistanceAt(
-        FindCorners(of.reader, (of.lattice_is_world ? p : Eigen::Vector3d(of.T_LW * p)) / voxel_m));
-  };
-  const auto voxel = static_cast<float>(voxel_m);
+  const VolumeDistances distances(volumes, voxel_m);
   pass.make_hidden = [&]() -> RayPass::Hidden {
-    return [&, looked_up = std::vector<LookUp>()](std::span<HiddenQuery> queries,
-                                                  std::span<const InstanceId> without) mutable {
-      // All places first, so that their memory is on its way when it is read; one after another is
-      // in the same block.
-      looked_up.clear();
-      Index3 block;
-      const InstanceId* ids = index.ActiveIn(block);
-      for (const HiddenQuery& query : queries) {
-        const Index3 v = NearestVoxel(query.look_up_W, voxel);
-        if (BlockOf(v) != block) {
-          block = BlockOf(v);
-          ids = index.ActiveIn(block);
-        }
-        const InstanceId* place = ids == nullptr ? nullptr : ids + PlaceInBlock(v);
-        __builtin_prefetch(place);
-        looked_up.push_back({v, place});
-      }
-      for (std::size_t i = 0; i < queries.size(); ++i) {
-        const auto& [v, place] = looked_up[i];
-        if (place == nullptr) continue;
-        const InstanceId active = without.empty() ? *place : FirstOf(index.ListedAt(v), without);
-        if (active == kNoInstance || active == queries[i].id) continue;
-        const auto distance = distance_at(active, queries[i].look_up_W);
-        queries[i].hidden = distance && *distance < -voxel;
-      }
-    };
+    return HiddenSearch(index, distances, static_cast<float>(voxel_m));
   };
   return RunRayPass(pass, camera, T_WC, options);
 }

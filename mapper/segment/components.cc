@@ -69,6 +69,118 @@ void JoinRows(const std::vector<RunOfPixels>& upper, std::int32_t first_upper,
   }
 }
 
+// Parts, of which small ones are joined to others.
+class Joining {
+ public:
+  Joining(const PartSize& least, std::vector<PartSize> sizes)
+      : least_(least), sizes_(std::move(sizes)), becomes_(sizes_.size()) {
+    std::iota(becomes_.begin(), becomes_.end(), 0);
+  }
+
+  // The links of each small part to others.
+  void CountLinks(const PixelLinks& links, const cv::Mat& labels) {
+    for (int v = 0; v < labels.rows; ++v) {
+      const auto* row = labels.ptr<std::int32_t>(v);
+      const auto* below = v + 1 < labels.rows ? labels.ptr<std::int32_t>(v + 1) : nullptr;
+      const auto* right = links.right.ptr<std::uint8_t>(v);
+      const auto* down = links.down.ptr<std::uint8_t>(v);
+      for (int u = 0; u < labels.cols; ++u) {
+        if (u + 1 < labels.cols && right[u] != 0) Count(row[u], row[u + 1]);
+        if (below != nullptr && down[u] != 0) Count(row[u], below[u]);
+      }
+    }
+  }
+
+  // The smallest first, each to the part with which it has most links, until none is small; what
+  // has links to nobody is dropped.
+  void JoinAll() {
+    std::set<std::pair<std::int64_t, std::int32_t>> small;  // pixels, label
+    for (std::int32_t label = 1; label < end(); ++label) {
+      if (!IsSmall(label)) continue;
+      if (shared_.contains(label)) {
+        small.emplace(SizeOf(label).pixels, label);
+      } else {
+        Becomes(label) = 0;
+      }
+    }
+    while (!small.empty()) {
+      const std::int32_t label = small.begin()->second;
+      small.erase(small.begin());
+      const std::int32_t into = MostLinked(label);
+      Becomes(label) = into;
+      if (into == 0) continue;
+      small.erase({SizeOf(into).pixels, into});
+      SizeOf(into).pixels += SizeOf(label).pixels;
+      SizeOf(into).area_m2 += SizeOf(label).area_m2;
+      if (IsSmall(into)) small.emplace(SizeOf(into).pixels, into);
+      HandLinksOver(label, into);
+    }
+  }
+
+  // What each label becomes, with numbers from `first` on for the parts that are left; 0 for what
+  // was dropped. Moves `first` behind the last one.
+  std::vector<std::int32_t> NumberParts(std::int32_t& first) const {
+    std::vector<std::int32_t> number(sizes_.size());
+    for (std::int32_t label = 1; label < end(); ++label) {
+      const auto i = static_cast<std::size_t>(label);
+      if (becomes_[i] == label && sizes_[i].pixels > 0) number[i] = first++;
+    }
+    std::vector<std::int32_t> number_of(sizes_.size());
+    for (std::int32_t label = 0; label < end(); ++label) {
+      number_of[static_cast<std::size_t>(label)] = number[static_cast<std::size_t>(LastOf(label))];
+    }
+    return number_of;
+  }
+
+ private:
+  std::int32_t end() const { return static_cast<std::int32_t>(sizes_.size()); }
+  PartSize& SizeOf(std::int32_t label) { return sizes_[static_cast<std::size_t>(label)]; }
+  std::int32_t& Becomes(std::int32_t label) { return becomes_[static_cast<std::size_t>(label)]; }
+  bool IsSmall(std::int32_t label) const {
+    const PartSize& size = sizes_[static_cast<std::size_t>(label)];
+    return size.pixels > 0 && (size.pixels < least_.pixels || size.area_m2 < least_.area_m2);
+  }
+  void Count(std::int32_t a, std::int32_t b) {
+    if (a == b || a == 0 || b == 0) return;
+    if (IsSmall(a) || IsSmall(b)) {
+      ++shared_[a][b];
+      ++shared_[b][a];
+    }
+  }
+  // 0 where all its neighbours were joined to others.
+  std::int32_t MostLinked(std::int32_t label) {
+    std::int32_t into = 0;
+    int most = 0;
+    for (const auto& [other, number] : shared_[label]) {
+      if (number > most) {
+        most = number;
+        into = other;
+      }
+    }
+    return into;
+  }
+  void HandLinksOver(std::int32_t label, std::int32_t into) {
+    for (const auto& [other, number] : shared_[label]) {
+      shared_[other].erase(label);
+      if (other == into) continue;
+      shared_[other][into] += number;
+      shared_[into][other] += number;
+    }
+    shared_.erase(label);
+  }
+  std::int32_t LastOf(std::int32_t label) const {
+    while (becomes_[static_cast<std::size_t>(label)] != label) {
+      label = becomes_[static_cast<std::size_t>(label)];
+    }
+    return label;
+  }
+
+  const PartSize& least_;
+  std::vector<PartSize> sizes_;        // by label
+  std::vector<std::int32_t> becomes_;  // by label: itself, or what it was joined to
+  std::map<std::int32_t, std::map<std::int32_t, int>> shared_;
+};
+
 }  // namespace
 
 std::int32_t LabelComponents(const cv::Mat& member, const PixelLinks& links, std::int32_t first,
@@ -182,84 +294,10 @@ std::vector<PartSize> MeasureParts(const cv::Mat& labels, const cv::Mat& depth, 
 
 std::int32_t JoinSmall(const PixelLinks& links, const PartSize& least, std::int32_t first,
                        std::vector<PartSize> sizes, cv::Mat& labels) {
-  const auto end = static_cast<std::int32_t>(sizes.size());
-  const auto size_of = [&](std::int32_t label) -> PartSize& {
-    return sizes[static_cast<std::size_t>(label)];
-  };
-  const auto is_small = [&](std::int32_t label) {
-    const PartSize& size = size_of(label);
-    return size.pixels > 0 && (size.pixels < least.pixels || size.area_m2 < least.area_m2);
-  };
-  // Links of each small part to others.
-  std::map<std::int32_t, std::map<std::int32_t, int>> shared;
-  const auto count = [&](std::int32_t a, std::int32_t b) {
-    if (a == b || a == 0 || b == 0) return;
-    if (is_small(a) || is_small(b)) {
-      ++shared[a][b];
-      ++shared[b][a];
-    }
-  };
-  for (int v = 0; v < labels.rows; ++v) {
-    const auto* row = labels.ptr<std::int32_t>(v);
-    const auto* below = v + 1 < labels.rows ? labels.ptr<std::int32_t>(v + 1) : nullptr;
-    const auto* right = links.right.ptr<std::uint8_t>(v);
-    const auto* down = links.down.ptr<std::uint8_t>(v);
-    for (int u = 0; u < labels.cols; ++u) {
-      if (u + 1 < labels.cols && right[u] != 0) count(row[u], row[u + 1]);
-      if (below != nullptr && down[u] != 0) count(row[u], below[u]);
-    }
-  }
-  std::set<std::pair<std::int64_t, std::int32_t>> small;  // pixels, label
-  std::vector<std::int32_t> becomes(static_cast<std::size_t>(end));
-  std::iota(becomes.begin(), becomes.end(), 0);
-  for (std::int32_t label = 1; label < end; ++label) {
-    if (!is_small(label)) continue;
-    if (shared.contains(label)) {
-      small.emplace(size_of(label).pixels, label);
-    } else {
-      becomes[static_cast<std::size_t>(label)] = 0;
-    }
-  }
-  while (!small.empty()) {
-    const std::int32_t label = small.begin()->second;
-    small.erase(small.begin());
-    std::int32_t into = 0;
-    int most = 0;
-    for (const auto& [other, number] : shared[label]) {
-      if (number > most) {
-        most = number;
-        into = other;
-      }
-    }
-    becomes[static_cast<std::size_t>(label)] = into;
-    if (into == 0) continue;
-    small.erase({size_of(into).pixels, into});
-    size_of(into).pixels += size_of(label).pixels;
-    size_of(into).area_m2 += size_of(label).area_m2;
-    if (is_small(into)) small.emplace(size_of(into).pixels, into);
-    for (const auto& [other, number] : shared[label]) {
-      shared[other].erase(label);
-      if (other == into) continue;
-      shared[other][into] += number;
-      shared[into][other] += number;
-    }
-    shared.erase(label);
-  }
-  const auto last = [&](std::int32_t label) {
-    while (becomes[static_cast<std::size_t>(label)] != label) {
-      label = becomes[static_cast<std::size_t>(label)];
-    }
-    return label;
-  };
-  std::vector<std::int32_t> number(static_cast<std::size_t>(end));
-  for (std::int32_t label = 1; label < end; ++label) {
-    const bool is_left = last(label) == label && size_of(label).pixels > 0;
-    if (is_left) number[static_cast<std::size_t>(label)] = first++;
-  }
-  for (std::int32_t label = 1; label < end; ++label) {
-    becomes[static_cast<std::size_t>(label)] = last(label);
-  }
-  for (std::int32_t& label : becomes) label = number[static_cast<std::size_t>(label)];
+  Joining joining(least, std::move(sizes));
+  joining.CountLinks(links, labels);
+  joining.JoinAll();
+  const std::vector<std::int32_t> becomes = joining.NumberParts(first);
   ForEachRow(labels.rows, [&](int v) {
     auto* row = labels.ptr<std::int32_t>(v);
     for (int u = 0; u < labels.cols; ++u) row[u] = becomes[static_cast<std::size_t>(row[u])];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "mapper/segment/background.h"
 #include "mapper/segment/components.h"
@@ -38,7 +39,8 @@ Expected<Segments> DepthSegments::Segment(const Frame& frame) {
   end = JoinSmall(links, least, kBackgroundLabel + 1,
                   MeasureParts(labels_, maps_->depth, maps_->rays.pixel_width, end), labels_);
   end = PartBackground(*maps_, links, least, end, config_, labels_);
-  return Segments{IdsOf(depth, end)};
+  TSDFPP_ASSIGN(cv::Mat ids, IdsOf(frame, end));
+  return Segments{std::move(ids)};
 }
 
 void DepthSegments::FindInner() {
@@ -78,17 +80,26 @@ void DepthSegments::FindInner() {
   });
 }
 
-cv::Mat DepthSegments::IdsOf(const cv::Mat& depth, std::int32_t end) const {
+Expected<cv::Mat> DepthSegments::IdsOf(const Frame& frame, std::int32_t end) const {
+  const cv::Mat& depth = frame.depth;
   const std::vector<std::int32_t> pixels = CountLabels(labels_, end);
   std::vector<std::size_t> order;
   for (std::size_t label = kBackgroundLabel + 1; label < pixels.size(); ++label) {
     if (pixels[label] > 0) order.push_back(label);
   }
+  constexpr std::size_t kMostSegments = kNoInstance - 1;
+  if (order.size() > kMostSegments) {
+    return DataError(
+        "frame {}: its depth falls into {} segments, expected at most {}: min_share or min_m2 is "
+        "too "
+        "low",
+        frame.index, order.size(), kMostSegments);
+  }
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return pixels[a] > pixels[b]; });
   std::vector<InstanceId> id_of(pixels.size(), kNoInstance);
   id_of[kBackgroundLabel] = kBackground;
-  for (std::size_t i = 0; i < order.size() && i + 1 < kNoInstance; ++i) {
+  for (std::size_t i = 0; i < order.size(); ++i) {
     id_of[order[i]] = static_cast<InstanceId>(i + 1);
   }
   cv::Mat ids(depth.size(), CV_16UC1);

@@ -16,15 +16,16 @@ class DepthSegments : public Segmenter {
 
   // Segments have ids from 1 on, the one of most pixels first, of equal ones that whose first pixel
   // comes first by row; kBackground is what background.h finds; kNoInstance where there is no
-  // valid depth, on parts too small to be told from noise, and beyond 65534 segments. Reads
-  // Frame::depth and Frame::intrinsics. The same for any number of threads.
-  // Errors: kData where depth is no CV_32FC1 image of the intrinsics' size.
+  // valid depth and on parts too small to be told from noise. Reads Frame::depth and
+  // Frame::intrinsics. The same for any number of threads.
+  // Errors: kData where depth is no CV_32FC1 image of the intrinsics' size, or falls into more than
+  // 65534 segments.
   Expected<Segments> Segment(const Frame& frame) override;
 
  private:
   // Pixels whose eight neighbours and their neighbours neither jump nor are concave.
   void FindInner();
-  cv::Mat IdsOf(const cv::Mat& depth, std::int32_t end) const;
+  Expected<cv::Mat> IdsOf(const Frame& frame, std::int32_t end) const;
 
   DepthSegmentsConfig config_;
   SurfaceMapper mapper_;

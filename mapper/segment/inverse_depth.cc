@@ -82,7 +82,7 @@ void TakeInverse(const cv::Mat& depth, cv::Mat& inverse) {
     auto* to = inverse.ptr<float>(v);
     for (int u = 0; u < depth.cols; ++u) {
       const float z = from[u];
-      const bool valid = (z >= kNearest_m) & (z <= kMaxValidDepth_m);
+      const bool valid = (z >= kNearestInverted_m) & (z <= kMaxValidDepth_m);
       to[u] = valid ? 1 / z : 0;
     }
   });

@@ -22,9 +22,9 @@ inline constexpr int kGreatestStep_px = 10;
 // 1 m.
 ChordReach ChooseReach(const cv::Mat& depth, float pixel, const DepthSegmentsConfig& config);
 
-// 1 / depth; 0 where depth is not valid, or below kNearest_m.
+// 1 / depth; 0 where depth is not valid, or below kNearestInverted_m.
 void TakeInverse(const cv::Mat& depth, cv::Mat& inverse);
-inline constexpr float kNearest_m = 0.001F;  // nearer, an inverse may be no number
+inline constexpr float kNearestInverted_m = 0.001F;  // nearer, an inverse may be no number
 
 // `bridged` gets `inverse`, and straight lines across holes of up to config.gap_px pixels whose two
 // ends are no jump: first along rows (`along_rows`, a scratch image), then along columns of that.

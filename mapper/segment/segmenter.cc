@@ -1,5 +1,7 @@
 #include "mapper/segment/segmenter.h"
 
+#include <cstdlib>
+
 #include "mapper/segment/given_masks.h"
 #include "mapper/segment/no_masks.h"
 
@@ -12,13 +14,24 @@ Expected<Segmentation> SegmentationFromName(std::string_view name) {
 }
 
 std::string_view SegmentationName(Segmentation segmentation) {
-  return segmentation == Segmentation::kGiven ? "gt" : "none";
+  switch (segmentation) {
+    case Segmentation::kGiven:
+      return "gt";
+    case Segmentation::kNone:
+      return "none";
+  }
+  std::abort();
 }
 
 std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
                                          const std::vector<ObjectInfo>& objects) {
-  if (segmentation == Segmentation::kNone) return std::make_unique<NoMasks>();
-  return std::make_unique<GivenMasks>(objects);
+  switch (segmentation) {
+    case Segmentation::kGiven:
+      return std::make_unique<GivenMasks>(objects);
+    case Segmentation::kNone:
+      return std::make_unique<NoMasks>();
+  }
+  std::abort();
 }
 
 }  // namespace tsdfpp

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-// One pass of this file an instruction set (mapper/volume/fusion_kernels.cc).
+// One pass of this file an instruction set (mapper/volume/fusion_kernels_simd.cc).
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "mapper/segment/surface_kernels.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h

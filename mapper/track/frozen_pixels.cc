@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "mapper/track/object_model.h"
+#include "mapper/volume/fusion_kernels.h"
 
 namespace tsdfpp {
 namespace {
-
-constexpr double kNearest_m = 0.05;  // docs/map.md, "Observation of a voxel"
 
 // The pixels that the voxels of a block fall on; the whole image where some are beside the camera.
 cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const Intrinsics& camera) {
@@ -23,7 +23,7 @@ cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const I
     const Index3 corner =
         VoxelAt(block, (i & 1) * 7 + ((i >> 1) & 1) * 7 * kBlockSide + (i >> 2) * 7 * 64);
     const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(corner.x, corner.y, corner.z));
-    if (p_C.z() < kNearest_m) {
+    if (p_C.z() < double{kNearest_m}) {
       ++behind;
       continue;
     }
@@ -49,19 +49,32 @@ cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const I
 
 cv::Mat LabelsToFuse(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
                      const TrackedPoses& tracked) {
-  cv::Mat fused = labels;
+  std::vector<bool> is_frozen;  // by id
   for (const auto& [id, status] : tracked.seen) {
     if (status != TrackStatus::kFrozen) continue;
-    if (fused.data == labels.data) fused = labels.clone();
-    fused.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
-    if (IsOneField(map.method())) continue;
+    is_frozen.resize(std::size_t{kNoInstance} + 1);
+    is_frozen[id] = true;
+  }
+  if (is_frozen.empty()) return labels;
+  // Of all at once: a frame may show as many objects as there are ids.
+  cv::Mat fused = labels.clone();
+  for (int v = 0; v < fused.rows; ++v) {
+    auto* row = fused.ptr<InstanceId>(v);
+    for (int u = 0; u < fused.cols; ++u) {
+      if (is_frozen[row[u]]) row[u] = kNoInstance;
+    }
+  }
+  if (IsOneField(map.method())) return fused;
+  for (const auto& [id, status] : tracked.seen) {
+    if (status != TrackStatus::kFrozen) continue;
     const std::optional<ObjectModel> model = ModelOf(map, id);
     if (!model) continue;
     const Pose T_CL = frame.T_WC.inverse() * model->T_WL;
     for (const auto& entry : model->grid->entries()) {
       if (!entry.block->AnyNegative()) continue;
-      fused(PixelsOf(entry.index, T_CL, map.config().voxel_m, frame.intrinsics))
-          .setTo(static_cast<double>(kNoInstance));
+      const cv::Rect pixels = PixelsOf(entry.index, T_CL, map.config().voxel_m, frame.intrinsics);
+      fused(pixels).setTo(static_cast<double>(kNoInstance));
+      if (pixels.size() == fused.size()) return fused;
     }
   }
   return fused;

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace tsdfpp {
 namespace {
@@ -86,6 +85,51 @@ Matches FindMatches(const Cloud& segment, const Cloud& model, const Tree& tree, 
   return matches;
 }
 
+// PCL's points are floats, so they are taken from the segment's centroid, S.
+struct CentredSegment {
+  Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();
+  Cloud::Ptr points_S = pcl::make_shared<Cloud>();
+  double radius_m = 0;
+};
+
+// Without points where one of them, or the centroid, is no number: PCL aborts there.
+CentredSegment Centre(const std::vector<Eigen::Vector3d>& segment_W) {
+  CentredSegment segment;
+  for (const Eigen::Vector3d& p_W : segment_W) segment.centroid_W += p_W;
+  segment.centroid_W /= static_cast<double>(segment_W.size());
+  if (!segment.centroid_W.allFinite()) return segment;
+  segment.points_S->reserve(segment_W.size());
+  for (const Eigen::Vector3d& p_W : segment_W) {
+    const Eigen::Vector3d p_S = p_W - segment.centroid_W;
+    if (!p_S.cast<float>().allFinite()) return {};
+    segment.radius_m = std::max(segment.radius_m, p_S.norm());
+    Point point;
+    point.getVector3fMap() = p_S.cast<float>();
+    segment.points_S->push_back(point);
+  }
+  return segment;
+}
+
+void SetUp(Icp& icp, const IcpConfig& config, double voxel_m, double radius_m) {
+  icp.setMaxCorrespondenceDistance(config.correspondence_voxels * voxel_m);
+  icp.setMaximumIterations(config.max_iterations);
+  // PCL takes the square of a length and the cosine of an angle; half of the step for each.
+  const double step_m = 0.5 * config.settled_voxels * voxel_m;
+  icp.setTransformationEpsilon(step_m * step_m);
+  icp.setTransformationRotationEpsilon(std::cos(std::min(step_m / radius_m, 1.0)));
+  // Else PCL reports ICP that ran out of iterations as converged, or stops where the error, but not
+  // the motion, is at rest.
+  icp.getConvergeCriteria()->setFailureAfterMaximumIterations(true);
+  icp.getConvergeCriteria()->setAbsoluteMSE(0);
+}
+
+// Of a motion: whether it is one that the config believes.
+bool IsWithin(const Eigen::Vector3d& shift, const Eigen::Quaterniond& turn, const IcpConfig& config,
+              double voxel_m) {
+  return shift.norm() <= config.max_translation_voxels * voxel_m &&
+         turn.angularDistance(Eigen::Quaterniond::Identity()) <= config.max_rotation_rad;
+}
+
 }  // namespace
 
 Expected<void> IcpConfig::Validate() const {
@@ -132,28 +176,21 @@ toml::table IcpConfig::ToToml() const {
                      {"max_rotation_rad", max_rotation_rad}};
 }
 
-std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const cv::Mat& labels, InstanceId id,
+std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const std::vector<int>& pixels,
                                            const IcpConfig& config) {
-  cv::Mat mask = labels == static_cast<double>(id);
-  if (config.mask_erosion_px > 0) {
-    const int side = 2 * config.mask_erosion_px + 1;
-    cv::erode(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
+  std::vector<int> valid;
+  valid.reserve(pixels.size());
+  const int cols = frame.depth.cols;
+  for (const int pixel : pixels) {
+    if (IsValidDepth(frame.depth.at<float>(pixel / cols, pixel % cols))) valid.push_back(pixel);
   }
-  const auto is_taken = [&](int v, int u) {
-    return mask.at<std::uint8_t>(v, u) != 0 && IsValidDepth(frame.depth.at<float>(v, u));
-  };
-  std::vector<cv::Point> pixels;
-  for (int v = 0; v < mask.rows; ++v) {
-    for (int u = 0; u < mask.cols; ++u) {
-      if (is_taken(v, u)) pixels.emplace_back(u, v);
-    }
-  }
-  const std::size_t count = std::min(pixels.size(), static_cast<std::size_t>(config.max_points));
+  const std::size_t count = std::min(valid.size(), static_cast<std::size_t>(config.max_points));
   const Intrinsics& camera = frame.intrinsics;
   std::vector<Eigen::Vector3d> points_W;
   points_W.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const cv::Point& pixel = pixels[i * pixels.size() / count];
+    const int at = valid[i * valid.size() / count];
+    const cv::Point pixel(at % cols, at / cols);
     const double z = frame.depth.at<float>(pixel);
     const Eigen::Vector3d p_C((pixel.x - camera.cx) / camera.fx * z,
                               (pixel.y - camera.cy) / camera.fy * z, z);
@@ -170,75 +207,53 @@ TrackResult TrackObject(const std::vector<Eigen::Vector3d>& segment_W, const Tri
   };
   if (too_few(segment_W.size())) return result;
 
-  // PCL's points are floats, so they are taken from the segment's centroid, S.
-  Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p_W : segment_W) centroid_W += p_W;
-  centroid_W /= static_cast<double>(segment_W.size());
-  if (!centroid_W.allFinite()) return result;
-  auto segment_S = pcl::make_shared<Cloud>();
-  segment_S->reserve(segment_W.size());
-  double radius_m = 0;
-  for (const Eigen::Vector3d& p_W : segment_W) {
-    const Eigen::Vector3d p_S = p_W - centroid_W;
-    radius_m = std::max(radius_m, p_S.norm());
-    Point point;
-    point.getVector3fMap() = p_S.cast<float>();
-    segment_S->push_back(point);
-  }
-  const Cloud::Ptr model_S = MakeModel(model_W, centroid_W);
+  const CentredSegment segment = Centre(segment_W);
+  if (segment.points_S->empty()) return result;
+  const Cloud::Ptr model_S = MakeModel(model_W, segment.centroid_W);
   // A segment smaller than a voxel says nothing about a rotation.
-  if (too_few(model_S->size()) || radius_m < voxel_m) return result;
+  if (too_few(model_S->size()) || segment.radius_m < voxel_m) return result;
   const auto tree = pcl::make_shared<Tree>();
   tree->setInputCloud(model_S);
-
-  const double limit_m = config.correspondence_voxels * voxel_m;
-  const auto accept = [&](const Matches& matches) {
-    return matches.count >= config.min_points &&
-           matches.count >= config.min_inlier_share * static_cast<double>(segment_W.size());
+  const auto note_matches = [&](const Pose& T) {
+    const Matches matches =
+        FindMatches(*segment.points_S, *model_S, *tree, T, config.correspondence_voxels * voxel_m);
+    result.correspondences = matches.count;
+    result.rmse_m = matches.rmse_m;
   };
   // PCL would complain on stderr about too few matches.
-  const Matches start = FindMatches(*segment_S, *model_S, *tree, Pose::Identity(), limit_m);
-  if (start.count < config.min_points) {
-    result.correspondences = start.count;
-    result.rmse_m = start.rmse_m;
-    return result;
-  }
+  note_matches(Pose::Identity());
+  if (result.correspondences < config.min_points) return result;
 
   Icp icp;
-  icp.setInputSource(segment_S);
+  icp.setInputSource(segment.points_S);
   icp.setInputTarget(model_S);
   icp.setSearchMethodTarget(tree, true);
-  icp.setMaxCorrespondenceDistance(limit_m);
-  icp.setMaximumIterations(config.max_iterations);
-  // PCL takes the square of a length and the cosine of an angle; half of the step for each.
-  const double step_m = 0.5 * config.settled_voxels * voxel_m;
-  icp.setTransformationEpsilon(step_m * step_m);
-  icp.setTransformationRotationEpsilon(std::cos(std::min(step_m / radius_m, 1.0)));
-  // Else PCL reports ICP that ran out of iterations as converged, or stops where the error, but not
-  // the motion, is at rest.
-  icp.getConvergeCriteria()->setFailureAfterMaximumIterations(true);
-  icp.getConvergeCriteria()->setAbsoluteMSE(0);
+  SetUp(icp, config, voxel_m, segment.radius_m);
   Cloud aligned;
   icp.align(aligned);
   result.iterations = icp.iterations();
-
   const Eigen::Matrix4d solution = icp.getFinalTransformation();
-  if (!solution.allFinite()) return result;
+  if (!solution.allFinite()) {
+    result.correspondences = 0;
+    result.rmse_m = 0;
+    return result;
+  }
   Pose T_old_new = Pose::Identity();  // takes the segment back to the model, in S
   // A rotation again after a product of many.
   const Eigen::Quaterniond rotation =
       Eigen::Quaterniond(Eigen::Matrix3d(solution.topLeftCorner<3, 3>())).normalized();
   T_old_new.linear() = rotation.toRotationMatrix();
   T_old_new.translation() = solution.topRightCorner<3, 1>();
-  const Matches end = FindMatches(*segment_S, *model_S, *tree, T_old_new, limit_m);
-  result.correspondences = end.count;
-  result.rmse_m = end.rmse_m;
+  note_matches(T_old_new);
 
-  const bool is_plausible =
-      T_old_new.translation().norm() <= config.max_translation_voxels * voxel_m &&
-      rotation.angularDistance(Eigen::Quaterniond::Identity()) <= config.max_rotation_rad;
-  if (!icp.hasConverged() || !accept(end) || !is_plausible) return result;
-  const Eigen::Translation3d from_S(centroid_W);
+  const bool is_matched =
+      result.correspondences >= config.min_points &&
+      result.correspondences >= config.min_inlier_share * static_cast<double>(segment_W.size());
+  if (!icp.hasConverged() || !is_matched ||
+      !IsWithin(T_old_new.translation(), rotation, config, voxel_m)) {
+    return result;
+  }
+  const Eigen::Translation3d from_S(segment.centroid_W);
   result.T_O = from_S * T_old_new.inverse() * from_S.inverse();
   result.converged = true;
   return result;

@@ -40,11 +40,10 @@ struct TrackResult {
   double rmse_m = 0;        // of the point-to-plane distances of those matches
 };
 
-// The points of one label in the world, metres, from the pixels with valid depth that remain when
-// the label's mask is eroded by `mask_erosion_px` (a square window; the image's own border erodes
-// nothing). `labels` is CV_16UC1 of the depth's size. Of more than `max_points`, those at even
-// steps in row order.
-std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const cv::Mat& labels, InstanceId id,
+// The points of a segment in the world, metres, from those of its pixels (PixelsByLabel() in
+// mapper/track/segment_points.h with `mask_erosion_px`) that have valid depth. Of more than
+// `max_points`, those at even steps in row order.
+std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const std::vector<int>& pixels,
                                            const IcpConfig& config);
 
 // Minimises the paper's eq. (1) over transformations that take the segment's points `segment_W`

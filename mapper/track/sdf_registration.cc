@@ -65,6 +65,73 @@ OutlineTerm OutlineTermOf(const SdfRegistration& task, const SdfTrackConfig& con
   return {has_one ? *task.places : nowhere, has_one ? *task.outline : none, frame, options};
 }
 
+DistanceTerm TermOf(const SdfRegistration& task, const MotionFrame& frame,
+                    const SdfTrackConfig& config, std::size_t stride) {
+  return {*task.model, task.points, frame, task.voxel_m, task.camera, config, stride};
+}
+
+// From every seed, with a share of the points: the pose of least cost, in the result.
+void RegisterCoarsely(const SdfRegistration& task, const SdfTrackConfig& config,
+                      LeastSquaresOptions options, SdfRegistrationResult& result) {
+  options.settled_m *= 10;
+  const std::size_t stride =
+      std::max<std::size_t>(1, task.points.size() / static_cast<std::size_t>(config.coarse_points));
+  const DistanceTerm coarse = TermOf(task, result.frame, config, stride);
+  const OutlineTerm outline =
+      OutlineTermOf(task, config, result.frame, config.coarse_points,
+                    static_cast<double>(task.points.size()) / static_cast<double>(stride));
+  const auto sums = [&](const Pose& T) {
+    NormalEquations both = coarse.Sums(T);
+    both += outline.Sums(T);
+    return both;
+  };
+  double least = std::numeric_limits<double>::infinity();
+  const auto try_seed = [&](const Pose& seed) {
+    const MotionPrior prior = PriorFor(sums(seed).H, task.T_LC_expected, config.weak_share);
+    const LeastSquaresResult found = MinimiseOverPose(sums, seed, result.frame, prior, options);
+    result.iterations += found.iterations;
+    if (!(found.at.cost < least)) return;
+    least = found.at.cost;
+    result.T_LC = found.T;
+  };
+  if (!task.is_near) try_seed(task.T_LC_expected);
+  for (const Pose& seed : task.T_LC_seeds) try_seed(seed);
+}
+
+struct FineFit {
+  MotionPrior prior;
+  LeastSquaresResult found;
+};
+
+// All points, with as narrow a Huber function as the residuals ask for. Sags hold near where they
+// were read, so they are read once more.
+FineFit RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
+                       const LeastSquaresOptions& options, DistanceTerm& fine,
+                       SdfRegistrationResult& result) {
+  const OutlineTerm outline = OutlineTermOf(task, config, result.frame, config.outline_places,
+                                            static_cast<double>(task.points.size()));
+  const auto sums = [&](const Pose& T) {
+    NormalEquations both = fine.Sums(T);
+    both += outline.Sums(T);
+    return both;
+  };
+  FineFit fit;
+  for (int pass = 0; pass < (config.curved ? 2 : 1); ++pass) {
+    if (config.curved) fine.SetSags(result.T_LC);
+    const double deviation_m =
+        fine.RobustDeviation_m(result.T_LC, kLeastDeviation_voxels * task.voxel_m);
+    fine.SetHuber(
+        std::min(config.huber_voxels * task.voxel_m, config.huber_deviations * deviation_m));
+    if (pass == 0) {
+      fit.prior = PriorFor(sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
+    }
+    fit.found = MinimiseOverPose(sums, result.T_LC, result.frame, fit.prior, options);
+    result.iterations += fit.found.iterations;
+    result.T_LC = fit.found.T;
+  }
+  return fit;
+}
+
 }  // namespace
 
 KnownDirections DirectionsOf(const Matrix6& information) {
@@ -95,62 +162,9 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   result.frame = FrameOf(task);
   if (!result.frame.centre.allFinite() || !std::isfinite(result.frame.radius_m)) return result;
   const LeastSquaresOptions options{config.max_iterations, config.settled_voxels * task.voxel_m};
-  const auto term_of = [&](std::size_t stride) {
-    return DistanceTerm(*task.model, task.points, result.frame, task.voxel_m, task.camera, config,
-                        stride);
-  };
-
-  // Coarse: from every seed.
-  const std::size_t stride =
-      std::max<std::size_t>(1, task.points.size() / static_cast<std::size_t>(config.coarse_points));
-  const DistanceTerm coarse = term_of(stride);
-  const OutlineTerm coarse_outline =
-      OutlineTermOf(task, config, result.frame, config.coarse_points,
-                    static_cast<double>(task.points.size()) / static_cast<double>(stride));
-  const auto coarse_sums = [&](const Pose& T) {
-    NormalEquations sums = coarse.Sums(T);
-    sums += coarse_outline.Sums(T);
-    return sums;
-  };
-  LeastSquaresOptions coarse_options = options;
-  coarse_options.settled_m *= 10;
-  double least = std::numeric_limits<double>::infinity();
-  const auto try_seed = [&](const Pose& seed) {
-    const MotionPrior prior = PriorFor(coarse_sums(seed).H, task.T_LC_expected, config.weak_share);
-    const LeastSquaresResult found =
-        MinimiseOverPose(coarse_sums, seed, result.frame, prior, coarse_options);
-    result.iterations += found.iterations;
-    if (!(found.at.cost < least)) return;
-    least = found.at.cost;
-    result.T_LC = found.T;
-  };
-  if (!task.is_near) try_seed(task.T_LC_expected);
-  for (const Pose& seed : task.T_LC_seeds) try_seed(seed);
-
-  // Fine: all points, with as narrow a Huber function as the residuals ask for. Sags hold near
-  // where they were read, so they are read once more.
-  DistanceTerm fine = term_of(1);
-  const OutlineTerm fine_outline = OutlineTermOf(task, config, result.frame, config.outline_places,
-                                                 static_cast<double>(task.points.size()));
-  const auto fine_sums = [&](const Pose& T) {
-    NormalEquations sums = fine.Sums(T);
-    sums += fine_outline.Sums(T);
-    return sums;
-  };
-  MotionPrior prior;
-  LeastSquaresResult found;
-  for (int pass = 0; pass < (config.curved ? 2 : 1); ++pass) {
-    if (config.curved) fine.SetSags(result.T_LC);
-    const double deviation_m =
-        fine.RobustDeviation_m(result.T_LC, kLeastDeviation_voxels * task.voxel_m);
-    fine.SetHuber(
-        std::min(config.huber_voxels * task.voxel_m, config.huber_deviations * deviation_m));
-    if (pass == 0)
-      prior = PriorFor(fine_sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
-    found = MinimiseOverPose(fine_sums, result.T_LC, result.frame, prior, options);
-    result.iterations += found.iterations;
-    result.T_LC = found.T;
-  }
+  RegisterCoarsely(task, config, options, result);
+  DistanceTerm fine = TermOf(task, result.frame, config, 1);
+  const auto [prior, found] = RegisterFinely(task, config, options, fine, result);
   // Where no point has a distance there is nothing to be at rest on.
   result.converged = found.converged && found.at.H.trace() > 0;
   result.counts = fine.Count(found.T);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "mapper/track/free_space.h"
 
@@ -17,6 +18,8 @@ constexpr int kLongestExtrapolation_frames = 5;
 constexpr int kOutlineMargin_px = 48;
 // Fewer places of the model in free space are outlines that are a little off.
 constexpr int kFewSeenThrough = 3;
+// Numbers of frames may be any.
+constexpr std::int64_t kMostPassed = 1'000'000'000;
 
 // With a rotation again after a product of many, whose rounding would else grow.
 Pose AsRigid(Pose T) {
@@ -62,9 +65,8 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
                                const MapRepresentation& map, const ObjectPoses& before) {
   TrackedPoses after{before};
   const double voxel_m = map.config().voxel_m;
-  for (const auto& [id, box] : BoxesOf(labels)) {
-    if (id == kBackground) continue;
-    const auto points = SegmentPointsOf(frame, labels, id, box, voxel_m, config_);
+  for (const auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
+    const auto points = SegmentPointsOf(frame, pixels, voxel_m, config_);
     TrackStatus& status = after.seen[id];
     status = TrackStatus::kFrozen;
     if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
@@ -110,7 +112,10 @@ std::optional<Pose> SdfTracker::Register(const Frame& frame,
   sight.T_WL = model.T_WL;
   sight.T_LO = model.T_WL.inverse() * T_WO;
   // An object from a map's file has no memory yet.
-  if (memory.centre_L) sight.passed = std::max(1, frame.index - memory.frame);
+  if (memory.centre_L) {
+    const std::int64_t passed = std::int64_t{frame.index} - memory.frame;
+    sight.passed = static_cast<int>(std::clamp<std::int64_t>(passed, 1, kMostPassed));
+  }
 
   SdfRegistrationResult found = RegisterToDistances(TaskOf(sight, memory), config_);
   if (!found.converged) return std::nullopt;

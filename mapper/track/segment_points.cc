@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace tsdfpp {
 namespace {
@@ -19,51 +18,76 @@ bool IsInside(const cv::Mat& depth, int v, int u, float max_step_m) {
   return goes_on(v - 1, u) && goes_on(v + 1, u) && goes_on(v, u - 1) && goes_on(v, u + 1);
 }
 
-}  // namespace
-
-std::map<InstanceId, cv::Rect> BoxesOf(const cv::Mat& labels) {
-  std::map<InstanceId, cv::Rect> boxes;
-  for (int v = 0; v < labels.rows; ++v) {
-    const auto* row = labels.ptr<InstanceId>(v);
-    for (int u = 0; u < labels.cols;) {
-      const int begin = u;
-      const InstanceId id = row[u];
-      while (u < labels.cols && row[u] == id) ++u;
-      if (id != kNoInstance) boxes[id] |= cv::Rect(begin, v, u - begin, 1);
-    }
+// Keeps the label of pixels whose neighbours within `erosion_px` columns have it too; others, and
+// the background, become kNoInstance.
+void ErodeRow(const InstanceId* row, int cols, int erosion_px, InstanceId* to) {
+  for (int begin = 0; begin < cols;) {
+    int end = begin;
+    while (end < cols && row[end] == row[begin]) ++end;
+    const int first = begin == 0 ? 0 : begin + erosion_px;
+    const int last = end == cols ? end : end - erosion_px;
+    const InstanceId label = row[begin] == kBackground ? kNoInstance : row[begin];
+    std::fill(to + begin, to + end, kNoInstance);
+    if (first < last) std::fill(to + first, to + last, label);
+    begin = end;
   }
-  return boxes;
 }
 
-std::vector<SegmentPoint> SegmentPointsOf(const Frame& frame, const cv::Mat& labels, InstanceId id,
-                                          const cv::Rect& box, double voxel_m,
-                                          const SdfTrackConfig& config) {
-  // With a rim of its surroundings, so that erosion sees them.
-  const int rim = config.mask_erosion_px;
-  const cv::Rect window =
-      cv::Rect(box.x - rim, box.y - rim, box.width + 2 * rim, box.height + 2 * rim) &
-      cv::Rect(0, 0, labels.cols, labels.rows);
-  cv::Mat mask = labels(window) == static_cast<double>(id);
-  if (rim > 0) {
-    cv::erode(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {2 * rim + 1, 2 * rim + 1}));
-  }
-  const auto max_step_m = static_cast<float>(config.max_step_voxels * voxel_m);
-  std::vector<cv::Point2i> pixels;
-  pixels.reserve(static_cast<std::size_t>(box.area()));
-  for (int row = 0; row < mask.rows; ++row) {
-    const auto* is_mine = mask.ptr<std::uint8_t>(row);
-    for (int column = 0; column < mask.cols; ++column) {
-      if (is_mine[column] == 0) continue;
-      const cv::Point2i pixel(window.x + column, window.y + row);
-      if (IsInside(frame.depth, pixel.y, pixel.x, max_step_m)) pixels.push_back(pixel);
+}  // namespace
+
+std::map<InstanceId, std::vector<int>> PixelsByLabel(const cv::Mat& labels, int erosion_px) {
+  std::map<InstanceId, std::vector<int>> pixels;
+  InstanceId last = kNoInstance;
+  std::vector<int>* of_last = nullptr;
+  const auto pixels_of = [&](InstanceId label) -> std::vector<int>& {
+    if (label != last) of_last = &pixels[last = label];
+    return *of_last;
+  };
+  cv::Mat eroded(labels.size(), CV_16UC1);
+  // For each column, down to which rows above this one the pixels have one label.
+  std::vector<int> since(static_cast<std::size_t>(labels.cols), 0);
+  for (int v = 0; v < labels.rows + erosion_px; ++v) {
+    if (v < labels.rows) {
+      const auto* row = labels.ptr<InstanceId>(v);
+      for (int u = 0; u < labels.cols; ++u) {
+        if (row[u] != kBackground && row[u] != kNoInstance && row[u] != last) pixels_of(row[u]);
+      }
+      ErodeRow(row, labels.cols, erosion_px, eroded.ptr<InstanceId>(v));
+      const auto* here = eroded.ptr<InstanceId>(v);
+      const auto* above = eroded.ptr<InstanceId>(std::max(v - 1, 0));
+      for (int u = 0; u < labels.cols; ++u) {
+        if (here[u] != above[u]) since[static_cast<std::size_t>(u)] = v;
+      }
+    }
+    // All that a pixel of this row asks for is known by now.
+    const int middle = v - erosion_px;
+    if (middle < 0) continue;
+    const int first = std::max(0, middle - erosion_px);
+    const auto* row = eroded.ptr<InstanceId>(middle);
+    for (int u = 0; u < labels.cols; ++u) {
+      if (row[u] == kNoInstance || since[static_cast<std::size_t>(u)] > first) continue;
+      pixels_of(row[u]).push_back(middle * labels.cols + u);
     }
   }
-  const std::size_t count = std::min(pixels.size(), static_cast<std::size_t>(config.max_points));
+  return pixels;
+}
+
+std::vector<SegmentPoint> SegmentPointsOf(const Frame& frame, const std::vector<int>& pixels,
+                                          double voxel_m, const SdfTrackConfig& config) {
+  const int cols = frame.depth.cols;
+  const auto max_step_m = static_cast<float>(config.max_step_voxels * voxel_m);
+  std::vector<cv::Point2i> inside;
+  inside.reserve(pixels.size());
+  for (const int pixel : pixels) {
+    const cv::Point2i at(pixel % cols, pixel / cols);
+    if (IsInside(frame.depth, at.y, at.x, max_step_m)) inside.push_back(at);
+  }
+  const std::size_t count = std::min(inside.size(), static_cast<std::size_t>(config.max_points));
   const Intrinsics& camera = frame.intrinsics;
   std::vector<SegmentPoint> points;
   points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const cv::Point2i& pixel = pixels[i * pixels.size() / count];
+    const cv::Point2i& pixel = inside[i * inside.size() / count];
     const double z = frame.depth.at<float>(pixel.y, pixel.x);
     const Eigen::Vector3d p_C((pixel.x - camera.cx) / camera.fx * z,
                               (pixel.y - camera.cy) / camera.fy * z, z);

@@ -1,3 +1,5 @@
+// Longer than most files: one loop with its parts, which are compiled together for each instruction
+// set.
 #include <hwy/cache_control.h>
 
 #include <algorithm>

@@ -10,130 +10,17 @@
 #include <tuple>
 
 #include "mapper/volume/cube_masks.h"
+#include "mapper/volume/outlines.h"
 
 namespace tsdfpp {
 namespace {
 
-// A cube's corners are within its diagonal of a point in it: 1.8 voxels, and the rounding of
-// pixels.
-constexpr double kRimReach_voxels = 2;
 const IsOwnVoxel kAllAreOwn;
 constexpr int kRowsPerTask = 16;
 constexpr std::size_t kBlocksPerRimTask = 8;
 // Distances of neighbours, or of their neighbours, that differ by more are of two surfaces: where
 // one is seen at 75 degrees, a voxel's step changes the distance along the ray by four.
 constexpr float kLargestStep_voxels = 4;
-
-// An object that is farther than this in front of what is beside it in the image ends there: what
-// its surface goes on to is out of sight, and nobody knows whether it does.
-constexpr float kInFront_voxels = 2;
-
-// Outlines that reach farther (with everyday images none does) are stamped all at once: one by one
-// they would each go over much of the image.
-constexpr int kWideReach_px = 256;
-
-struct PixelBox {
-  int left, right, top, bottom;  // inclusive
-};
-
-// Sets `near` at the pixels of this label that are in any of the boxes, in one pass over all.
-void StampBoxes(const std::vector<PixelBox>& boxes, std::uint16_t own, const FrameView& frame,
-                std::vector<std::uint8_t>& near) {
-  // Of how many boxes more a pixel is in than the one to its left, and than the row above says.
-  const auto columns = static_cast<std::size_t>(frame.width) + 1;
-  std::vector<std::int32_t> steps(columns * (static_cast<std::size_t>(frame.height) + 1), 0);
-  const auto at = [&](int column, int row) -> std::int32_t& {
-    return steps[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
-  };
-  for (const PixelBox& box : boxes) {
-    ++at(box.left, box.top);
-    --at(box.right + 1, box.top);
-    --at(box.left, box.bottom + 1);
-    ++at(box.right + 1, box.bottom + 1);
-  }
-  std::vector<std::int32_t> above(columns, 0);
-  std::size_t pixel = 0;
-  for (int row = 0; row < frame.height; ++row) {
-    std::int32_t boxes_here = 0;
-    for (int column = 0; column < frame.width; ++column, ++pixel) {
-      std::int32_t& step = above[static_cast<std::size_t>(column)];
-      step += at(column, row);
-      boxes_here += step;
-      if (boxes_here > 0 && frame.kernel.label[pixel] == own) near[pixel] = 1;
-    }
-  }
-}
-
-// The pixels within reach of an outline of their own object, one byte each.
-std::vector<std::uint8_t> PixelsAtOutlines(const FrameView& frame, double voxel_m) {
-  const auto width = static_cast<std::size_t>(frame.width);
-  std::vector<std::uint8_t> near(width * static_cast<std::size_t>(frame.height), 0);
-  const double reach_px =
-      kRimReach_voxels * voxel_m * std::max(frame.intrinsics.fx, frame.intrinsics.fy);
-  const std::uint16_t* label = frame.kernel.label;
-  const auto in_front_m = static_cast<float>(kInFront_voxels * voxel_m);
-  std::map<std::uint16_t, std::vector<PixelBox>> wide;  // by label
-  const auto stamp = [&](std::size_t pixel, std::size_t beside) {
-    if (!frame.IsUsable(pixel) || !frame.IsUsable(beside)) return;
-    if (frame.kernel.depth[pixel] + in_front_m < frame.kernel.depth[beside]) return;
-    const int u = static_cast<int>(pixel % width);
-    const int v = static_cast<int>(pixel / width);
-    const std::uint16_t own = label[pixel];
-    const auto reach = static_cast<int>(
-        std::min(std::ceil(reach_px / double{frame.kernel.depth[pixel]}), double{1 << 14}));
-    const int left = std::max(0, u - reach);
-    const int right = std::min(frame.width - 1, u + reach);
-    const int top = std::max(0, v - reach);
-    const int bottom = std::min(frame.height - 1, v + reach);
-    if (reach >= kWideReach_px) {
-      wide[own].push_back({left, right, top, bottom});
-      return;
-    }
-    for (int row = top; row <= bottom; ++row) {
-      // Written so that compilers make vectors of it.
-      const std::size_t first =
-          static_cast<std::size_t>(row) * width + static_cast<std::size_t>(left);
-      const std::uint16_t* others = label + first;
-      std::uint8_t* out = near.data() + first;
-      for (int i = 0; i <= right - left; ++i) {
-        out[i] = static_cast<std::uint8_t>(out[i] | static_cast<std::uint8_t>(others[i] == own));
-      }
-    }
-  };
-  const int columns = frame.tiles_per_row;
-  const int rows = static_cast<int>(frame.tiles.size()) / columns;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      // Outlines run through the tile, or along its right or lower side.
-      const auto tile = [&](int dx, int dy) -> const Tile& {
-        const int x = std::min(column + dx, columns - 1);
-        const int y = std::min(row + dy, rows - 1);
-        return frame.tiles[static_cast<std::size_t>(y * columns + x)];
-      };
-      const Tile& own = tile(0, 0);
-      const auto is_as_own = [&](const Tile& of) {
-        return of.least_label == own.least_label && of.greatest_label == own.least_label;
-      };
-      if (is_as_own(own) && is_as_own(tile(1, 0)) && is_as_own(tile(0, 1))) continue;
-      for (int v = row * kTile_px; v < std::min((row + 1) * kTile_px, frame.height); ++v) {
-        for (int u = column * kTile_px; u < std::min((column + 1) * kTile_px, frame.width); ++u) {
-          const std::size_t pixel =
-              static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u);
-          if (u + 1 < frame.width && label[pixel] != label[pixel + 1]) {
-            stamp(pixel, pixel + 1);
-            stamp(pixel + 1, pixel);
-          }
-          if (v + 1 < frame.height && label[pixel] != label[pixel + width]) {
-            stamp(pixel, pixel + width);
-            stamp(pixel + width, pixel);
-          }
-        }
-      }
-    }
-  }
-  for (const auto& [own, boxes] : wide) StampBoxes(boxes, own, frame, near);
-  return near;
-}
 
 // A voxel without an observation in a cube in which the pixel sees the surface of `id`.
 struct RimVoxel {
@@ -192,19 +79,23 @@ class NearbyVoxels {
   const TsdfBlock* block_ = nullptr;
 };
 
-// By object and voxel, each once, with its first pixel.
-std::vector<RimVoxel> FindRimVoxels(const FrameView& frame, const MapConfig& config,
-                                    const RimVolumeOf& volume_of) {
-  const std::vector<std::uint8_t> near = PixelsAtOutlines(frame, config.voxel_m);
-  const int tasks = (frame.height + kRowsPerTask - 1) / kRowsPerTask;
-  std::vector<std::vector<RimVoxel>> found(static_cast<std::size_t>(tasks));
-  const Intrinsics& k = frame.intrinsics;
-  std::vector<double> slope_of_column;
-  for (int u = 0; u < frame.width; ++u) slope_of_column.push_back((u - k.cx) / k.fx);
-  const auto visit_row = [&](int v, std::vector<RimVoxel>& out) {
-    const double slope_of_row = (v - k.cy) / k.fy;
+// Finds rim voxels at a row's pixels that are near an outline.
+class RowSearch {
+ public:
+  RowSearch(const FrameView& frame, const MapConfig& config, const RimVolumeOf& volume_of)
+      : frame_(frame),
+        voxel_m_(config.voxel_m),
+        volume_of_(volume_of),
+        near_(PixelsAtOutlines(frame, config.voxel_m)) {
+    const Intrinsics& k = frame.intrinsics;
+    for (int u = 0; u < frame.width; ++u) slope_of_column_.push_back((u - k.cx) / k.fx);
+  }
+
+  void Visit(int v, std::vector<RimVoxel>& out) const {
+    const FrameView& frame = frame_;
+    const double slope_of_row = (v - frame.intrinsics.cy) / frame.intrinsics.fy;
     const std::size_t first = static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width);
-    const auto row = near.begin() + static_cast<std::ptrdiff_t>(first);
+    const auto row = near_.begin() + static_cast<std::ptrdiff_t>(first);
     InstanceId id = kNoInstance;
     Pose T_LC = Pose::Identity();
     std::optional<NearbyVoxels> voxels;
@@ -216,7 +107,7 @@ std::vector<RimVoxel> FindRimVoxels(const FrameView& frame, const MapConfig& con
       if (!frame.IsUsable(pixel)) continue;
       if (frame.kernel.label[pixel] != id) {
         id = frame.kernel.label[pixel];
-        const std::optional<RimVolume> volume = volume_of(id);
+        const std::optional<RimVolume> volume = volume_of_(id);
         voxels.reset();
         last.x = std::numeric_limits<int>::max();
         if (!volume) continue;
@@ -227,25 +118,45 @@ std::vector<RimVoxel> FindRimVoxels(const FrameView& frame, const MapConfig& con
       const double z = frame.kernel.depth[pixel];
       const Eigen::Vector3d p_L =
           T_LC *
-          Eigen::Vector3d(slope_of_column[static_cast<std::size_t>(u)] * z, slope_of_row * z, z);
-      const Index3 cube = FloorOf(p_L / config.voxel_m);
+          Eigen::Vector3d(slope_of_column_[static_cast<std::size_t>(u)] * z, slope_of_row * z, z);
+      const Index3 cube = FloorOf(p_L / voxel_m_);
       if (cube == last) continue;
       last = cube;
-      if (voxels->IsSurelyObserved(cube)) continue;
-      for (int i = 0; i < 8; ++i) {
-        const Index3 corner = cube + Index3{i & 1, (i >> 1) & 1, i >> 2};
-        if (voxels->IsObserved(corner)) continue;
-        out.push_back({id, corner, static_cast<std::uint32_t>(pixel)});
-      }
+      AddUnobserved(*voxels, cube, id, pixel, out);
     }
-  };
+  }
+
+ private:
+  static void AddUnobserved(NearbyVoxels& voxels, const Index3& cube, InstanceId id,
+                            std::size_t pixel, std::vector<RimVoxel>& out) {
+    if (voxels.IsSurelyObserved(cube)) return;
+    for (int i = 0; i < 8; ++i) {
+      const Index3 corner = cube + Index3{i & 1, (i >> 1) & 1, i >> 2};
+      if (voxels.IsObserved(corner)) continue;
+      out.push_back({id, corner, static_cast<std::uint32_t>(pixel)});
+    }
+  }
+
+  const FrameView& frame_;
+  double voxel_m_;
+  const RimVolumeOf& volume_of_;
+  std::vector<std::uint8_t> near_;
+  std::vector<double> slope_of_column_;
+};
+
+// By object and voxel, each once, with its first pixel.
+std::vector<RimVoxel> FindRimVoxels(const FrameView& frame, const MapConfig& config,
+                                    const RimVolumeOf& volume_of) {
+  const RowSearch search(frame, config, volume_of);
+  const int tasks = (frame.height + kRowsPerTask - 1) / kRowsPerTask;
+  std::vector<std::vector<RimVoxel>> found(static_cast<std::size_t>(tasks));
   tbb::parallel_for(
       tbb::blocked_range<int>(0, tasks, 1),
       [&](const tbb::blocked_range<int>& range) {
         for (int task = range.begin(); task != range.end(); ++task) {
           const int end = std::min(frame.height, (task + 1) * kRowsPerTask);
           for (int v = task * kRowsPerTask; v < end; ++v) {
-            visit_row(v, found[static_cast<std::size_t>(task)]);
+            search.Visit(v, found[static_cast<std::size_t>(task)]);
           }
         }
       },

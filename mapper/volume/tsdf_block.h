@@ -90,8 +90,8 @@ struct alignas(64) TsdfBlock {
   // it.
   std::uint64_t revision = 0;
 
-  // Kept by AnchoredMap where the object's lattice is the world's: other objects are listed in the
-  // index's block as well.
+  // Kept by DistanceIndex where the object's lattice is the world's: its block lists other objects
+  // as well. Here, because fusion would have to look each block up there.
   bool is_listed_with_others = false;
 
   static void* operator new(std::size_t);

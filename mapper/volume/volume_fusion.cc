@@ -78,6 +78,19 @@ class Candidates {
   std::size_t size_ = 0;
 };
 
+FusionRule RuleOf(const MapConfig& config, InstanceId id, bool one_label) {
+  FusionRule rule;
+  rule.id = id;
+  rule.contradiction = config.contradiction;
+  rule.one_label = one_label;
+  rule.front = config.front();
+  rule.back = config.back();
+  rule.colour_band = config.colour_band();
+  rule.first_colour_band = config.first_colour_band();
+  rule.weight_cap = static_cast<float>(config.weight_cap);
+  return rule;
+}
+
 }  // namespace
 
 std::uint8_t BlocksOfCubesAt(const BlockMask& voxels) {
@@ -109,15 +122,7 @@ std::vector<FusedBlock> FuseIntoVolumes(const FrameView& frame, const MapConfig&
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
           const Candidate of = candidates[planned[k].number];
-          FusionRule rule;
-          rule.id = of.id;
-          rule.contradiction = config.contradiction;
-          rule.one_label = planned[k].label == of.id;
-          rule.front = config.front();
-          rule.back = config.back();
-          rule.colour_band = config.colour_band();
-          rule.first_colour_band = config.first_colour_band();
-          rule.weight_cap = static_cast<float>(config.weight_cap);
+          const FusionRule rule = RuleOf(config, of.id, planned[k].label == of.id);
           TsdfBlock& block = *of.block;
           const TsdfBlock* next =
               k + 1 == range.end() ? nullptr : candidates[planned[k + 1].number].block;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <numbers>
 #include <set>
@@ -157,12 +158,12 @@ class MaskFaults {
   // An id that nothing in this frame has, the same one for the whole of a fault unless two faults
   // draw the same.
   InstanceId Invent(double uniform) const {
-    constexpr int kCount = kLastInventedId - kFirstInventedId + 1;
-    int offset = static_cast<int>(uniform * kCount);
-    while (object_of_.contains(static_cast<InstanceId>(kFirstInventedId + offset))) {
-      offset = (offset + 1) % kCount;
+    const int drawn = static_cast<int>(uniform * kInventedIds);
+    for (int taken = 0; taken < kInventedIds; ++taken) {
+      const auto id = static_cast<InstanceId>(kFirstInventedId + (drawn + taken) % kInventedIds);
+      if (!object_of_.contains(id)) return id;
     }
-    return static_cast<InstanceId>(kFirstInventedId + offset);
+    std::abort();
   }
 
   void Split(InstanceId id) {
@@ -228,8 +229,8 @@ class MaskFaults {
 
 }  // namespace
 
-bool InventsIds(const MaskFaultConfig& config) {
-  return config.split.rate > 0 || config.flicker.rate > 0;
+int InventionsAnObject(const MaskFaultConfig& config) {
+  return (config.split.rate > 0 ? 1 : 0) + (config.flicker.rate > 0 ? 1 : 0);
 }
 
 bool DrawsEveryId(const MaskFaultConfig& config) { return config.flicker.rate >= 1; }

@@ -18,7 +18,9 @@ namespace tsdfpp {
 // kLastInventedId, which still fit 8-bit mask files; true ids stay below.
 inline constexpr InstanceId kFirstInventedId = 128;
 inline constexpr InstanceId kLastInventedId = 255;
-bool InventsIds(const MaskFaultConfig& config);
+inline constexpr int kInventedIds = kLastInventedId - kFirstInventedId + 1;
+// The most ids that the faults may invent for one object in one frame.
+int InventionsAnObject(const MaskFaultConfig& config);
 // Whether each object has an invented id in every frame, so that ids say nothing of objects.
 bool DrawsEveryId(const MaskFaultConfig& config);
 
@@ -56,7 +58,8 @@ cv::Mat SplitMask(const cv::Mat& mask, InstanceId object, double angle, Instance
 // `object` (the lowest id of several); kNoInstance where there is none.
 InstanceId TouchingObject(const cv::Mat& mask, InstanceId object, int pixels);
 
-// `mask` is CV_16UC1 with ids below kFirstInventedId where InventsIds; `objects` gives the classes.
+// `mask` is CV_16UC1; `objects` gives the classes. Where ids are invented, those of the mask are
+// below kFirstInventedId and so few that kInventedIds are enough; aborts where these are used up.
 // The exact config changes no pixel.
 SensedMask SenseMask(const MaskFaultConfig& config, std::uint64_t seed, int frame,
                      const cv::Mat& mask, const std::vector<ObjectInfo>& objects);

@@ -17,7 +17,9 @@ Expected<void> CheckMask(const MaskFaultConfig& config, const SequenceInfo& info
     return UsageError("sensor.masks asks for mask faults, and frame {} of '{}' has no mask",
                       frame.index, info.name);
   }
-  if (!InventsIds(config)) return {};
+  const int inventions = InventionsAnObject(config);
+  if (inventions == 0) return {};
+  int objects = 0;
   for (const ObjectInfo& object : info.objects) {
     if (object.id >= kFirstInventedId) {
       return UsageError(
@@ -25,6 +27,13 @@ Expected<void> CheckMask(const MaskFaultConfig& config, const SequenceInfo& info
           "{}: expected ids below {}",
           kFirstInventedId, object.name, info.name, object.id, kFirstInventedId);
     }
+    if (object.id != kBackground) ++objects;
+  }
+  if (objects * inventions > kInventedIds) {
+    return UsageError(
+        "sensor.masks.split and .flicker may invent {} ids for the {} objects of '{}', expected at "
+        "most {}",
+        objects * inventions, objects, info.name, kInventedIds);
   }
   return {};
 }

@@ -28,7 +28,8 @@ struct SensedTruth {
 // and the objects' classes alone: not on frames sensed before. The exact config changes no byte.
 // Errors: kUsage where the config is invalid (ValidateSensorConfig), where it needs an image that
 // the frame lacks (colour for the depth model azure, a mask for mask faults), or where it invents
-// ids and an object's id is kFirstInventedId or more.
+// ids and an object's id is kFirstInventedId or more, or the objects are more than there are ids to
+// invent for.
 Expected<SensedTruth> ApplySensor(const SensorConfig& config, std::uint64_t seed,
                                   const SequenceInfo& info, Frame& frame);
 

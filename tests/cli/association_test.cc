@@ -82,6 +82,9 @@ TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
                 .find("--associate given: the ids in the masks of mini are drawn anew in every "
                       "frame, expected --associate votes"),
             std::string::npos);
+  EXPECT_NE(sentence(Run("compare", "no", {"--associate", "given"}))
+                .find("--associate given: the ids in the masks of mini are drawn anew"),
+            std::string::npos);
   EXPECT_NE(sentence(Run("map", "no", {"--poses", "gt"}))
                 .find("--poses gt are the poses of given ids, and --associate votes gives ids of "
                       "its own: expected --poses icp, or --associate given"),

@@ -304,6 +304,66 @@ TEST_F(Hostile, WhatIsThereTwiceIsRefused) {
   ExpectSentence(Map(folder_ / "seven"), kData, "are both of frame 2");
 }
 
+// Masks that show an object that the sequence does not list: it is in the map, and is kept.
+TEST_F(Hostile, ObjectsThatNobodyListsAreKept) {
+  Spoil("sequence.json", "\"id\": 8", "\"id\": 9");
+  fs::remove(folder_ / "set/trajectories/gt-right-8.txt");
+  const fs::path file = folder_ / "a/b/out.map";
+  const CommandOutput begun = Map(folder_ / "set", {"--until", "1", "--save", file});
+  ASSERT_EQ(begun.exit_code, 0) << begun.err;
+  EXPECT_TRUE(fs::exists(folder_ / "a/b/out/mesh/object8-8.ply"));
+  const std::string out = folder_ / "a/b/out";
+  const CommandOutput alone =
+      RunTsdfpp({"map", "--load", file, "--remove", "object8", "--out", out}, folder_.path());
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  const CommandOutput rest =
+      RunTsdfpp({"map", folder_ / "set", "--load", file, "--out", out}, folder_.path());
+  EXPECT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_TRUE(fs::exists(folder_ / "a/b/out/mesh/object8-8.ply"));
+}
+
+// What a loaded map cannot say is asked for again, or said to be wrong.
+TEST_F(Hostile, SettingsOfTrackingAreNotLeftOut) {
+  const fs::path file = folder_ / "a/b/out.map";
+  ASSERT_EQ(Map(folder_ / "set", {"--until", "1", "--save", file, "--poses", "icp"}).exit_code, 0);
+  const auto go_on = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"map", folder_ / "set", "--load",
+                                       file,  "--out",         folder_ / "a/b/out"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTsdfpp(arguments, folder_.path());
+  };
+  const CommandOutput all = go_on({"--track", "all"});
+  EXPECT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_NE(all.err.find("tracked is all that is not background"), std::string::npos) << all.err;
+  ExpectSentence(go_on({"--track-config", folder_ / "none.toml"}), kUsage, "no such file");
+  ASSERT_TRUE(WriteFile(folder_ / "track.toml", "min_points = 40\n").has_value());
+  ExpectSentence(go_on({"--track-config", folder_ / "track.toml"}), kUsage,
+                 "--track-config needs --poses track");
+  ExpectSentence(RunTsdfpp({"map", "--load", file, "--track", "all", "--out", folder_ / "a/b/out"},
+                           folder_.path()),
+                 kUsage, "--track needs a sequence to map");
+  ExpectSentence(Map(folder_ / "set", {"--method", "surfels", "--associate", "votes"}), kUsage,
+                 "association by votes asks a map for its voxels, which method 'surfels' has not");
+}
+
+// The page of a run would take the place of the run.
+TEST_F(Hostile, WhatAPageIsMadeOfIsNotWrittenOver) {
+  const fs::path run = folder_ / "run";
+  const std::string note =
+      R"({"schema":1,"generator":"tsdfpp","run":"0123456789abcdef","command":"c",)"
+      R"("files":[{"name":"summary.json","bytes":2}]})";
+  for (const auto& [file, text] : std::map<std::string, std::string>{
+           {"run.json", note}, {"summary.json", "{}"}, {"gates.json", "{}"}}) {
+    ASSERT_TRUE(WriteFile(run / file, text).has_value());
+  }
+  for (const char* file : {"run.json", "summary.json", "gates.json", "../run/summary.json"}) {
+    ExpectSentence(RunTsdfpp({"report", run, "--out", run / file}, folder_.path()), kUsage,
+                   "is a file that the page is made of, expected another");
+  }
+  EXPECT_EQ(ReadFile(run / "run.json").value(), note);
+  EXPECT_EQ(ReadFile(run / "summary.json").value(), "{}");
+}
+
 TEST_F(Hostile, FramesThatAreClaimedAreListed) {
   Spoil("sequence.json", "\"frame_count\": 3", "\"frame_count\": 1000000");
   const CommandOutput output = RunTsdfpp({"verify", folder_ / "set"}, folder_.path());

@@ -36,6 +36,18 @@ TEST(JsonText, WhatIsNoJsonHasASentence) {
   EXPECT_EQ(ParseJsonObject("3", "x.json").error().message, "x.json: not a JSON object");
 }
 
+// A reader would else go by one of two answers.
+TEST(JsonText, MembersAreThereOnce) {
+  for (const char* text : {R"({"a":1,"a":2})", R"([{"b":{"a":1,"\u0061":1}}])"}) {
+    const auto twice = ParseJson(text, "x.json");
+    ASSERT_FALSE(twice.has_value()) << text;
+    EXPECT_EQ(twice.error().message, "x.json: an object has 'a' twice");
+    EXPECT_EQ(twice.error().kind, ErrorKind::kData);
+  }
+  EXPECT_TRUE(ParseJson(R"([{"a":{"a":[{"a":1}]},"b":"a"},{"a":1}])", "x.json").has_value());
+  EXPECT_EQ(ParseJson(R"({"a":1,"a":2)", "x.json").error().message, "x.json: not JSON");
+}
+
 // As deep as this, copying, printing and comparing overflow the stack.
 TEST(JsonText, DepthIsLimitedBeforeAnythingIsMade) {
   for (const std::string& text :

@@ -1,4 +1,5 @@
-// The rooms within the large rooms (docs/architecture.md): what includes what never leads back.
+// The rooms (docs/architecture.md): a lower one includes no higher one, and within the large rooms
+// what includes what never leads back.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -6,6 +7,7 @@
 #include <regex>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "core/files.h"
 #include "tests/core/temp_folder.h"
@@ -62,6 +64,60 @@ std::string Circle(const Arrows& arrows) {
     if (!way.empty()) return way;
   }
   return "";
+}
+
+// The other rooms that a room's files include, each with one of them.
+std::map<std::string, std::string> RoomsIncludedBy(const fs::path& source,
+                                                   const std::string& room) {
+  std::map<std::string, std::string> included;
+  const std::regex include(
+      "#include \"(bench|cli|core|eval|mapper|metrics|sequence|sim|tests|viewer)/");
+  for (const auto& entry : fs::recursive_directory_iterator(source / room)) {
+    const fs::path extension = entry.path().extension();
+    if (!entry.is_regular_file() || (extension != ".h" && extension != ".cc")) continue;
+    const std::string text = ReadFile(entry.path()).value();
+    for (std::sregex_iterator at(text.begin(), text.end(), include), end; at != end; ++at) {
+      if ((*at)[1] != room) {
+        included.try_emplace((*at)[1], entry.path().lexically_relative(source).string());
+      }
+    }
+  }
+  return included;
+}
+
+// Those of them that are not `allowed`, a sentence each.
+std::vector<std::string> NotAllowed(const fs::path& source, const std::string& room,
+                                    const std::set<std::string>& allowed) {
+  std::vector<std::string> faults;
+  for (const auto& [other, file] : RoomsIncludedBy(source, room)) {
+    if (!allowed.contains(other)) faults.push_back(file + " includes a header of " + other);
+  }
+  return faults;
+}
+
+TEST(Rooms, ALowerOneIncludesNoHigherOne) {
+  const std::map<std::string, std::set<std::string>> allowed{
+      {"core", {}},
+      {"sim", {"core"}},
+      {"sequence", {"core"}},
+      {"mapper", {"core"}},
+      {"metrics", {"core"}},
+      {"eval", {"core", "sim", "sequence", "mapper", "metrics", "viewer"}},
+      {"cli", {"core", "sim", "sequence", "mapper", "metrics", "eval"}},
+  };
+  for (const auto& [room, others] : allowed) {
+    EXPECT_EQ(NotAllowed(TSDFPP_SOURCE_DIR, room, others), std::vector<std::string>()) << room;
+  }
+}
+
+TEST(Rooms, AHigherOneIsFound) {
+  const test::TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "mapper/index/list.h",
+                        "#include \"mapper/map.h\"\n#include \"core/types.h\"\n"));
+  EXPECT_EQ(NotAllowed(folder.path(), "mapper", {"core"}), std::vector<std::string>());
+  ASSERT_TRUE(WriteFile(folder / "mapper/map.cc", "#include \"metrics/measured.h\"\n"));
+  EXPECT_EQ(NotAllowed(folder.path(), "mapper", {"core"}),
+            std::vector<std::string>{"mapper/map.cc includes a header of metrics"});
 }
 
 TEST(Rooms, NoneLeadsBack) {

@@ -1,4 +1,4 @@
-// A folder of its own for one test, removed at the end.
+// A folder of its own for one test, or for all of a suite, removed at the end.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,9 +13,10 @@ namespace tsdfpp::test {
 class TempFolder {
  public:
   TempFolder() {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = "tsdfpp-" + std::string(info->test_suite_name()) + "-" + info->name() + "-" +
-                       std::to_string(getpid());
+    const testing::UnitTest& tests = *testing::UnitTest::GetInstance();
+    const auto* info = tests.current_test_info();  // nullptr in SetUpTestSuite()
+    std::string name = "tsdfpp-" + std::string(tests.current_test_suite()->name()) + "-" +
+                       (info == nullptr ? "all" : info->name()) + "-" + std::to_string(getpid());
     std::replace(name.begin(), name.end(), '/', '-');  // of a test with a parameter
     path_ = std::filesystem::path(testing::TempDir()) / name;
     std::filesystem::remove_all(path_);

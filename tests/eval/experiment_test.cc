@@ -6,6 +6,7 @@
 #include <set>
 
 #include "eval/sweep/cell.h"
+#include "eval/sweep/sweep.h"
 #include "eval/sweep/sweep_statistics.h"
 
 namespace tsdfpp {
@@ -129,6 +130,41 @@ TEST(Experiment, TheReadyOnesFitTheirScenes) {
     ++experiments;
   }
   EXPECT_GE(experiments, 11);
+}
+
+// Values that are sound one by one; a cell of them has no map.
+TEST(Experiment, SettingsThatDoNotGoTogetherAreRefused) {
+  const auto config = Parse(R"(name = "e"
+question = "?"
+metrics = ["fuse_ms"]
+[[grid]]
+scene = "mini.toml"
+method = ["surfels", "tsdf"]
+poses = "track"
+)");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto plan = PlanSweep(*config);
+  ASSERT_FALSE(plan.has_value());
+  EXPECT_EQ(plan.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(plan.error().message.find("grid '1': poses 'track' are tracked by signed distances"),
+            std::string::npos)
+      << plan.error().message;
+}
+
+// Masks whose ids are of one frame alone are no objects' masks.
+TEST(Experiment, SensorsThatDrawEveryIdAreRefused) {
+  VariantMaker maker(TSDFPP_SOURCE_DIR "/scenes", {});
+  CellSettings settings;
+  settings.scene = "mini.toml";
+  settings.sensor = "masks_mild";
+  ASSERT_TRUE(maker.Make(settings).has_value());
+  settings.sensor = "masks_redrawn";
+  const auto variant = maker.Make(settings);
+  ASSERT_FALSE(variant.has_value());
+  EXPECT_EQ(variant.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(variant.error().message.find("draws the ids of masks anew in every frame"),
+            std::string::npos)
+      << variant.error().message;
 }
 
 TEST(Experiment, CellsAreAllCombinationsGridByGrid) {

@@ -31,6 +31,25 @@ TEST(SweepMetrics, EveryRowIsWhole) {
   EXPECT_EQ(FindMetric("map_mb")->better, Better::kLower);
 }
 
+TEST(SweepMetrics, ASharesMostIsOne) {
+  EXPECT_EQ(MostOf(*FindMetric("table_preservation_behind_other")), 1);
+  EXPECT_EQ(MostOf(*FindMetric("table_retention_behind_other")), std::nullopt) << "a ratio";
+  EXPECT_EQ(MostOf(*FindMetric("table_hole_area_cm2")), std::nullopt) << "it has a unit";
+}
+
+// What it does not know the report shows by a bare name, and leaves out where two reports are
+// compared.
+TEST(SweepMetrics, TheReportKnowsEveryColumn) {
+  const std::string page = ReadFile(TSDFPP_SOURCE_DIR "/viewer/src/measures.js").value();
+  for (const EvaluationColumn& column : EvaluationColumns()) {
+    EXPECT_NE(page.find("\n  " + column.csv + ": {"), std::string::npos)
+        << "give " << column.csv << " a row in viewer/src/measures.js";
+    if (!column.error) continue;
+    EXPECT_NE(page.find("\n  " + column.csv + "_se: "), std::string::npos)
+        << "give " << column.csv << "_se a row in viewer/src/measures.js";
+  }
+}
+
 TEST(SweepMetrics, ThePageIsMadeOfIt) {
   const std::string page = ReadFile(TSDFPP_SOURCE_DIR "/docs/metrics.md").value();
   EXPECT_NE(page.find(MetricsMarkdown()), std::string::npos)

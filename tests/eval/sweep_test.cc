@@ -293,6 +293,11 @@ TEST_F(Sweep, AnEditedResultIsNotReplayed) {
       in_sequence([](json& s) { s["evaluated"] = json::array(); }),
       in_sequence([](json& s) { s["object_error"] = 1e308; }),
       in_sequence([](json& s) { s["fuse_until"] = -1; }),
+      said(all,
+           [&](json& value) {
+             value["cells"][id]["settings"]["method"] = "surfels";
+             value["cells"][id]["settings"]["poses"] = "track";
+           }),
       said(one, [](json& c) { c.erase("images"); }),
       said(one, [](json& c) { c["images"] = {1}; }),
       said(one, [](json& c) { c["images"]["3"] = 5; }),

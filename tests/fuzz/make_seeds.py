@@ -9,6 +9,7 @@ corpora (what fuzzing found) stay as they are.
 import argparse
 import json
 import pathlib
+import re
 import struct
 
 from seed_files import COLOUR, ROOT, depth_exr, grid, has_object, packed, png, save
@@ -230,18 +231,21 @@ def labels(encoding):
             "pred/b.png": image(4, bits)}
 
 
-METRICS = ["table_preservation_behind_other", "table_retention_behind_other", "table_hole_area_cm2", "visible_completion",
-           "table_visible_completion", "movers_completion", "ghost_area_cm2", "revealed_ghost_area_cm2",
-           "revealed_unseen_area_cm2", "sanity_all", "sanity_least", "seam_share", "seam_area_cm2", "bulge_share",
-           "table_preservation_any_label", "table_label_purity", "movers_accuracy_rmse_mm", "table_accuracy_rmse_mm"]
-COSTS = ["frame_ms", "move_ms", "fuse_ms", "mesh_ms", "map_mb"]
+def metrics():
+    """The names of all metrics, of evaluations and of whole runs, as docs/metrics.md lists them: first what an evaluation has."""
+    page = (ROOT / "docs" / "metrics.md").read_text()
+    table = page[page.index("<!-- table: metrics -->"):]
+    names = re.findall(r"^\| `(\w+)` \|", table[:table.index("<!-- end -->")], re.MULTILINE)
+    first_cost = names.index("frame_ms")
+    return names[:first_cost], names[first_cost:]
 
 
 def cell():
-    scores = {name: 0.5 for name in METRICS}
+    of_evaluations, of_runs = metrics()
+    scores = {name: 0.5 for name in of_evaluations}
     scores["seam_share"] = {"value": None, "why": "no seam"}
     return {"schema": 2, "id": "0123456789abcdef", "sequence": "sequence", "key": "key", "settings": {},
-            "examined": {**scores, **{name: 1.5 for name in COSTS}}, "removed": [1],
+            "examined": {**scores, **{name: 1.5 for name in of_runs}}, "removed": [1],
             "frames": [{"frame": 8, "examined": True, "scores": scores, "map_digest": "00ff"}], "evaluation": {},
             "times": {"run": "r", "frame_ms": [1.0, 2.5], "steps": None}, "images": {"1": "00ff", "8": "ff00"}}
 

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 
+#include <set>
+#include <string>
+
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/limits.h"
@@ -51,7 +54,8 @@ TEST_P(FuzzReplay, Corpus) {
     SCOPED_TRACE(file.filename());
     const bool accepted = Read(target, file);
     if (!file.filename().string().starts_with("good")) continue;
-    EXPECT_TRUE(accepted) << "a sound input is refused";
+    EXPECT_TRUE(accepted) << "a sound input is refused; where what it should hold has changed, as "
+                             "by a new metric, python3 tests/fuzz/make_seeds.py makes it anew";
     ++good;
   }
   EXPECT_GT(good, 0) << "no sound input for the fuzzer to begin with";
@@ -88,6 +92,23 @@ TEST(FuzzTargets, EveryCorpusAndEverySourceIsThere) {
     }
   }
 #endif
+}
+
+TEST(FuzzTargets, EveryReaderOfASequenceIsFuzzed) {
+  const fs::path root = TSDFPP_SOURCE_DIR;
+  std::set<std::string> fuzzed;
+  for (const Target& target : AllTargets()) {
+    fuzzed.insert(target.sources.begin(), target.sources.end());
+  }
+  const std::string built = ReadFile(root / "tests" / "fuzz" / "readers.cmake").value();
+  for (const fs::path& file : EntriesOf(root / "sequence")) {
+    const std::string name = file.filename().string();
+    if (!name.ends_with("_reader.cc")) continue;
+    EXPECT_TRUE(fuzzed.contains("sequence/" + name))
+        << name << " has no target in tests/fuzz/targets_sequences.cc";
+    EXPECT_NE(built.find(" " + name), std::string::npos)
+        << name << " is not in tests/fuzz/readers.cmake";
+  }
 }
 
 TEST(FuzzComplaint, IsMadeOfWhatUsersMustNotSee) {

@@ -278,5 +278,24 @@ TEST(RunFolder, WhatIsInTheWayIsNamed) {
   EXPECT_EQ(ContentOf(out), before);
 }
 
+// A rename would fail on them when the earlier result is gone already.
+TEST(RunFolder, FoldersWithoutFilesMakePlace) {
+  const TempFolder folder;
+  const fs::path out = folder / "out";
+  for (const char* text : {"first", "second"}) {
+    fs::create_directories(out / "000002.png/a/b");
+    fs::create_directories(out / "run.json.d");
+    auto run = RunFolder::Begin(out, "c");
+    ASSERT_TRUE(run.has_value());
+    ASSERT_TRUE(WriteFile(run->path() / "000001.png", text).has_value());
+    ASSERT_TRUE(WriteFile(run->path() / "000002.png", text).has_value());
+    const auto done = run->Commit();
+    ASSERT_TRUE(done.has_value()) << done.error().message;
+    EXPECT_EQ(ReadFile(out / "000002.png").value(), text);
+    EXPECT_TRUE(fs::is_directory(out / "run.json.d"));
+    fs::remove(out / "000002.png");
+  }
+}
+
 }  // namespace
 }  // namespace tsdfpp

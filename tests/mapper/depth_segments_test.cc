@@ -174,6 +174,27 @@ TEST(DepthSegments, RefusesAnImageOfAnotherSizeOrType) {
   EXPECT_EQ(ids.error().message.rfind("frame 1: ", 0), 0U) << ids.error().message;
 }
 
+// More than there are ids: each pixel is a surface of its own, and none is small.
+TEST(DepthSegments, RefusesMoreSegmentsThanThereAreIds) {
+  Frame frame;
+  frame.index = 1;
+  frame.intrinsics = {300, 300, 250, 250, 149.5, 149.5};
+  frame.depth.create(300, 300, CV_32FC1);
+  for (int v = 0; v < 300; ++v) {
+    for (int u = 0; u < 300; ++u) {
+      frame.depth.at<float>(v, u) = 1 + static_cast<float>((7 * u + 3 * v) % 10);
+    }
+  }
+  DepthSegmentsConfig config = ExactConfig();
+  config.min_share = 0;
+  config.min_m2 = 0;
+  const auto ids = DepthSegments(config).Segment(frame);
+  ASSERT_FALSE(ids.has_value());
+  EXPECT_EQ(ids.error().kind, ErrorKind::kData);
+  EXPECT_NE(ids.error().message.find("segments, expected at most 65534"), std::string::npos)
+      << ids.error().message;
+}
+
 TEST(DepthSegmentsConfig, RoundTripsThroughTomlAndValidatesItself) {
   DepthSegmentsConfig config;
   EXPECT_TRUE(config.Validate().has_value());

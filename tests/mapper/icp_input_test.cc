@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "mapper/track/icp_registration.h"
+#include "mapper/track/segment_points.h"
 #include "tests/reference/analytic_scene.h"
 
 namespace tsdfpp {
@@ -24,7 +25,9 @@ class SegmentPointsTest : public ::testing::Test {
     labels_ = cv::Mat(frame_.depth.size(), CV_16UC1, cv::Scalar(kBackground));
     labels_(rectangle_) = kId;
   }
-  Points Segment() const { return SegmentPoints(frame_, labels_, kId, config_); }
+  Points Segment() const {
+    return SegmentPoints(frame_, PixelsByLabel(labels_, config_.mask_erosion_px).at(kId), config_);
+  }
 
   const cv::Rect rectangle_{20, 10, 30, 20};
   Frame frame_;
@@ -88,7 +91,8 @@ TEST_F(SegmentPointsTest, AreThinnedEvenly) {
 }
 
 TEST_F(SegmentPointsTest, AreNoneForALabelThatIsNotThere) {
-  EXPECT_TRUE(SegmentPoints(frame_, labels_, 8, config_).empty());
+  EXPECT_FALSE(PixelsByLabel(labels_, config_.mask_erosion_px).contains(8));
+  EXPECT_TRUE(SegmentPoints(frame_, {}, config_).empty());
 }
 
 TEST(IcpConfig, SurvivesToml) {

@@ -13,6 +13,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "mapper/map_representation.h"
+#include "mapper/track/segment_points.h"
 #include "tests/needs.h"
 #include "tests/reference/analytic_scene.h"
 #include "tests/reference/icp_reference.h"
@@ -212,7 +213,8 @@ TEST(TrackObject, RecoversTheMotionOfAnObjectInTheMap) {
   const Pose motion = MakePose(0.02, Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.006, 0.004, 0));
   scene.T_WO[kId] = motion;
   const Frame frame = reference::Render(scene, T_WC, 3, camera);
-  const Points segment_W = SegmentPoints(frame, frame.mask, kId, {});
+  const Points segment_W =
+      SegmentPoints(frame, PixelsByLabel(frame.mask, IcpConfig{}.mask_erosion_px).at(kId), {});
   const TrackResult result = TrackObject(segment_W, map->ObjectMesh(kId), kIcpVoxel_m, {});
   ASSERT_TRUE(result.converged);
   const Eigen::Vector3d before_W = motion.inverse() * Centroid(segment_W);

@@ -165,6 +165,29 @@ TEST(MapFileNames, ARunNamesAllObjectsInPlainText) {
                   kBrick));
 }
 
+// What a run says of objects is of objects that it names, up to its last frame; otherwise it is
+// neither read nor written.
+TEST(MapFileNames, TrajectoriesAreThoseOfTheRunsObjects) {
+  const auto map = MakeMap(Method::kTsdf, ToyConfig());
+  const test::TempFolder folder;
+  const auto sentence = [&](const MappedRun& run) {
+    const auto loaded = MapFromBytes(MapToBytes(*map, &run).value(), "map.tsdf");
+    EXPECT_EQ(SaveMap(folder / "map.tsdf", *map, &run).has_value(), loaded.has_value());
+    return loaded ? std::string() : loaded.error().message;
+  };
+  EXPECT_EQ(sentence(SomeRun()), "");
+  const std::string begin = "map.tsdf: section 'RUN ' is wrong: ";
+  MappedRun run = SomeRun();
+  // An id that counting on from would wrap to that of the background.
+  run.trajectories[kNoInstance] = {{1, Pose::Identity()}};
+  EXPECT_EQ(sentence(run), begin + "object 65535 has a trajectory and is not in its list");
+  run = SomeRun();
+  run.last_frame = 2;
+  EXPECT_EQ(sentence(run), begin + fmt::format("the trajectory of object {} goes to frame 3, "
+                                               "behind the last one, 2",
+                                               kBrick));
+}
+
 // Zeros fold to a thousandth: what they unfold to is summed before memory is taken.
 TEST(MapFileSize, WhatUnfoldsToTooMuchIsRefused) {
   constexpr std::size_t kBytes = 8U << 20U;

@@ -9,8 +9,8 @@
 #include <set>
 #include <span>
 
+#include "mapper/mesh/join_parts.h"
 #include "mapper/mesh/marching_cubes.h"
-#include "mapper/mesh/scene_parts.h"
 #include "tests/mapper/from_scratch.h"
 #include "tests/mapper/mesh_checks.h"
 #include "tests/mapper/methods_of_tests.h"

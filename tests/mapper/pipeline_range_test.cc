@@ -44,6 +44,7 @@ TEST_P(PipelineRange, ARefusedFrameLeavesNoTrace) {
       },
       [](Frame& f) { f.T_WC.linear() *= 2; },
       [](Frame& f) { f.intrinsics.fx = 1e-30; },
+      [](Frame& f) { f.T_WO[kNoInstance] = Pose::Identity(); },
   };
   for (int i = 0; i < 3; ++i) {
     const Frame good = DyadicFrame(i);
@@ -135,6 +136,33 @@ TEST(PipelineRemarks, ALoadedMapCounts) {
   config.method = Method::kTsdfppAnchored;
   const Pipeline loaded(config, {}, DyadicMap(config.method, 1), {});
   EXPECT_TRUE(loaded.Remarks().empty());
+}
+
+// Trackers see a frame before it is known whether the map can take it, and PCL's points have single
+// precision; a map without blocks has no range of its own.
+TEST(PipelineForm, WhatNoNumberCanHoldIsRefused) {
+  const std::vector<std::function<void(Frame&)>> faults{
+      [](Frame& f) { f.intrinsics.fx = 1e-300; }, [](Frame& f) { f.intrinsics.cx = 1e300; },
+      [](Frame& f) { f.T_WC.translation().x() = 1e300; },
+      [](Frame& f) { f.T_WC.translation().x() = 1e8; },
+      [](Frame& f) {
+        f.intrinsics.width = f.intrinsics.height = 1;
+        for (cv::Mat* image : {&f.colour, &f.depth, &f.mask}) *image = (*image)({0, 0, 1, 1});
+      }};
+  for (const Method method : {Method::kTsdfppAnchored, Method::kSurfels}) {
+    for (const PoseSource poses : {PoseSource::kGiven, PoseSource::kIcp}) {
+      Pipeline pipeline = NewPipeline(method, poses);
+      for (int i = 0; i < 2; ++i) ASSERT_TRUE(pipeline.Process(DyadicFrame(i)).has_value());
+      for (std::size_t k = 0; k < faults.size(); ++k) {
+        Frame bad = DyadicFrame(2);
+        faults[k](bad);
+        const auto status = pipeline.Process(bad);
+        ASSERT_FALSE(status.has_value()) << k;
+        EXPECT_EQ(status.error().kind, ErrorKind::kData);
+      }
+      EXPECT_TRUE(pipeline.Process(DyadicFrame(2)).has_value());
+    }
+  }
 }
 
 }  // namespace

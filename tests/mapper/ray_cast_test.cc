@@ -1,4 +1,5 @@
 // Ray casting: against tiny steps, closed forms, copies of the map without what is in front.
+// Longer than most files: each of these for the same camera and scenes.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 #include <tbb/global_control.h>

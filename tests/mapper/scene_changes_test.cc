@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "mapper/map_editing.h"
-#include "mapper/mesh/scene_parts.h"
+#include "mapper/mesh/join_parts.h"
 #include "mapper/scene_mesher.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/from_scratch.h"

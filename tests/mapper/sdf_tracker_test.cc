@@ -180,5 +180,28 @@ TEST(SdfTracker, TracksAllWhereNoClassIsKnownAndSaysWhereItTracksNothing) {
   EXPECT_NE(pipeline.Remarks()[0].find("--poses track"), std::string::npos);
 }
 
+// Each id there is, each all over the image: some minutes a frame where the image is looked at once
+// for each.
+TEST(ManyObjects, AreLookedAtTogether) {
+  Frame frame;
+  frame.intrinsics = {320, 240, 250, 250, 159.5, 119.5};
+  frame.colour = cv::Mat::zeros(240, 320, CV_8UC3);
+  frame.depth = cv::Mat::ones(240, 320, CV_32FC1);
+  frame.mask = cv::Mat(240, 320, CV_16UC1);
+  for (int at = 0; at < 240 * 320; ++at) {
+    frame.mask.at<InstanceId>(at / 320, at % 320) =
+        static_cast<InstanceId>(1 + at % (kNoInstance - 1));
+  }
+  for (const PoseSource poses : {PoseSource::kIcp, PoseSource::kTrack}) {
+    PipelineConfig config;
+    config.method = Method::kTsdfppAnchored;
+    config.map.voxel_m = 0.1;
+    config.poses = poses;
+    Pipeline pipeline(config, {});
+    ASSERT_TRUE(pipeline.Process(frame));
+    EXPECT_EQ(pipeline.track_log().objects().size(), std::size_t{kNoInstance} - 1);
+  }
+}
+
 }  // namespace
 }  // namespace tsdfpp

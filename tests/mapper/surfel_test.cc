@@ -1,5 +1,5 @@
 // Method `surfels` against its reference (tests/reference/surfel_reference.h), which is written
-// from docs/map.md alone, and against surfaces in closed form.
+// from docs/map.md alone, and against surfaces in closed form. Longer than most files: one method.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -51,7 +51,7 @@ void ExpectTrueLabels(const VoteWorld& world, const cv::Mat& labels, const cv::M
 }
 
 class VoxelVotesOfMethod : public EveryMethodTest {};
-TSDFPP_FOR_EVERY_METHOD(VoxelVotesOfMethod);
+TSDFPP_FOR_EVERY_VOXEL_METHOD(VoxelVotesOfMethod);
 
 // The brick drives and turns (tsdf/static moves nothing, so there it stands still) until it reaches
 // the tray, where one field of these large voxels mixes the two up.

@@ -1,4 +1,5 @@
 // Mask faults: rates and durations, and each step against brute force over all pairs of pixels.
+// Longer than most files: a test for each fault.
 #include "sim/sensor/mask_faults.h"
 
 #include <gtest/gtest.h>

@@ -249,8 +249,7 @@ TEST(SceneConfig, SaysWhatIsWrongWithCamerasAndRooms) {
 
 // Every scene can be written and read back, and is the same file then.
 TEST(SceneConfig, ScenesSurviveTheirTrip) {
-  for (const char* name : {"toycar3", "mini", "parked", "stack", "contact", "tumble", "thin",
-                           "many", "room", "handheld"}) {
+  for (const char* name : kScenes) {
     const SceneConfig config = LoadScene(name);
     const std::string text = SceneToToml(config);
     const auto read = ParseSceneConfig(text, "trip.toml");

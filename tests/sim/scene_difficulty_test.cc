@@ -4,7 +4,9 @@
 #include <cmath>
 #include <map>
 #include <opencv2/core.hpp>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sim/scene_list.h"
@@ -112,9 +114,8 @@ TEST_P(EveryScene, ObjectsAreInView) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
-                         testing::Values("parked", "stack", "contact", "tumble", "container",
-                                         "reentry", "occlusion", "thin", "fast", "many", "room",
-                                         "handheld"),
+                         testing::ValuesIn(std::vector<std::string>(kScenes.begin(),
+                                                                    kScenes.end())),
                          [](const auto& scene) { return scene.param; });
 
 TEST(SceneParked, TheCarStandsForEightSecondsThenClearsItsPlace) {
@@ -359,18 +360,18 @@ TEST(SceneFiles, ListsEveryScene) {
   const auto files = SceneFiles(std::string(TSDFPP_SOURCE_DIR) + "/scenes");
   ASSERT_TRUE(files.has_value()) << files.error().message;
   std::map<std::string, const SceneFile*> by_name;
+  const std::set<std::string_view> tested(kScenes.begin(), kScenes.end());
   for (const SceneFile& file : *files) {
+    EXPECT_TRUE(file.random || tested.contains(file.name))
+        << "name it in kScenes (tests/sim/scene_files.h): no test looks at " << file.path;
     EXPECT_EQ(file.name, file.path.stem().string());
     EXPECT_FALSE(file.purpose.empty()) << file.name;
     EXPECT_GT(file.frames, 0);
     EXPECT_EQ(file.random, file.name == "random");
     by_name.emplace(file.name, &file);
   }
-  for (const char* name :
-       {"toycar3", "static", "mini", "parked", "stack", "contact", "tumble", "container", "reentry",
-        "occlusion", "thin", "fast", "many", "room", "handheld", "random"}) {
-    EXPECT_TRUE(by_name.contains(name)) << name;
-  }
+  for (const char* name : kScenes) EXPECT_TRUE(by_name.contains(name)) << name;
+  EXPECT_TRUE(by_name.contains("random"));
   EXPECT_EQ(by_name.at("room")->width, 640);
   const auto none = SceneFiles("/nowhere");
   ASSERT_FALSE(none.has_value());

@@ -173,6 +173,41 @@ TEST(Sensor, RefusesWhatItCannotDo) {
       "id 130: expected ids below 128");
 }
 
+// A frame with 100 objects, each a square of its own.
+Frame ManySquares(SequenceInfo& info) {
+  Frame frame = ToyFrame(3);
+  frame.mask = cv::Mat::zeros(frame.depth.size(), CV_16UC1);
+  const int in_a_row = frame.depth.cols / 4;
+  info.objects = {{kBackground, "background", ""}};
+  for (int id = 1; id <= 100; ++id) {
+    const cv::Rect square(4 * ((id - 1) % in_a_row), 4 * ((id - 1) / in_a_row), 3, 3);
+    frame.mask(square).setTo(id);
+    info.objects.push_back({static_cast<InstanceId>(id), "cup", "cup"});
+  }
+  return frame;
+}
+
+// Either kind alone has an id for each; both together would not.
+TEST(Sensor, FaultsInventNoMoreIdsThanThereAre) {
+  SequenceInfo info = ToyInfo();
+  const Frame frame = ManySquares(info);
+  ASSERT_EQ(cv::countNonZero(frame.mask), 100 * 9);
+  SensorConfig config;
+  config.masks.split = {1, 1};
+  Frame split = frame;
+  const auto truth = ApplySensor(config, kSensorSeed, info, split);
+  ASSERT_TRUE(truth.has_value());
+  EXPECT_EQ(truth->segments.size(), 200U);
+  config.masks.flicker = {1, 1};
+  Frame both = frame;
+  const auto refused = ApplySensor(config, kSensorSeed, info, both);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
+  EXPECT_EQ(refused.error().message,
+            "sensor.masks.split and .flicker may invent 200 ids for the 100 objects of 'toy', "
+            "expected at most 128");
+}
+
 TEST(Sensor, AMissingMaskIsNoFaultWithoutMaskFaults) {
   Frame frame = ToyFrame(3);
   frame.mask = cv::Mat();

@@ -61,6 +61,10 @@ export const kMeasures = {
     scale: 1, unit: 'cm²', decimals: 1, better: -1, title: 'Ring',
     about: 'Area of background that is missing beside objects, in the visible scene',
   },
+  bulge_share: {
+    ...percent, decimals: 2, better: -1, title: 'Bulges',
+    about: 'Share of the background pixels beside objects where the map, seen from the camera, shows something in front of it',
+  },
   table_preservation_any_label: {
     ...percent, title: 'Hidden table kept, any label',
     about: 'As hidden table kept, whatever object the surface is said to belong to',

@@ -70,6 +70,56 @@ function alignedData(lists) {
   })];
 }
 
+// A line at the frame that is shown.
+function markFrame(u, frame) {
+  const x = u.valToPos(frame, 'x', true);
+  const { ctx } = u;
+  ctx.save();
+  ctx.strokeStyle = themeColour('--accent');
+  ctx.lineWidth = 1.5 * devicePixelRatio;
+  ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
+  ctx.beginPath();
+  ctx.moveTo(x, u.bbox.top);
+  ctx.lineTo(x, u.bbox.top + u.bbox.height);
+  ctx.stroke();
+  ctx.restore();
+}
+
+// A rare slow frame must not flatten all others: the scale ends above 98 % of the values.
+function usual(u, high) {
+  const values = u.data.slice(1).flat().filter((value) => value !== null).sort((a, b) => a - b);
+  return values.length ? Math.min(high, 1.3 * values[Math.floor(0.98 * (values.length - 1))]) : high;
+}
+
+function rangeOf(low, high, unit) {
+  if (low === null || high === null) return [0, 1];
+  const room = Math.max((high - low) * 0.08, Math.abs(high) * 0.01, 1e-6);
+  if (unit === '%') return [Math.max(0, low - room), Math.min(100.5, high + room)];
+  return [low >= 0 ? Math.max(0, low - (high - low) * 4) : low - room, high + room];
+}
+
+function plotOptions(chart, data, state, runs, width) {
+  const dark = state.get('dark');
+  const line = themeColour('--line');
+  const text = themeColour('--quiet');
+  const axis = { stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: '12px system-ui, sans-serif' };
+  const show = (u, value) => (value === null || value === undefined ? '–' : `${value.toFixed(chart.decimals)} ${chart.unit}`);
+  return {
+    width, height: kHeight,
+    cursor: { sync: { key: 'frames', scales: ['x', null] }, drag: { x: false, y: false }, focus: { prox: 24 } },
+    scales: { x: { time: false }, y: { range: (u, low, high) => rangeOf(low, chart.steps ? usual(u, high) : high, chart.unit) } },
+    axes: [{ ...axis, size: 28 }, { ...axis, size: 52 }],
+    series: [
+      { label: 'frame', value: (u, value) => (value === null || value === undefined ? '–' : String(value)) },
+      ...runs.map((run) => ({
+        label: shortLabel(run, runs), stroke: colourOfRun(run, dark), width: 2, dash: dashOfRun(run, data.runs),
+        points: { show: Boolean(chart.points), size: 6 }, spanGaps: true, value: show,
+      })),
+    ],
+    hooks: { draw: [(u) => markFrame(u, state.get('frame'))] },
+  };
+}
+
 function makeChart(chart, data, state, frames) {
   const holder = el('div', { class: 'plot' });
   let step = 'all';
@@ -80,63 +130,19 @@ function makeChart(chart, data, state, frames) {
   const part = el('figure', { class: 'chart', 'data-chart': chart.title },
     el('figcaption', { title: chart.about }, el('b', {}, chart.title),
       chart.unit ? el('span', { class: 'quiet' }, `, ${chart.unit}`) : null, steps), holder);
+  const width = () => Math.max(holder.clientWidth, 200);
   let plot = null;
-
-  function markFrame(u) {
-    const x = u.valToPos(state.get('frame'), 'x', true);
-    const { ctx } = u;
-    ctx.save();
-    ctx.strokeStyle = themeColour('--accent');
-    ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
-    ctx.beginPath();
-    ctx.moveTo(x, u.bbox.top);
-    ctx.lineTo(x, u.bbox.top + u.bbox.height);
-    ctx.stroke();
-    ctx.restore();
-  }
 
   function draw() {
     plot?.destroy();
     const runs = data.runs.filter((run) => state.get('shown').has(run.key));
     const read = chart.steps ? perFrame(kSteps[step][1]) : chart.read;
-    const dark = state.get('dark');
-    const line = themeColour('--line');
-    const text = themeColour('--quiet');
-    const axis = { stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: '12px system-ui, sans-serif' };
-    const show = (u, value) => (value === null || value === undefined ? '–' : `${value.toFixed(chart.decimals)} ${chart.unit}`);
-    plot = new uPlot({
-      width: Math.max(holder.clientWidth, 200), height: kHeight,
-      cursor: { sync: { key: 'frames', scales: ['x', null] }, drag: { x: false, y: false }, focus: { prox: 24 } },
-      scales: { x: { time: false }, y: { range: (u, low, high) => rangeOf(low, chart.steps ? usual(u, high) : high, chart.unit) } },
-      axes: [{ ...axis, size: 28 }, { ...axis, size: 52 }],
-      series: [
-        { label: 'frame', value: (u, value) => (value === null || value === undefined ? '–' : String(value)) },
-        ...runs.map((run) => ({
-          label: shortLabel(run, runs), stroke: colourOfRun(run, dark), width: 2, dash: dashOfRun(run, data.runs),
-          points: { show: Boolean(chart.points), size: 6 }, spanGaps: true, value: show,
-        })),
-      ],
-      hooks: { draw: [markFrame] },
-    }, alignedData(runs.map(read)), holder);
+    plot = new uPlot(plotOptions(chart, data, state, runs, width()), alignedData(runs.map(read)), holder);
     plot.over.addEventListener('click', () => {
       const at = plot.cursor.idx;
       if (at === null || at === undefined) return;
       state.set({ frame: nearestFrame(frames, plot.data[0][at]) });
     });
-  }
-
-  // A rare slow frame must not flatten all others: the scale ends above 98 % of the values.
-  function usual(u, high) {
-    const values = u.data.slice(1).flat().filter((value) => value !== null).sort((a, b) => a - b);
-    return values.length ? Math.min(high, 1.3 * values[Math.floor(0.98 * (values.length - 1))]) : high;
-  }
-
-  function rangeOf(low, high, unit) {
-    if (low === null || high === null) return [0, 1];
-    const room = Math.max((high - low) * 0.08, Math.abs(high) * 0.01, 1e-6);
-    if (unit === '%') return [Math.max(0, low - room), Math.min(100.5, high + room)];
-    return [low >= 0 ? Math.max(0, low - (high - low) * 4) : low - room, high + room];
   }
 
   // Drawn once it is laid out, and again for other maps or another theme.
@@ -145,7 +151,7 @@ function makeChart(chart, data, state, frames) {
   ready.then(() => {
     drawn = true;
     draw();
-    new ResizeObserver(() => plot?.setSize({ width: Math.max(holder.clientWidth, 200), height: kHeight })).observe(holder);
+    new ResizeObserver(() => plot?.setSize({ width: width(), height: kHeight })).observe(holder);
   });
   state.watch(['shown', 'dark'], () => drawn && draw());
   state.watch(['frame'], () => plot?.redraw(false));

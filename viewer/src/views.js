@@ -66,6 +66,92 @@ function pictures(runs, state) {
   return holder;
 }
 
+function pullControl(state) {
+  const pull = el('input', {
+    type: 'range', id: 'pull', min: 0, max: 100, step: 1,
+    oninput: () => state.set({ pull: Number(pull.value) / 100 }),
+  });
+  state.watch(['pull'], () => { pull.value = String(Math.round(100 * state.get('pull'))); });
+  return el('label', { class: 'pull', for: 'pull' }, 'Pull the moving objects away', pull);
+}
+
+function colourControl(state) {
+  const select = el('select', { id: 'colour-by', onchange: () => state.set({ colour: select.value }) },
+    kColours.map(([value, text]) => el('option', { value }, text)));
+  state.watch(['colour'], () => { select.value = state.get('colour'); });
+  return el('label', { class: 'choice', for: 'colour-by' }, 'Colour', select);
+}
+
+// What moves the camera; `view` says which view there is, if any yet.
+function cameraButtons(recording, state, view) {
+  const button = (text, action) => el('button', { type: 'button', onclick: () => view() && action(view()) }, text);
+  return el('span', { class: 'buttons' },
+    button('Camera’s view', (of) => of.lookAsCamera(recording, state.get('frame'))),
+    button('From above', (of) => of.lookFromAbove(recording, state.get('frame'))),
+    button('Reset', (of) => of.lookAsCamera(recording, state.get('frame'), 1.12)));
+}
+
+// What was asked for in a panel, in words.
+function describe(run, hit) {
+  if (!hit) return `${run.label}: nothing there.`;
+  if (hit.layer === 'hole') {
+    return `${run.label}: table that was seen, is hidden, and is lost; at ${hit.at.map((x) => x.toFixed(3)).join(', ')} m.`;
+  }
+  const words = kLayerWords[hit.layer];
+  const error = hit.error_mm === null ? 'more than 51 mm' : `${fixed(hit.error_mm, 1)} mm`;
+  const age = hit.age_frames === null ? 'never seen by the camera'
+    : hit.age_frames === 0 ? 'in sight now' : `last in sight ${hit.age_frames} frames ago`;
+  return `${run.label}: ${hit.name} (id ${hit.id})${words ? `, ${words}` : ''}; ${error} from the true surface; ${age}; at ${
+    hit.at.map((x) => x.toFixed(3)).join(', ')} m.`;
+}
+
+// The view shows what the state says.
+function follow(view, panels, runs, recording, state) {
+  state.watch(['shown'], () => {
+    for (const old of view.panels()) old.remove();
+    panels.prepend(...runs().map((run) => panelOf(run, runs())));
+    panels.dataset.count = String(runs().length);
+    view.setRuns(runs());
+  });
+  state.watch(['colour', 'pull', 'hidden', 'truth', 'path'], () => view.setOptions({
+    colour: state.get('colour'), pull: state.get('pull'), hidden: state.get('hidden'),
+    truth: state.get('truth'), path: state.get('path'),
+  }));
+  let first = true;
+  state.watch(['frame'], () => {
+    view.setFrame(state.get('frame'));
+    if (first) view.lookAsCamera(recording, state.get('frame'), 1.12);
+    first = false;
+  });
+}
+
+function listenToKeys(panels, view) {
+  const step = 0.12;
+  const keys = {
+    ArrowLeft: () => view.turn3d(-step, 0), ArrowRight: () => view.turn3d(step, 0),
+    ArrowUp: () => view.turn3d(0, step), ArrowDown: () => view.turn3d(0, -step),
+    '+': () => view.turn3d(0, 0, 1.15), '=': () => view.turn3d(0, 0, 1.15), '-': () => view.turn3d(0, 0, 1 / 1.15),
+    Enter: () => {
+      const box = view.panels()[0].querySelector('.stage').getBoundingClientRect();
+      view.pick(box.left + box.width / 2, box.top + box.height / 2);
+    },
+  };
+  panels.addEventListener('keydown', (event) => {
+    if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+}
+
+// Calls `start` once, when the element comes near the window.
+function whenNear(element, start) {
+  new IntersectionObserver((entries, observer) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    observer.disconnect();
+    start();
+  }, { rootMargin: '300px' }).observe(element);
+}
+
 export function viewPart(data, state) {
   const recording = data.reports.find((report) => report.recording)?.recording;
   const part = el('section', { id: 'view' }, el('h2', {}, 'Look for yourself'));
@@ -75,96 +161,29 @@ export function viewPart(data, state) {
     return part;
   }
   const runs = () => data.runs.filter((run) => run.recorded && state.get('shown').has(run.key));
-  const hasMovers = recording.objects.some((object) => object.removed);
-  const pull = el('input', {
-    type: 'range', id: 'pull', min: 0, max: 100, step: 1,
-    oninput: () => state.set({ pull: Number(pull.value) / 100 }),
-  });
-  state.watch(['pull'], () => { pull.value = String(Math.round(100 * state.get('pull'))); });
-  const pullControl = hasMovers
-    ? el('label', { class: 'pull', for: 'pull' }, 'Pull the moving objects away', pull) : null;
-
+  const pull = recording.objects.some((object) => object.removed) ? pullControl(state) : null;
   if (!webglWorks()) {
     part.append(
       el('p', { class: 'message' }, 'This browser has no WebGL, so here are pictures in place of the 3-D view.'),
-      el('div', { class: 'controls' }, pullControl), pictures(runs, state));
+      el('div', { class: 'controls' }, pull), pictures(runs, state));
     return part;
   }
 
   const picked = el('output', { class: 'picked', 'aria-live': 'polite' },
     'Drag to turn, wheel or pinch to come nearer, click to ask what is there. Keys: arrows turn, + and − come nearer, Enter asks at the middle of the first map.');
   const panels = el('div', { class: 'panels', tabindex: 0, role: 'application', 'aria-label': '3-D view of the maps' });
-  const select = el('select', { id: 'colour-by', onchange: () => state.set({ colour: select.value }) },
-    kColours.map(([value, text]) => el('option', { value }, text)));
-  state.watch(['colour'], () => { select.value = state.get('colour'); });
-
-  let view = null;
-  const button = (text, action) => el('button', { type: 'button', onclick: () => view && action() }, text);
   part.append(
-    el('div', { class: 'controls' }, pullControl,
-      el('label', { class: 'choice', for: 'colour-by' }, 'Colour', select),
+    el('div', { class: 'controls' }, pull, colourControl(state),
       switchBox(state, 'hidden', 'See through', 'The moving objects become glass, and what is remembered under them shows'),
       switchBox(state, 'truth', 'True surface', 'The true surface, in teal, just behind the map: it shows where the map has none, or nothing was seen'),
       switchBox(state, 'path', 'Camera', 'The way of the camera, and what it sees at this frame'),
-      el('span', { class: 'buttons' },
-        button('Camera’s view', () => view.lookAsCamera(recording, state.get('frame'))),
-        button('From above', () => view.lookFromAbove(recording, state.get('frame'))),
-        button('Reset', () => view.lookAsCamera(recording, state.get('frame'), 1.12)))),
+      cameraButtons(recording, state, () => part.view)),
     panels, legend(state, recording), picked);
-
-  const describe = (run, hit) => {
-    if (!hit) return `${run.label}: nothing there.`;
-    if (hit.layer === 'hole') {
-      return `${run.label}: table that was seen, is hidden, and is lost; at ${hit.at.map((x) => x.toFixed(3)).join(', ')} m.`;
-    }
-    const words = kLayerWords[hit.layer];
-    const error = hit.error_mm === null ? 'more than 51 mm' : `${fixed(hit.error_mm, 1)} mm`;
-    const age = hit.age_frames === null ? 'never seen by the camera'
-      : hit.age_frames === 0 ? 'in sight now' : `last in sight ${hit.age_frames} frames ago`;
-    return `${run.label}: ${hit.name} (id ${hit.id})${words ? `, ${words}` : ''}; ${error} from the true surface; ${age}; at ${
-      hit.at.map((x) => x.toFixed(3)).join(', ')} m.`;
-  };
-  const start = () => {
-    if (view) return;
-    view = new View3d(panels, (run, hit) => { picked.textContent = describe(run, hit); });
-    part.view = view;
-    state.watch(['shown'], () => {
-      for (const old of view.panels()) old.remove();
-      panels.prepend(...runs().map((run) => panelOf(run, runs())));
-      panels.dataset.count = String(runs().length);
-      view.setRuns(runs());
-    });
-    state.watch(['colour', 'pull', 'hidden', 'truth', 'path'], () => view.setOptions({
-      colour: state.get('colour'), pull: state.get('pull'), hidden: state.get('hidden'),
-      truth: state.get('truth'), path: state.get('path'),
-    }));
-    let first = true;
-    state.watch(['frame'], () => {
-      view.setFrame(state.get('frame'));
-      if (first) view.lookAsCamera(recording, state.get('frame'), 1.12);
-      first = false;
-    });
-    panels.addEventListener('keydown', (event) => {
-      const step = 0.12;
-      const keys = {
-        ArrowLeft: () => view.turn3d(-step, 0), ArrowRight: () => view.turn3d(step, 0),
-        ArrowUp: () => view.turn3d(0, step), ArrowDown: () => view.turn3d(0, -step),
-        '+': () => view.turn3d(0, 0, 1.15), '=': () => view.turn3d(0, 0, 1.15), '-': () => view.turn3d(0, 0, 1 / 1.15),
-        Enter: () => {
-          const box = view.panels()[0].querySelector('.stage').getBoundingClientRect();
-          view.pick(box.left + box.width / 2, box.top + box.height / 2);
-        },
-      };
-      if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
-      event.preventDefault();
-      keys[event.key]();
-    });
-  };
   // Decoding and drawing begin when the view comes near the window.
-  new IntersectionObserver((entries, observer) => {
-    if (!entries.some((entry) => entry.isIntersecting)) return;
-    observer.disconnect();
-    start();
-  }, { rootMargin: '300px' }).observe(part);
+  whenNear(part, () => {
+    part.view = new View3d(panels, (run, hit) => { picked.textContent = describe(run, hit); });
+    follow(part.view, panels, runs, recording, state);
+    listenToKeys(panels, part.view);
+  });
   return part;
 }

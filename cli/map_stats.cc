@@ -1,0 +1,58 @@
+#include "cli/map_stats.h"
+
+#include <string>
+
+#include "mapper/kernels.h"
+
+namespace tsdfpp {
+namespace {
+
+// What was tracked, from when to when.
+nlohmann::json TrackingJson(const MapStart& start) {
+  const Pipeline& pipeline = *start.pipeline;
+  const std::vector<ObjectInfo> known = ObjectsOf(start);
+  nlohmann::json objects = nlohmann::json::array();
+  for (const auto& [id, span] : pipeline.track_log().objects()) {
+    std::string name;
+    for (const ObjectInfo& object : known) {
+      if (object.id == id) name = object.name;
+    }
+    objects.push_back({{"id", id},
+                       {"name", name},
+                       {"first_frame", span.first},
+                       {"last_frame", span.last},
+                       {"tracked_frames", span.tracked},
+                       {"stayed_frames", span.stayed},
+                       {"frozen_frames", span.frozen}});
+  }
+  return {{"which", TrackChoiceName(pipeline.tracked().choice())}, {"objects", objects}};
+}
+
+}  // namespace
+
+nlohmann::json StatsOf(const MapStart& start, const RunTimes& times,
+                       const std::vector<InstanceId>& removed, const MapMemory& memory) {
+  const PipelineConfig& config = start.config;
+  nlohmann::json stats{
+      {"method", MethodName(config.method)},
+      {"poses", PoseSourceName(config.poses)},
+      {"segmentation", SegmentationName(config.segmentation)},
+      {"associate", AssociationModeName(config.associate)},
+      {"sequence", start.info.name},
+      {"frames", start.frames()},
+      {"removed", removed},
+      {"voxel_m", config.map.voxel_m},
+      {"trunc_front_voxels", config.map.trunc_front_voxels},
+      {"trunc_back_voxels", config.map.trunc_back_voxels},
+      {"layers", LayersOf(config.method, config.map)},
+      {"kernels", KernelsName(UsedKernels())},
+      {"times", times.ToJson()},
+      {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
+  };
+  if (config.poses != PoseSource::kGiven) stats["tracking"] = TrackingJson(start);
+  if (!start.mask_remark.empty()) stats["remarks"] = {start.mask_remark};
+  for (const std::string& remark : start.pipeline->Remarks()) stats["remarks"].push_back(remark);
+  return stats;
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,196 @@
+// Segments that wait to become objects, against a plain version that looks at every pair of a
+// segment and a candidate, and frames of very many segments.
+#include "mapper/associate/candidates.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+
+#include "mapper/volume/object_volume.h"
+
+namespace tsdfpp {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+constexpr double kVoxel_m = 0.01;
+
+// candidates.h's rules, with the points themselves in place of an index of cells.
+class PlainCandidates {
+ public:
+  explicit PlainCandidates(const VoteConfig& config) : config_(config) {}
+
+  std::vector<bool> Confirm(const std::vector<Points>& segments_W) {
+    ++frame_;
+    struct Pair {
+      double overlap;
+      std::size_t segment;
+      std::size_t candidate;
+    };
+    std::vector<Pair> pairs;
+    for (std::size_t s = 0; s < segments_W.size(); ++s) {
+      if (!IsLarge(segments_W[s])) continue;
+      for (std::size_t c = 0; c < candidates_.size(); ++c) {
+        const double share = ShareNear(segments_W[s], candidates_[c].points_W);
+        if (share < config_.near_share) continue;
+        const Points cells = OnePointACell(candidates_[c].points_W);
+        pairs.push_back({share * ShareNear(cells, segments_W[s]), s, c});
+      }
+    }
+    std::stable_sort(pairs.begin(), pairs.end(),
+                     [](const Pair& a, const Pair& b) { return a.overlap > b.overlap; });
+    std::map<std::size_t, std::size_t> candidate_of;
+    std::set<std::size_t> taken;
+    for (const Pair& pair : pairs) {
+      if (candidate_of.contains(pair.segment) || taken.contains(pair.candidate)) continue;
+      candidate_of[pair.segment] = pair.candidate;
+      taken.insert(pair.candidate);
+    }
+    std::vector<bool> is_confirmed(segments_W.size());
+    std::vector<Candidate> left;
+    for (std::size_t s = 0; s < segments_W.size(); ++s) {
+      if (!IsLarge(segments_W[s])) continue;
+      Candidate candidate;
+      if (candidate_of.contains(s)) candidate = candidates_[candidate_of[s]];
+      candidate.seen.push_back(frame_);
+      candidate.points_W = segments_W[s];
+      is_confirmed[s] =
+          SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames;
+      if (!is_confirmed[s]) left.push_back(candidate);
+    }
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (taken.contains(c)) continue;
+      if (SeenSince(candidates_[c], frame_ + 1 - config_.confirm_window + 1) > 0) {
+        left.push_back(candidates_[c]);
+      }
+    }
+    candidates_ = left;
+    return is_confirmed;
+  }
+
+  std::size_t size() const { return candidates_.size(); }
+
+ private:
+  struct Candidate {
+    std::vector<int> seen;
+    Points points_W;
+  };
+  bool IsLarge(const Points& points_W) const {
+    return points_W.size() >= static_cast<std::size_t>(config_.min_points);
+  }
+  static std::ptrdiff_t SeenSince(const Candidate& candidate, int frame) {
+    return std::count_if(candidate.seen.begin(), candidate.seen.end(),
+                         [&](int seen) { return seen >= frame; });
+  }
+  Index3 CellOf(const Eigen::Vector3d& p_W) const {
+    return FloorOf(p_W / (0.5 * config_.near_voxels * kVoxel_m));
+  }
+  Points OnePointACell(const Points& points_W) const {
+    std::map<Index3, Eigen::Vector3d> cells;
+    for (const Eigen::Vector3d& p_W : points_W) cells.emplace(CellOf(p_W), p_W);
+    Points points;
+    for (const auto& [cell, p_W] : cells) points.push_back(p_W);
+    return points;
+  }
+  double ShareNear(const Points& points_W, const Points& others_W) const {
+    const auto near = std::count_if(points_W.begin(), points_W.end(), [&](const auto& p_W) {
+      return std::any_of(others_W.begin(), others_W.end(), [&](const auto& other_W) {
+        const Index3 a = CellOf(p_W);
+        const Index3 b = CellOf(other_W);
+        return std::abs(a.x - b.x) <= 1 && std::abs(a.y - b.y) <= 1 && std::abs(a.z - b.z) <= 1;
+      });
+    });
+    return static_cast<double>(near) / static_cast<double>(points_W.size());
+  }
+
+  VoteConfig config_;
+  int frame_ = 0;
+  std::vector<Candidate> candidates_;
+};
+
+class Clouds {
+ public:
+  double Between(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(dice_);
+  }
+  Points Around(const Eigen::Vector3d& centre_W, double radius_m, int count) {
+    Points points;
+    for (int i = 0; i < count; ++i) {
+      points.push_back(centre_W +
+                       radius_m * Eigen::Vector3d(Between(-1, 1), Between(-1, 1), Between(-1, 1)));
+    }
+    return points;
+  }
+
+ private:
+  std::minstd_rand dice_{1};
+};
+
+TEST(Candidates, AreThoseOfPlainPairs) {
+  VoteConfig config;
+  config.min_points = 5;
+  Clouds clouds;
+  for (int trial = 0; trial < 20; ++trial) {
+    Candidates candidates(config, kVoxel_m);
+    PlainCandidates plain(config);
+    for (int frame = 0; frame < 12; ++frame) {
+      std::vector<Points> segments_W;
+      const int count = static_cast<int>(clouds.Between(0, 10));
+      for (int s = 0; s < count; ++s) {
+        const Eigen::Vector3d centre_W(clouds.Between(0, 0.2), clouds.Between(0, 0.2), 1);
+        segments_W.push_back(clouds.Around(centre_W, clouds.Between(0.01, 0.1),
+                                           static_cast<int>(clouds.Between(3, 30))));
+      }
+      SCOPED_TRACE(testing::Message() << "trial " << trial << ", frame " << frame);
+      ASSERT_EQ(candidates.Confirm(segments_W), plain.Confirm(segments_W));
+      ASSERT_EQ(candidates.size(), plain.size());
+    }
+  }
+}
+
+// Time and memory would grow with the square of the segments, which are as many as a frame's masks
+// have ids; those that find no place wait until others have become objects.
+TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
+  constexpr int kSegments = 5000;
+  const VoteConfig config;
+  Clouds clouds;
+  Candidates candidates(config, kVoxel_m);
+  std::vector<Points> segments_W;
+  for (int s = 0; s < kSegments; ++s) {
+    segments_W.push_back(clouds.Around(Eigen::Vector3d(s % 100, s / 100, 1), 0.02, 50));
+  }
+  std::size_t confirmed = 0;
+  int frames = 0;
+  while (!segments_W.empty() && frames < 100) {
+    ++frames;
+    const std::vector<bool> is_confirmed = candidates.Confirm(segments_W);
+    ASSERT_LE(candidates.size(), Candidates::kMostCandidates);
+    std::vector<Points> rest;
+    for (std::size_t s = 0; s < segments_W.size(); ++s) {
+      if (is_confirmed[s])
+        ++confirmed;
+      else
+        rest.push_back(segments_W[s]);
+    }
+    segments_W = rest;
+  }
+  EXPECT_EQ(confirmed, std::size_t{kSegments});
+  EXPECT_LE(frames, 30);
+}
+
+// All at one place, each of which could be any candidate.
+TEST(Candidates, VeryManySegmentsAtOnePlaceAreBounded) {
+  const VoteConfig config;
+  Clouds clouds;
+  Candidates candidates(config, kVoxel_m);
+  std::vector<Points> segments_W(6000, clouds.Around({0, 0, 1}, 0.02, 50));
+  for (int frame = 1; frame < config.confirm_frames; ++frame) {
+    for (const bool is_confirmed : candidates.Confirm(segments_W)) ASSERT_FALSE(is_confirmed);
+    EXPECT_EQ(candidates.size(), Candidates::kMostCandidates);
+  }
+}
+
+}  // namespace
+}  // namespace tsdfpp
