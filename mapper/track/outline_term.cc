@@ -16,10 +16,13 @@ constexpr double kOutline_px = 1.5;
 
 }  // namespace
 
-SegmentOutline OutlineOf(const cv::Mat& labels, InstanceId id, const cv::Rect& segment,
-                         const cv::Mat& depth, const Intrinsics& camera, int margin_px) {
+SegmentOutline OutlineOf(const cv::Mat& labels, InstanceId id,
+                         const std::vector<SegmentPoint>& points, const cv::Mat& depth,
+                         const Intrinsics& camera, int margin_px) {
   SegmentOutline outline;
   outline.camera = camera;
+  cv::Rect segment;
+  for (const SegmentPoint& point : points) segment |= cv::Rect(point.pixel, cv::Size(1, 1));
   const cv::Rect wider(segment.x - margin_px, segment.y - margin_px, segment.width + 2 * margin_px,
                        segment.height + 2 * margin_px);
   outline.box = wider & cv::Rect(0, 0, labels.cols, labels.rows);

@@ -18,9 +18,11 @@ struct SegmentOutline {
   Intrinsics camera;
 };
 
-// `segment` is the least rectangle around the pixels labelled `id`; the box is `margin_px` wider.
-SegmentOutline OutlineOf(const cv::Mat& labels, InstanceId id, const cv::Rect& segment,
-                         const cv::Mat& depth, const Intrinsics& camera, int margin_px);
+// Of the pixels labelled `id`; `points` are some of them. The box is wider by `margin_px` than the
+// least one around the points.
+SegmentOutline OutlineOf(const cv::Mat& labels, InstanceId id,
+                         const std::vector<SegmentPoint>& points, const cv::Mat& depth,
+                         const Intrinsics& camera, int margin_px);
 
 // A place of the model that the camera should see, but that falls beside the segment, is as far off
 // as the segment's nearest pixel at its depth, less a pixel and `slack_m`: an outline of voxels is

@@ -71,7 +71,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     status = TrackStatus::kFrozen;
     if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
     const SegmentOutline outline =
-        OutlineOf(labels, id, box, frame.depth, frame.intrinsics, kOutlineMargin_px);
+        OutlineOf(labels, id, points, frame.depth, frame.intrinsics, kOutlineMargin_px);
     Memory& memory = memory_[id];
     const auto known = before.find(id);
     if (known == before.end()) {

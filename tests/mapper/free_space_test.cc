@@ -110,13 +110,15 @@ TEST_F(FreeSpace, WhatHidesTheModelAndWhatHasNoDepthSaysNothing) {
 class Outline : public FreeSpace {
  protected:
   Outline() {
-    const cv::Rect box = BoxesOf(frame_.mask).at(kBall);
-    outline_ = OutlineOf(frame_.mask, kBall, box, frame_.depth, frame_.intrinsics, 40);
+    outline_ = OutlineOf(frame_.mask, kBall, Points(), frame_.depth, frame_.intrinsics, 40);
     motion_.centre = Centre();
     motion_.radius_m = kRadius_m;
     options_.max_places = kAllPlaces;
     options_.margin_m = kToyVoxel_m;
     options_.huber_m = kToyVoxel_m;
+  }
+  std::vector<SegmentPoint> Points() const {
+    return SegmentPointsOf(frame_, PixelsByLabel(frame_.mask, 1).at(kBall), kToyVoxel_m, {});
   }
   OutlineTerm Term() const { return {places_, outline_, motion_, options_}; }
 
@@ -177,12 +179,11 @@ TEST_F(Outline, WhatHidesTheModelAndWhatIsOfNoInstanceDoesNotPull) {
   const Pose beside = Moved(0.5 * kRadius_m * Sideways());
   Frame other = frame_;
   other.depth = cv::Mat(frame_.depth.size(), CV_32FC1, 0.2F);
-  const cv::Rect box = BoxesOf(frame_.mask).at(kBall);
-  outline_ = OutlineOf(frame_.mask, kBall, box, other.depth, frame_.intrinsics, 40);
+  outline_ = OutlineOf(frame_.mask, kBall, Points(), other.depth, frame_.intrinsics, 40);
   EXPECT_EQ(Term().Sums(beside).cost, 0);
   cv::Mat unknown = frame_.mask.clone();
   unknown.setTo(static_cast<double>(kNoInstance), unknown != static_cast<double>(kBall));
-  outline_ = OutlineOf(unknown, kBall, box, frame_.depth, frame_.intrinsics, 40);
+  outline_ = OutlineOf(unknown, kBall, Points(), frame_.depth, frame_.intrinsics, 40);
   EXPECT_EQ(Term().Sums(beside).cost, 0);
 }
 

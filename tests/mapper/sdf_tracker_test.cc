@@ -106,6 +106,70 @@ TEST(SdfTracker, FreezesObjectsThatTheMaskSwaps) {
   EXPECT_LT(OffBy_m(pipeline, kBrick, kFrames), kPixel_voxels * kToyVoxel_m);
 }
 
+// Of a brick that slides before a camera between its ends only the top and one side are in sight,
+// which fit wherever it is. What tells where it is, to the slack, is its outline.
+TEST(SdfTracker, FollowsWhatSlidesAlongTheSidesInSight) {
+  constexpr double kWay_m = 0.006;  // a frame
+  const auto sliding = [&](int index) {
+    reference::Scene scene = TableOnly();
+    AddBrick(scene, 0.0, {0.0, -0.04 + kWay_m * (index - 1), kTableTop_m + 0.045});
+    return reference::Render(scene, CircleCamera(0), index, Camera());
+  };
+  const auto off_by_m = [&](const SdfTrackConfig& track) {
+    PipelineConfig config = TrackConfig();
+    config.track = track;
+    Pipeline pipeline(config, Toys());
+    for (int i = 1; i <= kFrames; ++i) EXPECT_TRUE(pipeline.Process(sliding(i)));
+    const Eigen::Vector3d at = sliding(1).T_WO.at(kBrick).translation();
+    const Eigen::Vector3d way(0, kWay_m * (kFrames - 1), 0);
+    return (pipeline.trajectories().at(kBrick).at(kFrames) * at - at - way).norm();
+  };
+  SdfTrackConfig without;
+  without.outline_weight = 0;
+  without.max_seen_through_share = 1;
+  // Half a voxel of slack, the pixel that does not count, and the half beside the last one.
+  const double slack_voxels = SdfTrackConfig().outline_slack_voxels + 1.5 * kPixel_voxels;
+  EXPECT_LT(off_by_m({}), slack_voxels * kToyVoxel_m);
+  EXPECT_GT(off_by_m(without), 2 * slack_voxels * kToyVoxel_m) << "the sides tell it alone";
+}
+
+// A brick that is suddenly elsewhere: whatever is found, nothing is fused at a wrong place.
+TEST(SdfTracker, FreezesWhatTheCameraWouldSeeThrough) {
+  // Off by more than this is a wrong pose.
+  constexpr double kWrong_voxels = 1;
+  const auto turned = [](double turn_rad) {
+    reference::Scene scene = TableOnly();
+    AddBrick(scene, 0.3 + turn_rad, {-0.1, 0.0, kTableTop_m + 0.045});
+    return reference::Render(scene, CircleCamera(0.1), 1, Camera());
+  };
+  const auto wrongly_fused = [&](double max_seen_through_share) {
+    int wrong = 0;
+    for (const double turn_rad : {0.5, 0.8, 1.2, 1.5, 2.2}) {
+      PipelineConfig config = TrackConfig();
+      config.track.max_seen_through_share = max_seen_through_share;
+      config.track.outline_weight = 0;
+      config.track.max_rotation_rad = 3;
+      Pipeline pipeline(config, Toys());
+      for (int i = 1; i <= 6; ++i) {
+        Frame frame = turned(i < 6 ? 0 : turn_rad);
+        frame.index = i;
+        EXPECT_TRUE(pipeline.Process(frame));
+      }
+      const TrackSpan& span = pipeline.track_log().objects().at(kBrick);
+      if (span.last < 6) continue;
+      const Pose truth = turned(turn_rad).T_WO.at(kBrick) * turned(0).T_WO.at(kBrick).inverse();
+      const Eigen::Vector3d corner =
+          turned(0).T_WO.at(kBrick) * Eigen::Vector3d(0.075, 0.05, 0.045);
+      const Eigen::Vector3d off =
+          pipeline.trajectories().at(kBrick).at(6) * corner - truth * corner;
+      if (off.norm() > kWrong_voxels * kToyVoxel_m) ++wrong;
+    }
+    return wrong;
+  };
+  EXPECT_EQ(wrongly_fused(SdfTrackConfig().max_seen_through_share), 0);
+  EXPECT_GT(wrongly_fused(1), 0) << "the other gates do";
+}
+
 TEST(SdfTracker, FreezesWhatIsTooSmallOrWithoutDepth) {
   Pipeline pipeline(TrackConfig(), Toys());
   for (int i = 1; i <= 4; ++i) ASSERT_TRUE(pipeline.Process(MovingToys(i)));
