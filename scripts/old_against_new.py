@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Compares the speed of this program with that of an older commit: is the new one slower?
 
-    python3 scripts/old_against_new.py OLD [--new build/release] [--pairs 11] [--only fusion,...] [--out FOLDER]
+    python3 scripts/old_against_new.py OLD [--new build/release] [--pairs 11] [--only fusion,...]
+        [--methods tsdf,...] [--out FOLDER]
 
 OLD is a revision, which is built in a copy of its own below out/old (a quarter of an hour on two cores), or a build folder.
 Both programs do the same work at the same time, but only one of them runs: each in turn for TURN_S, some ten frames, while
@@ -31,6 +32,7 @@ FRAMES = "40"  # of the scene, that are mapped
 RAY_FRAMES = "24"
 SMALL_SCENE = ["scenes/mini.toml", "--scale", "3"]  # for `generate`, which makes a whole scene: 48 frames of 960x540
 LIMIT = 1.05
+ROOMS = "core;sim;sequence;mapper;metrics;eval;cli;bench"  # of an old program, whose tests are not asked for
 METHODS = ("tsdf", "tsdf/guarded", "tsdf++", "tsdf++/literal", "tsdf++/anchored", "volumes")
 NUMBER = re.compile(r"^[0-9.]+$")
 
@@ -107,8 +109,8 @@ def rows_of(text, heading):
 class Work:
     """What is measured: for each measure the command of a build and its figures."""
 
-    def __init__(self, scene, folder):
-        self.scene, self.folder = scene, folder
+    def __init__(self, scene, folder, methods):
+        self.scene, self.folder, self.methods = scene, folder, methods
         self.sequence = folder / "sequence"
 
     def prepare(self, build):
@@ -116,7 +118,7 @@ class Work:
                        stdout=subprocess.DEVNULL)
 
     def fusion(self, pair):
-        for method in METHODS:
+        for method in self.methods:
             def command(build, index, method=method):
                 return [build / "tsdfpp", "map", self.sequence, "--method", method, "--threads", "2", "--until", FRAMES,
                         "--out", self.folder / f"map{index}"]
@@ -172,8 +174,12 @@ def built(old):
     tree = pathlib.Path("out/old") / revision
     if not tree.is_dir():
         subprocess.run(["git", "worktree", "add", "--quiet", "--detach", tree, revision], check=True)
-    subprocess.run(["bash", "scripts/build.sh", "--target", "tsdfpp_command", "tsdfpp_bench"], cwd=tree, check=True,
-                   stdout=sys.stderr)
+    deps = tree / ".deps"
+    if not deps.exists():
+        deps.symlink_to(pathlib.Path(".deps").resolve())
+    for command in (["cmake", "--preset", "release", f"-DTSDFPP_ROOMS={ROOMS}"],
+                    ["cmake", "--build", "--preset", "release", "--target", "tsdfpp_command", "tsdfpp_bench"]):
+        subprocess.run(command, cwd=tree, check=True, stdout=sys.stderr)
     return (tree / "build/release").resolve()
 
 
@@ -191,12 +197,17 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, help="folder for turns.md, the table")
     parser.add_argument("--pairs", type=int, default=11)
     parser.add_argument("--only", default="fusion,rays,meshes,generation")
+    parser.add_argument("--methods", default=",".join(METHODS), help="of fusion; rays and meshes are those of all")
     parser.add_argument("--scene", default="scenes/toycar3.toml")
     options = parser.parse_args()
     measures = options.only.split(",")
     unknown = [name for name in measures if name not in ("fusion", "rays", "meshes", "generation")]
     if unknown:
         parser.error(f"--only: expected some of fusion, rays, meshes, generation, found '{unknown[0]}'")
+    methods = options.methods.split(",")
+    unknown = [name for name in methods if name not in METHODS]
+    if unknown:
+        parser.error(f"--methods: expected some of {', '.join(METHODS)}, found '{unknown[0]}'")
     if options.pairs < 2:
         parser.error(f"--pairs: expected 2 or more, found {options.pairs}")
     builds = [built(options.old), options.new]
@@ -207,7 +218,7 @@ def main():
     ratios = {}
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        work = Work(options.scene, folder)
+        work = Work(options.scene, folder, methods)
         if "fusion" in measures:
             work.prepare(options.new)
         for pair in range(options.pairs):

@@ -346,8 +346,8 @@ MeshWork GridMesh::Update(const TsdfGrid& grid, float voxel,
 
 std::size_t GridMesh::Bytes() const {
   std::size_t bytes =
-      order_.capacity() * (sizeof(MeshPart*) + sizeof(std::uint64_t)) +
-      (remade_.capacity() + unsettled_.capacity() + pending_.capacity()) * sizeof(MeshPart*) +
+      order_.capacity() * (sizeof(void*) + sizeof(std::uint64_t)) +
+      (remade_.capacity() + unsettled_.capacity() + pending_.capacity()) * sizeof(void*) +
       (changed_.capacity() + gone_.capacity()) * sizeof(Index3) +
       owned_.capacity() * (sizeof(owned_[0]) + sizeof(Seen));
   for (const MeshPart* part : order_) {

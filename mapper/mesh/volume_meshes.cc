@@ -82,6 +82,7 @@ std::optional<VolumeMeshes::VisibilityChanges> VolumeMeshes::WhereVisibilityChan
     whose |= IdBit(id);
   }
   std::vector<BlockBox> index;
+  index.reserve(index_changes.size());
   for (const Index3& block : index_changes) index.push_back({block, block, false});
   auto index_set = BlockSet::Of(index, 0);
   auto value_set = BlockSet::Of(values, 0);

@@ -15,6 +15,8 @@ constexpr double kLeastVisibleCompletion = 0.98;  // of all that is seen, anchor
 constexpr double kLeastCarCompletion =
     0.95;  // of what was seen of each car, anchored, profile close
 
+constexpr int kEvery = 128;  // frames between evaluations; to score takes longer than to map
+
 TEST(ToyCar3, LayeredMapsKeepTheTableUnderTheCars) {
   const std::filesystem::path scene =
       std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes" / "toycar3.toml";
@@ -23,7 +25,7 @@ TEST(ToyCar3, LayeredMapsKeepTheTableUnderTheCars) {
   const std::filesystem::path out =
       std::filesystem::path(testing::TempDir()) / fmt::format("tsdfpp-toycar3-{}", getpid());
   CompareConfig config;  // tsdf, tsdf++ and anchored, both profiles, given poses
-  config.every = 32;     // as the demo
+  config.every = kEvery;
   const auto result = RunCompare(**source, config, out, "test", {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   std::filesystem::remove_all(out);
