@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/command.h"
+#include "cli/pose_choice.h"
 #include "cli/sequence_options.h"
 #include "eval/compare/compare_report.h"
 #include "eval/compare/compare_tables.h"
@@ -70,12 +71,16 @@ Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSourc
   return WithPlan(std::move(source), plan, std::move(models));
 }
 
-// The poses that were typed; else those that go with the association.
-std::string PoseNames(const CompareArguments& options, const FrameSource& source) {
+// The poses that were typed; else those that fit the source, the association and the methods.
+std::string PoseNames(const CompareArguments& options, const CompareConfig& config,
+                      const FrameSource& source) {
   if (!options.poses.empty()) return options.poses;
-  const bool votes = options.associate.empty() ? !source.info().mask_ids_are_objects
-                                               : options.associate == "votes";
-  return std::string(PoseSourceName(votes ? PoseSource::kIcp : PoseSource::kGiven));
+  const SequenceInfo& info = source.info();
+  const AssociationMode by_itself =
+      info.mask_ids_are_objects ? AssociationMode::kGiven : AssociationMode::kVotes;
+  const PoseChoice choice = PosesUnsaid(info, config.associate.value_or(by_itself), config.methods);
+  if (!choice.remark.empty()) spdlog::info("{}", choice.remark);
+  return std::string(PoseSourceName(choice.poses));
 }
 
 // What is compared: maps of this program, and those of others.
@@ -195,7 +200,7 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
     TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
   }
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
-  const std::string pose_names = PoseNames(options, *opened.source);
+  const std::string pose_names = PoseNames(options, config, *opened.source);
   TSDFPP_RETURN_IF_ERROR(ReadPoses(pose_names, config));
   TSDFPP_RETURN_IF_ERROR(CheckLists(options, pose_names, config));
   TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened.source), options, config));
@@ -230,8 +235,8 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
       ->check(OneOf({"given", "votes"}));
   app.add_option(
       "--poses", options->poses,
-      "Object poses: gt (given), icp or track (tracked, docs/tracking.md); by default gt, with "
-      "votes icp");
+      std::string("Object poses: gt (given), icp or track (tracked, docs/tracking.md); ") +
+          kPosesUnsaid);
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();
   app.add_option("--every", options->config.every, "Frames between evaluations")

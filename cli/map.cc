@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/map_start.h"
 #include "cli/map_stats.h"
+#include "cli/pose_choice.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "core/json_text.h"
@@ -27,7 +28,7 @@ struct MapArguments {
   std::string method = "tsdf++/anchored";
   std::string segmentation;
   std::string associate;
-  std::string poses = "gt";
+  std::string poses;
   std::string track = "auto";
   std::string track_config;
   std::string profile = "close";
@@ -61,8 +62,10 @@ Expected<TrackWishes> ReadTracking(const MapArguments& options) {
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
-  TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
-  TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
+  if (!options.poses.empty()) {
+    TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
+    TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
+  }
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -82,7 +85,7 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   MapWishes wishes;
-  wishes.poses = app.count("--poses") > 0;
+  wishes.poses = !options.poses.empty();
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -165,10 +168,7 @@ void LogStart(const MapStart& start) {
     spdlog::info("{}: tracked is {}", start.info.name,
                  all ? "all that is not background" : "what has a class");
   }
-  if (start.by_votes()) {
-    spdlog::info("{}: the map's ids are its own, found by votes; poses are tracked ({})",
-                 start.info.name, PoseSourceName(start.config.poses));
-  }
+  if (!start.pose_remark.empty()) spdlog::info("{}", start.pose_remark);
 }
 
 Expected<RunFolder> BeginRun(const MapArguments& options, const CLI::App& app) {
@@ -287,11 +287,11 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own; poses are then tracked); by default given unless ids are "
                  "drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
-  app.add_option(
-         "--poses", options->poses,
-         "Object poses: gt (given), icp (tracked as in the paper), track (tracked by signed "
-         "distances, docs/tracking.md)")
-      ->capture_default_str();
+  app.add_option("--poses", options->poses,
+                 std::string("Object poses: gt (given), icp (tracked as in the paper), track "
+                             "(tracked by signed distances, docs/tracking.md); ") +
+                     kPosesUnsaid)
+      ->check(NotEmpty("gt, icp or track"));
   app.add_option("--track", options->track,
                  "Which objects are tracked: classified (those with a class), all (whatever is not "
                  "background), auto (classified where the sequence knows a class)")

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "cli/pose_choice.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -35,26 +37,32 @@ Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
   return {};
 }
 
-// Who says which object a segment is, and where that object is.
+// Who says which object a segment is.
 Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
   const bool of_objects = start.info.mask_ids_are_objects;
   const bool has_segments = start.config.segmentation != Segmentation::kNone;
   start.config.associate = wishes.associate.value_or(
       of_objects || !has_segments ? AssociationMode::kGiven : AssociationMode::kVotes);
-  if (start.config.associate == AssociationMode::kGiven) {
-    if (of_objects || !has_segments) return {};
-    return UsageError(
-        "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
-        "--associate votes",
-        start.info.name);
-  }
-  if (start.config.poses != PoseSource::kGiven) return {};
+  if (start.by_votes() || of_objects || !has_segments) return {};
+  return UsageError(
+      "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
+      "--associate votes",
+      start.info.name);
+}
+
+// Who says where that object is.
+Expected<void> ChoosePoses(MapStart& start, const MapWishes& wishes) {
   if (wishes.poses) {
+    if (start.config.poses != PoseSource::kGiven || !start.by_votes()) return {};
     return UsageError(
         "--poses gt are the poses of given ids, and --associate votes gives ids of its own: "
-        "expected --poses icp, or --associate given");
+        "expected --poses icp or track, or --associate given");
   }
-  start.config.poses = PoseSource::kIcp;
+  // Of the background alone there is nothing to track.
+  if (start.config.segmentation == Segmentation::kNone && !start.by_votes()) return {};
+  PoseChoice choice = PosesUnsaid(start.info, start.config.associate, {start.config.method});
+  start.config.poses = choice.poses;
+  start.pose_remark = std::move(choice.remark);
   return {};
 }
 
@@ -97,6 +105,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
   start.config = config;
   TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
+  TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   TSDFPP_RETURN_IF_ERROR(start.config.Validate());
   start.first = start.info.first_index;

@@ -28,6 +28,8 @@ struct SequenceInfo {
   // Whether an id in the frames' masks is the same object in every frame, one of `objects`; else
   // ids are of one frame alone.
   bool mask_ids_are_objects = true;
+  // Whether frames say where objects are (Frame::T_WO); what stands still has no need of it.
+  bool has_object_poses = true;
 };
 
 class FrameSource {

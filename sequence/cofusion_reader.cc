@@ -81,6 +81,7 @@ class CofusionSource : public FrameSource {
     TSDFPP_RETURN_IF_ERROR(
         CheckCamera(info_.intrinsics, (folder_ / cofusion::kCalibration).string()));
     NameObjects();
+    info_.has_object_poses = !objects_.empty();
     return CheckObjects(info_.objects, folder_.string());
   }
 
@@ -196,6 +197,7 @@ class CofusionSource : public FrameSource {
 
   Expected<void> Adopt(SequenceRecord& record) {
     info_ = std::move(record.info);
+    info_.has_object_poses = !objects_.empty();
     for (const ObjectInfo& object : found_) {
       if (std::find_if(info_.objects.begin(), info_.objects.end(), [&](const ObjectInfo& listed) {
             return listed.id == object.id;

@@ -239,6 +239,8 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
   std::vector<double> times;
   for (const FrameFiles& frame : frames) times.push_back(frame.time_s);
   info.rate_hz = sequence.rate_hz > 0 ? sequence.rate_hz : RateOf(times);
+  info.has_object_poses = std::any_of(frames.begin(), frames.end(),
+                                      [](const FrameFiles& frame) { return !frame.T_WO.empty(); });
   if (sequence.objects.empty()) sequence.objects = NamedByIds(IdsIn(sequence));
   info.objects.push_back({kBackground, "background", "background"});
   for (const ObjectInfo& object : sequence.objects) info.objects.push_back(object);

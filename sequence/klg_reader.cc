@@ -58,6 +58,7 @@ class KlgSource : public DatasetSource {
     for (const int number : numbers_) stems.push_back(fmt::format("{:06d}", number));
     TSDFPP_ASSIGN(masks_, FindMasks(folder, stems, notes));
     if (masks_.empty()) notes.push_back(fmt::format("{}: no masks", info_.name));
+    info_.has_object_poses = false;
     info_.objects = {{kBackground, "background", "background"}};
     for (ObjectInfo& object : NamedByIds(Ids())) info_.objects.push_back(std::move(object));
     return {};

@@ -54,7 +54,7 @@ TEST_F(Associate, IsByVotesWhereIdsAreOfOneFrame) {
       << output.err;
   const nlohmann::json stats = Json("map/stats.json");
   EXPECT_EQ(stats["associate"], "votes");
-  EXPECT_EQ(stats["poses"], "icp");
+  EXPECT_EQ(stats["poses"], "track");
   EXPECT_EQ(stats["removed"], nlohmann::json::array({2}));
   EXPECT_TRUE(fs::exists(*folder_ / "map/mesh/background-0.ply"));
   EXPECT_TRUE(fs::exists(*folder_ / "map/mesh/object1-1.ply"));
@@ -87,7 +87,7 @@ TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
             std::string::npos);
   EXPECT_NE(sentence(Run("map", "no", {"--poses", "gt"}))
                 .find("--poses gt are the poses of given ids, and --associate votes gives ids of "
-                      "its own: expected --poses icp, or --associate given"),
+                      "its own: expected --poses icp or track, or --associate given"),
             std::string::npos);
   EXPECT_NE(
       sentence(Run("compare", "no", {"--poses", "gt"})).find("given poses are those of given"),
@@ -104,7 +104,7 @@ TEST_F(Associate, IsMatchedToTheTruthByOverlap) {
   ASSERT_EQ(output.exit_code, 0) << output.err;
   const nlohmann::json run = Json("compare/summary.json")["runs"][0];
   EXPECT_EQ(run["associate"], "votes");
-  EXPECT_EQ(run["title"], "tsdf++/anchored, close, ICP, ids by votes");
+  EXPECT_EQ(run["title"], "tsdf++/anchored, close, tracked, ids by votes");
   ASSERT_EQ(run["matched_ids"].size(), 2U) << run["matched_ids"];
   std::set<int> objects;
   for (const nlohmann::json& match : run["matched_ids"]) {
