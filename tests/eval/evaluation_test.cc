@@ -363,28 +363,43 @@ TEST(EvaluationColumns, SayWhatTheirNamesSay) {
   evaluation.visible_completion = Measured::Of(0.81);
   evaluation.ghost_area_m2 = 0.0009;
   evaluation.revealed_ghost_area_m2 = Measured::Of(0.0011);
+  evaluation.revealed_unseen_area_m2 = Measured::Of(0.0013);
+  evaluation.seams.beside_objects = {Measured::Of(0.71), Measured::Of(0.72), 0.0017, 0.0019};
+  evaluation.seams.elsewhere = {Measured::Of(0.73), Measured::Of(0.74), 0.0021, 0.0023};
   evaluation.sanity.all = Measured::Of(0.95);
   evaluation.sanity.by_object[kCar] = Measured::Of(0.91);
   evaluation.sanity.by_object[kHouse] = Measured::Of(0.93);
   evaluation.sanity.by_object[kCup] = Measured::Undefined("not seen");
-  EXPECT_EQ(ColumnOf("table_preservation_behind_other", evaluation), 0.02);
-  EXPECT_EQ(ColumnOf("table_retention_behind_other", evaluation), 0.03);
-  EXPECT_EQ(ColumnOf("table_hole_area_cm2", evaluation), 4);
-  EXPECT_EQ(ColumnOf("visible_completion", evaluation), 0.81);
-  EXPECT_EQ(ColumnOf("table_visible_completion", evaluation), 0.06);
+  std::set<std::string> asked;
+  const auto column = [&](const std::string& name) {
+    asked.insert(name);
+    return ColumnOf(name, evaluation);
+  };
+  EXPECT_EQ(column("table_preservation_behind_other"), 0.02);
+  EXPECT_EQ(column("table_retention_behind_other"), 0.03);
+  EXPECT_EQ(column("table_hole_area_cm2"), 4);
+  EXPECT_EQ(column("visible_completion"), 0.81);
+  EXPECT_EQ(column("table_visible_completion"), 0.06);
   // The mean of car and cup; the house is none of them.
-  EXPECT_DOUBLE_EQ(ColumnOf("movers_completion", evaluation), (0.6 + 0.8) / 2);
-  EXPECT_DOUBLE_EQ(ColumnOf("ghost_area_cm2", evaluation), 9);
-  EXPECT_DOUBLE_EQ(ColumnOf("revealed_ghost_area_cm2", evaluation), 11);
-  EXPECT_EQ(ColumnOf("sanity_all", evaluation), 0.95);
-  EXPECT_EQ(ColumnOf("sanity_least", evaluation), 0.91);
-  EXPECT_EQ(ColumnOf("table_preservation_any_label", evaluation), 0.05);
-  EXPECT_EQ(ColumnOf("table_label_purity", evaluation), 0.07);
+  EXPECT_DOUBLE_EQ(column("movers_completion"), (0.6 + 0.8) / 2);
+  EXPECT_DOUBLE_EQ(column("ghost_area_cm2"), 9);
+  EXPECT_DOUBLE_EQ(column("revealed_ghost_area_cm2"), 11);
+  EXPECT_DOUBLE_EQ(column("revealed_unseen_area_cm2"), 13);
+  EXPECT_EQ(column("seam_share"), 0.71);
+  EXPECT_DOUBLE_EQ(column("seam_area_cm2"), 17);
+  EXPECT_EQ(column("bulge_share"), 0.72);
+  EXPECT_EQ(column("sanity_all"), 0.95);
+  EXPECT_EQ(column("sanity_least"), 0.91);
+  EXPECT_EQ(column("table_preservation_any_label"), 0.05);
+  EXPECT_EQ(column("table_label_purity"), 0.07);
   // A mover that was never seen is not counted; without any there is no mean.
   evaluation.objects[kCup].preserved.completion = Measured::Undefined("not seen");
-  EXPECT_EQ(ColumnOf("movers_completion", evaluation), 0.6);
+  EXPECT_EQ(column("movers_completion"), 0.6);
   evaluation.objects[kCar].preserved.completion = Measured::Undefined("not seen");
-  EXPECT_EQ(ColumnOf("movers_completion", evaluation), -1);
+  EXPECT_EQ(column("movers_completion"), -1);
+  for (const EvaluationColumn& each : EvaluationColumns()) {
+    EXPECT_TRUE(asked.contains(each.csv)) << each.csv << " has no line here";
+  }
 }
 
 }  // namespace

@@ -347,5 +347,16 @@ TEST(ForeignFormats, NamesOfFormats) {
             "replica, 7scenes");
 }
 
+TEST(ForeignFormats, ThePageHasThemAll) {
+  const std::string page = ReadFile(TSDFPP_SOURCE_DIR "/docs/datasets.md").value();
+  std::string choice;
+  for (const DatasetFormat format : AllDatasetFormats()) {
+    const std::string name = DatasetFormatName(format);
+    EXPECT_NE(page.find("\n| `" + name + "` | "), std::string::npos) << "no row of " << name;
+    choice += (choice.empty() ? "" : "|") + name;
+  }
+  EXPECT_NE(page.find("`--dataset " + choice + "`"), std::string::npos) << "at its top";
+}
+
 }  // namespace
 }  // namespace tsdfpp
