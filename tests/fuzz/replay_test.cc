@@ -94,6 +94,14 @@ TEST(FuzzTargets, EveryCorpusAndEverySourceIsThere) {
 #endif
 }
 
+TEST(FuzzTargets, ThePageHasThemAll) {
+  const fs::path root = TSDFPP_SOURCE_DIR;
+  const std::string page = ReadFile(root / "docs" / "fuzzing.md").value();
+  for (const Target& target : AllTargets()) {
+    EXPECT_NE(page.find("`" + std::string(target.name) + "`"), std::string::npos) << target.name;
+  }
+}
+
 TEST(FuzzTargets, EveryReaderOfASequenceIsFuzzed) {
   const fs::path root = TSDFPP_SOURCE_DIR;
   std::set<std::string> fuzzed;
