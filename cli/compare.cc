@@ -76,9 +76,7 @@ std::string PoseNames(const CompareArguments& options, const CompareConfig& conf
                       const FrameSource& source) {
   if (!options.poses.empty()) return options.poses;
   const SequenceInfo& info = source.info();
-  const AssociationMode by_itself =
-      info.mask_ids_are_objects ? AssociationMode::kGiven : AssociationMode::kVotes;
-  const PoseChoice choice = PosesUnsaid(info, config.associate.value_or(by_itself), config.methods);
+  const PoseChoice choice = DefaultPoses(info, AssociationOf(config, info), config.methods);
   if (!choice.remark.empty()) spdlog::info("{}", choice.remark);
   return std::string(PoseSourceName(choice.poses));
 }
@@ -234,9 +232,10 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
                  "default given unless ids are drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
   app.add_option(
-      "--poses", options->poses,
-      std::string("Object poses: gt (given), icp or track (tracked, docs/tracking.md); ") +
-          kPosesUnsaid);
+         "--poses", options->poses,
+         std::string("Object poses: gt (given), icp or track (tracked, docs/tracking.md); ") +
+             kDefaultPosesHelp)
+      ->check(NotEmpty("one of gt, icp and track at least"));
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();
   app.add_option("--every", options->config.every, "Frames between evaluations")

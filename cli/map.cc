@@ -62,10 +62,6 @@ Expected<TrackWishes> ReadTracking(const MapArguments& options) {
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
-  if (!options.poses.empty()) {
-    TSDFPP_ASSIGN(config.poses, PoseSourceFromName(options.poses));
-    TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
-  }
   config.map = options.map;
   TSDFPP_RETURN_IF_ERROR(config.map.SetProfile(options.profile));
   if (options.trunc_front > 0) config.map.trunc_front_voxels = options.trunc_front;
@@ -85,7 +81,9 @@ Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
 
 Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   MapWishes wishes;
-  wishes.poses = !options.poses.empty();
+  if (!options.poses.empty()) {
+    TSDFPP_ASSIGN(wishes.poses, PoseSourceFromName(options.poses));
+  }
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -169,6 +167,10 @@ void LogStart(const MapStart& start) {
                  all ? "all that is not background" : "what has a class");
   }
   if (!start.pose_remark.empty()) spdlog::info("{}", start.pose_remark);
+  if (start.by_votes()) {
+    spdlog::info("{}: the map's ids are its own, found by votes; poses are tracked ({})",
+                 start.info.name, PoseSourceName(start.config.poses));
+  }
 }
 
 Expected<RunFolder> BeginRun(const MapArguments& options, const CLI::App& app) {
@@ -290,7 +292,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--poses", options->poses,
                  std::string("Object poses: gt (given), icp (tracked as in the paper), track "
                              "(tracked by signed distances, docs/tracking.md); ") +
-                     kPosesUnsaid)
+                     kDefaultPosesHelp)
       ->check(NotEmpty("gt, icp or track"));
   app.add_option("--track", options->track,
                  "Which objects are tracked: classified (those with a class), all (whatever is not "

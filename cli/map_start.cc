@@ -53,14 +53,17 @@ Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
 // Who says where that object is.
 Expected<void> ChoosePoses(MapStart& start, const MapWishes& wishes) {
   if (wishes.poses) {
-    if (start.config.poses != PoseSource::kGiven || !start.by_votes()) return {};
+    start.config.poses = *wishes.poses;
+    if (start.config.poses != PoseSource::kGiven || !start.by_votes()) {
+      return CheckPoses(start.config.method, start.config.poses);
+    }
     return UsageError(
         "--poses gt are the poses of given ids, and --associate votes gives ids of its own: "
         "expected --poses icp or track, or --associate given");
   }
   // Of the background alone there is nothing to track.
   if (start.config.segmentation == Segmentation::kNone && !start.by_votes()) return {};
-  PoseChoice choice = PosesUnsaid(start.info, start.config.associate, {start.config.method});
+  PoseChoice choice = DefaultPoses(start.info, start.config.associate, {start.config.method});
   start.config.poses = choice.poses;
   start.pose_remark = std::move(choice.remark);
   return {};

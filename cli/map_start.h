@@ -21,7 +21,7 @@ struct TrackWishes {
 struct MapWishes {
   std::optional<Segmentation> segmentation;
   std::optional<AssociationMode> associate;
-  bool poses = false;  // the config's poses are what was asked for; else as PosesUnsaid() has it
+  std::optional<PoseSource> poses;
   TrackWishes track;
 };
 
@@ -29,7 +29,7 @@ struct MapStart {
   PipelineConfig config;
   std::unique_ptr<FrameSource> source;  // none where a map alone is loaded
   std::string mask_remark;              // why all of it is taken for background, or empty
-  std::string pose_remark;              // why poses are tracked, where nobody asked; or empty
+  std::string pose_remark;              // why poses are tracked unasked, or empty
   std::optional<bool> has_masks;        // what each frame must have or lack; nothing: no matter
   SequenceInfo info;                    // of the source, or what the map's file says
   int first = 1;                        // frames to map, none where last < first
@@ -43,10 +43,12 @@ struct MapStart {
 
 // With an empty map. `until` is the last frame, or below 0 for the sequence's. Where nothing is
 // wished, masks are those of the sequence if its first frame has one, association is by votes if
-// the masks' ids are of one frame alone, and poses are those of PosesUnsaid().
+// the masks' ids are of one frame alone, and poses are DefaultPoses(); the config's
+// association and poses are not looked at.
 // Errors: those of OpenArguments; kUsage where `until` is out of range, ids of one frame are to be
-// those of objects, given poses are to go with votes, or what is wished of tracking does not fit
-// the poses; kData where masks are asked for and there are none.
+// those of objects, given poses are to go with votes, the method has not what poses are to be
+// tracked by, or what is wished of tracking does not fit the poses; kData where masks are asked for
+// and there are none.
 Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArguments& source,
                             const MapWishes& wishes, int until);
 

@@ -12,19 +12,19 @@
 namespace tsdfpp {
 
 // For the option's help.
-inline constexpr const char* kPosesUnsaid =
+inline constexpr const char* kDefaultPosesHelp =
     "by default gt where the sequence has poses of objects and their ids, else track (icp where a "
     "method has no signed distances)";
 
 struct PoseChoice {
   PoseSource poses = PoseSource::kGiven;
-  std::string remark;  // for the log, why they are tracked; or empty
+  std::string remark;  // for the log, that the sequence lacks poses; or empty
 };
 
 // Given poses where the frames have them, and where there is nothing but background. Else they are
 // tracked: by signed distances, or by ICP where one of the methods has none. Ids of the map's own
 // (votes) have no given poses.
-PoseChoice PosesUnsaid(const SequenceInfo& info, AssociationMode associate,
-                       const std::vector<Method>& methods);
+PoseChoice DefaultPoses(const SequenceInfo& info, AssociationMode associate,
+                        const std::vector<Method>& methods);
 
 }  // namespace tsdfpp

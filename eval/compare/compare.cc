@@ -52,11 +52,6 @@ Expected<int> LastFrame(const SequenceInfo& info, const std::string& until) {
   return frame;
 }
 
-AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info) {
-  return config.associate.value_or(info.mask_ids_are_objects ? AssociationMode::kGiven
-                                                             : AssociationMode::kVotes);
-}
-
 Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig& config,
                                                             const SequenceInfo& info,
                                                             const SceneTruth& truth) {
@@ -146,6 +141,11 @@ int LastEvaluated(const CompareResult& result) {
 }
 
 }  // namespace
+
+AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info) {
+  return config.associate.value_or(info.mask_ids_are_objects ? AssociationMode::kGiven
+                                                             : AssociationMode::kVotes);
+}
 
 CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profile_name,
                        const std::vector<ObjectInfo>& objects, const SceneTruth& truth)

@@ -39,6 +39,9 @@ struct CompareConfig {
   bool record = false;  // what `tsdfpp report` shows in 3-D, below record/ (docs/report.md)
 };
 
+// What the config says; else by votes where ids in the masks are of one frame alone.
+AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info);
+
 // One map of the comparison.
 struct CompareRun {
   CompareRun(const PipelineConfig& config, std::string profile_name,

@@ -15,7 +15,7 @@ constexpr double kLeastVisibleCompletion = 0.98;  // of all that is seen, anchor
 constexpr double kLeastCarCompletion =
     0.95;  // of what was seen of each car, anchored, profile close
 
-constexpr int kEvery = 128;  // frames between evaluations; to score takes longer than to map
+constexpr int kEvery = 128;  // frames between evaluations, the last one at the reveal
 
 TEST(ToyCar3, LayeredMapsKeepTheTableUnderTheCars) {
   const std::filesystem::path scene =
