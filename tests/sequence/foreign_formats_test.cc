@@ -64,6 +64,7 @@ TEST(ForeignFormats, Scannet) {
   ASSERT_TRUE(read.has_value()) << read.error().message;
   const SequenceInfo& info = (*read)->info();
   EXPECT_EQ(info.frame_count, 5) << "the frame without a pose is left out";
+  EXPECT_FALSE(info.has_object_poses);
   EXPECT_EQ(info.first_index, 0);
   EXPECT_EQ(info.objects.size(), 3U);
   EXPECT_TRUE(NotesSay(notes, "1 of 6 frames have infinite poses"));
@@ -164,6 +165,7 @@ TEST(ForeignFormats, BopInstancesKeepTheirIds) {
     const SequenceInfo& info = read->info();
     // The plate, the first cup, and after all obj_ids the others.
     ASSERT_EQ(info.objects.size(), 5U);
+    EXPECT_TRUE(info.has_object_poses);
     EXPECT_EQ(info.objects[1].id, 2);
     EXPECT_EQ(info.objects[2], (ObjectInfo{5, "obj_000005", "obj_000005"}));
     EXPECT_EQ(info.objects[3], (ObjectInfo{6, "obj_000005_2", "obj_000005"}));
