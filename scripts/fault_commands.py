@@ -32,7 +32,7 @@ class Command:
     ours: bool = True  # tsdfpp, no script
     variant: bool = False  # of a command that meets every fault; meets those of writers alone
     quick: bool = False
-    goes_on: bool = False  # without a child that was killed, and says so
+    goes_on: str = ""  # what it prints where it goes on without a child that was killed
 
 
 SCENE = """name = "{name}"
@@ -320,7 +320,7 @@ def commands_of(inputs):
                 kills=24, pairs=True, replaces=True, quick=True),
         Command("compare --adapter", [*compare, "--methods", "tsdf", "--adapter", at("adapter", "slow.toml")],
                 before=compare_before, readers=[[t, "report", "out", "--out", "read/page.html"]],
-                notes=["summary.json", "frames.csv"], kills=10, variant=True, goes_on=True),
+                notes=["summary.json", "frames.csv"], kills=10, variant=True, goes_on="\nfailed: slow: "),
         Command("report", [t, "report", "out"], given=at("compared"), before=[t, "report", "out", "--compare", at("compared-before")],
                 notes=["summary.json"], kills=6),
         Command("report --video", [t, "report", "out", "--video", "--out", "out/film.mp4"], given=at("compared"),

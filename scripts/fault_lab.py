@@ -226,7 +226,7 @@ class Lab:
         trial, learned = self.at("trial"), self.learned[command.name]
         for attempt in range(tries):
             draw = fault_process.drawn(self.seed, command.name, "kill", number, attempt)
-            outcome, said = Outcome(), False
+            outcome, went_on = Outcome(), False
             self.restore(command, trial)
             for again in range(2 if draw.random() < 0.2 else 1):
                 killed, ending, stayed = self.kill_once(command, trial, draw, command.writes and number % 3 == 2)
@@ -236,15 +236,15 @@ class Lab:
                     outcome.lost.append(f"{len(stayed)} processes stayed")
                 if ending.hung:
                     outcome.lost.append("it did not end")
-                said = not ending.signal and ending.code != learned.code
-                if said:
+                went_on = bool(command.goes_on) and command.goes_on in ending.out
+                if not ending.signal and ending.code != learned.code:
                     # A child was killed, and the command says so.
                     wrong = fault_process.what_is_wrong_with(ending.err)
                     if again == 0 and (wrong or ending.code != 3):
                         outcome.lost.append(f"its child was killed, and it {ending.text()}: {wrong}")
             if outcome.how:
-                # What others have of a run that goes on without the child is whole, and of neither run.
-                outcome.how = "between" if command.goes_on and said else self.judge_left(command, trial, outcome)
+                # A result without what the child would have made is of neither run.
+                outcome.how = "between" if went_on else self.judge_left(command, trial, outcome)
                 self.judge_rerun(command, trial, outcome, outcome.how)
                 return outcome
         return None
