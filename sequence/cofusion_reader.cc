@@ -128,6 +128,7 @@ class CofusionSource : public FrameSource {
           models.string());
     }
     std::vector<TrueModel> ordered;
+    ordered.reserve(truth.size());
     for (auto& [id, model] : truth) ordered.push_back(std::move(model));
     return ordered;
   }

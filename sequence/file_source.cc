@@ -151,6 +151,7 @@ Pose MirroredInY(const Pose& T_WC) {
 
 std::vector<ObjectInfo> NamedByIds(const std::vector<InstanceId>& ids) {
   std::vector<ObjectInfo> objects;
+  objects.reserve(ids.size());
   for (const InstanceId id : ids) objects.push_back({id, fmt::format("object{}", id), ""});
   return objects;
 }
@@ -237,6 +238,7 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
   }
   info.frame_count = static_cast<int>(frames.size());
   std::vector<double> times;
+  times.reserve(frames.size());
   for (const FrameFiles& frame : frames) times.push_back(frame.time_s);
   info.rate_hz = sequence.rate_hz > 0 ? sequence.rate_hz : RateOf(times);
   info.has_object_poses = std::any_of(frames.begin(), frames.end(),

@@ -23,10 +23,10 @@ class Associate : public testing::Test {
   // scenes/mini.toml, small, with a car and a house; rendered once for all tests.
   static void SetUpTestSuite() {
     folder_ = std::make_unique<test::TempFolder>();
-    const CommandOutput made =
-        RunTsdfpp({"generate", TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--sensor", "masks_redrawn",
-                   "--no-antialias", "--out", *folder_ / "redrawn"},
-                  folder_->path());
+    const std::string scene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
+    const CommandOutput made = RunTsdfpp({"generate", scene, "--sensor", "masks_redrawn",
+                                          "--no-antialias", "--out", *folder_ / "redrawn"},
+                                         folder_->path());
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
   static void TearDownTestSuite() { folder_.reset(); }

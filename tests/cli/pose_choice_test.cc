@@ -21,9 +21,9 @@ class PoseChoice : public testing::Test {
   // scenes/mini.toml, small, with a car and a house, of which only masks tell; rendered once.
   static void SetUpTestSuite() {
     folder_ = std::make_unique<test::TempFolder>();
-    const CommandOutput made = RunTsdfpp({"generate", TSDFPP_SOURCE_DIR "/scenes/mini.toml",
-                                          "--no-antialias", "--out", *folder_ / "posed"},
-                                         folder_->path());
+    const std::string scene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
+    const CommandOutput made = RunTsdfpp(
+        {"generate", scene, "--no-antialias", "--out", *folder_ / "posed"}, folder_->path());
     ASSERT_EQ(made.exit_code, 0) << made.err;
     fs::copy(*folder_ / "posed", *folder_ / "bare", fs::copy_options::recursive);
     for (const auto& entry : fs::directory_iterator(*folder_ / "bare/trajectories")) {
