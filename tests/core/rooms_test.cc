@@ -2,6 +2,7 @@
 // what includes what never leads back.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <regex>
@@ -95,6 +96,23 @@ std::vector<std::string> NotAllowed(const fs::path& source, const std::string& r
   return faults;
 }
 
+// The sources of a folder that are longer than kLines and do not begin by saying why.
+std::set<std::string> LongWithoutAReason(const fs::path& source, const std::string& room) {
+  constexpr std::ptrdiff_t kLines = 400;  // past which a file may have two subjects
+  std::set<std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(source / room)) {
+    const fs::path extension = entry.path().extension();
+    if (!entry.is_regular_file() || (extension != ".h" && extension != ".cc")) continue;
+    const std::string text = ReadFile(entry.path()).value();
+    const std::string head = text.substr(0, text.find("#include"));
+    if (std::ranges::count(text, '\n') > kLines &&
+        head.find("Longer than most files: ") == std::string::npos) {
+      files.insert(entry.path().lexically_relative(source).string());
+    }
+  }
+  return files;
+}
+
 TEST(Rooms, ALowerOneIncludesNoHigherOne) {
   const std::map<std::string, std::set<std::string>> allowed{
       {"core", {}},
@@ -118,6 +136,24 @@ TEST(Rooms, AHigherOneIsFound) {
   ASSERT_TRUE(WriteFile(folder / "mapper/map.cc", "#include \"metrics/measured.h\"\n"));
   EXPECT_EQ(NotAllowed(folder.path(), "mapper", {"core"}),
             std::vector<std::string>{"mapper/map.cc includes a header of metrics"});
+}
+
+TEST(Rooms, LongFilesSayWhy) {
+  for (const char* room :
+       {"bench", "cli", "core", "eval", "mapper", "metrics", "sequence", "sim", "tests"}) {
+    for (const std::string& file : LongWithoutAReason(fs::path(TSDFPP_SOURCE_DIR), room)) {
+      ADD_FAILURE() << file << ": expected \"Longer than most files: \" and why, at its top";
+    }
+  }
+}
+
+TEST(Rooms, ALongFileWithoutAReasonIsFound) {
+  const test::TempFolder folder;
+  const std::string lines(401, '\n');
+  ASSERT_TRUE(WriteFile(folder / "room/short.cc", lines.substr(1)));
+  ASSERT_TRUE(WriteFile(folder / "room/long.cc", lines));
+  ASSERT_TRUE(WriteFile(folder / "room/why.cc", "// Longer than most files: one table." + lines));
+  EXPECT_EQ(LongWithoutAReason(folder.path(), "room"), std::set<std::string>{"room/long.cc"});
 }
 
 TEST(Rooms, NoneLeadsBack) {

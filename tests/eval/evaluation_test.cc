@@ -1,5 +1,5 @@
 // Scores of scene meshes that are made by hand, so that each value is known: what is sampled, what
-// is removed, who is counted.
+// is removed, who is counted. Longer than most files: each rule has a scene of its own.
 #include "eval/score/evaluation.h"
 
 #include <gtest/gtest.h>

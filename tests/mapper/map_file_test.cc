@@ -1,4 +1,5 @@
 // A map that was saved and loaded is the same map; a file that is not whole is refused.
+// Longer than most files: each of these for every method.
 #include "mapper/map_file.h"
 
 #include <gtest/gtest.h>
