@@ -20,6 +20,7 @@
 #include "bench/scaling.h"
 #include "bench/segment.h"
 #include "bench/side_by_side.h"
+#include "bench/track.h"
 #include "core/guard.h"
 
 namespace tsdfpp {
@@ -142,6 +143,25 @@ void AddSegment(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunSegmentBench(*options); }; });
 }
 
+void AddTrack(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<TrackBenchOptions>();
+  CLI::App* command = app.add_subcommand("track", "What docs/tracking.md shows, as CSV");
+  command->add_option("--out", options->out, "Output folder")->required();
+  command->add_option("--scenes", options->scenes, "Folder of scenes")->capture_default_str();
+  command->add_option("--only", options->only, "Names of some of them; default: all")
+      ->delimiter(',');
+  command->add_option("--depths", options->depths, "Some of: exact, noise")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"exact", "noise"}))
+      ->capture_default_str();
+  command->add_option("--runs", options->runs, "known, or a tracker and a method: 'icp tsdf++'")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--track-config", options->settings, "Settings of track and known, TOML");
+  AddCount(command, "--until", options->until, "The last frame", 1, 100000);
+  command->callback([=, &chosen] { chosen = [=] { return RunTrackBench(*options); }; });
+}
+
 void AddReleased(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<ReleasedOptions>();
   CLI::App* command = app.add_subcommand("released", "What docs/released.md shows, as CSV");
@@ -193,6 +213,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddFigures(app, chosen);
   tsdfpp::AddReleased(app, chosen);
   tsdfpp::AddSegment(app, chosen);
+  tsdfpp::AddTrack(app, chosen);
   tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {

@@ -74,7 +74,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
       }
       continue;
     }
-    const std::optional<ObjectModel> model = ModelOf(map, id);
+    const std::optional<ObjectModel> model = models_(map, id);
     if (!model) continue;
     const auto T_WL = Register(frame, points, *model, voxel_m, known->second, memory);
     if (!T_WL) continue;

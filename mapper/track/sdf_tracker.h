@@ -2,8 +2,10 @@
 // where its last motion would bring it, and freezes what it cannot register (docs/tracking.md).
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "mapper/track/object_model.h"
@@ -12,10 +14,14 @@
 
 namespace tsdfpp {
 
+// Where a tracker gets an object's model from, as ModelOf() does.
+using ModelSource = std::function<std::optional<ObjectModel>(const MapRepresentation&, InstanceId)>;
+
 class SdfTracker : public Tracker {
  public:
-  // The config must be valid.
-  explicit SdfTracker(const SdfTrackConfig& config) : config_(config) {}
+  // The config must be valid. Models are the map's, unless others are known.
+  explicit SdfTracker(const SdfTrackConfig& config, ModelSource models = ModelOf)
+      : config_(config), models_(std::move(models)) {}
 
   // An object's frame O is its lattice: its pose is the identity where it is first seen with enough
   // points. Frozen are objects that have too few points, are not registered, or fail a gate: they
@@ -65,6 +71,7 @@ class SdfTracker : public Tracker {
                       const Intrinsics& camera) const;
 
   SdfTrackConfig config_;
+  ModelSource models_;
   std::map<InstanceId, Memory> memory_;
 };
 

@@ -1,0 +1,30 @@
+// How well objects are tracked: what docs/tracking.md shows.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace tsdfpp {
+
+struct TrackBenchOptions {
+  std::string scenes = "scenes";  // a folder of scenes
+  std::vector<std::string> only;  // names of some of them; empty for all
+  std::vector<std::string> depths = {"exact", "noise"};
+  // Trackers, each with a method: "track tsdf++/anchored", and "known", which has no map.
+  std::vector<std::string> runs = {"known", "track tsdf++/anchored", "track tsdf++",
+                                   "icp tsdf++/anchored", "icp tsdf++"};
+  std::string settings;  // a file of mapper/track/sdf_track_config.h; empty for the defaults
+  int until = 100000;    // the last frame
+  std::string out;
+};
+
+// Renders each scene once, and gives its true masks, and depth that is exact or has the noise of
+// nguyen2012, to each run. `known` registers to the distances of the true surfaces, beginning at
+// the true poses. Writes objects.csv, a row for each object and run that moves at least 5 cm, and
+// of these the tables shifts.csv and turns.csv, a row a scene. Errors: kUsage for an unknown scene,
+// depth or run, or wrong settings; else those of the scenes and the renderer.
+Expected<void> RunTrackBench(const TrackBenchOptions& options);
+
+}  // namespace tsdfpp

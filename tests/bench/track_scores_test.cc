@@ -1,0 +1,68 @@
+// Scores of an object whose estimate is off by known shifts and turns.
+#include "bench/track_scores.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace tsdfpp {
+namespace {
+
+constexpr double kRounding = 1e-6;  // metres: points are in single precision
+constexpr double kDegrees = std::numbers::pi / 180;
+
+Pose At(double x, double turn_rad = 0) {
+  return Eigen::Translation3d(x, 0.2, 0.1) * Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()) *
+         Pose::Identity();
+}
+
+// Four frames in which the object drives 1 cm each.
+TrackedObject Driving() {
+  TrackedObject object;
+  for (int i = 1; i <= 4; ++i) object.T_WO_truth[i] = At(0.01 * i);
+  object.shown = {1, 2, 3, 4};
+  object.points_O = {{0.1F, 0, 0}, {-0.1F, 0, 0}, {0, 0.1F, 0}, {0, -0.1F, 0}};
+  return object;
+}
+
+TEST(TrackScores, AnotherFrameOfTheObjectIsNoError) {
+  TrackedObject object = Driving();
+  const Pose C = At(0.4, 1.2);
+  for (const auto& [i, T_WO] : object.T_WO_truth) object.T_WO_estimate[i] = T_WO * C;
+  const TrackScores scores = ScoreTracked(object);
+  EXPECT_EQ(scores.frames, 4U);
+  EXPECT_NEAR(scores.moved_m, 0.03, kRounding);
+  EXPECT_NEAR(*scores.trajectory.ate_rmse_m.value, 0, kRounding);
+  EXPECT_NEAR(*scores.add_m.value, 0, kRounding);
+  EXPECT_EQ(*scores.within_5mm.value, 1);
+}
+
+TEST(TrackScores, ShiftsCountWhereTheObjectIsShown) {
+  TrackedObject object = Driving();
+  object.T_WO_estimate = {{1, At(0.01)}, {2, At(0.024)}, {3, At(0.8)}, {4, At(0.07)}};
+  object.shown = {1, 2, 4};
+  const TrackScores scores = ScoreTracked(object);
+  EXPECT_EQ(scores.frames, 3U);
+  EXPECT_NEAR(scores.farthest_m, 0.03, kRounding);
+  EXPECT_NEAR(scores.end_m, 0.03, kRounding);
+  EXPECT_NEAR(*scores.trajectory.ate_rmse_m.value, std::sqrt((0.004 * 0.004 + 0.03 * 0.03) / 3),
+              kRounding);
+  EXPECT_NEAR(*scores.add_m.value, 0.034 / 3, kRounding);
+  EXPECT_NEAR(*scores.within_5mm.value, 2.0 / 3, kRounding);
+  EXPECT_NEAR(*scores.within_2cm.value, 2.0 / 3, kRounding);
+}
+
+// A quarter turn brings the four points onto each other: ADD-S sees nothing, ADD the way of each.
+TEST(TrackScores, TurnsThatTheShapeHidesAreSeenByAddAlone) {
+  TrackedObject object = Driving();
+  object.T_WO_estimate = {{1, At(0.01)}, {2, At(0.02, 90 * kDegrees)}};
+  const TrackScores scores = ScoreTracked(object);
+  EXPECT_EQ(scores.frames, 2U);
+  EXPECT_NEAR(*scores.trajectory.rotation_rmse_deg.value, 90 / std::numbers::sqrt2, 1e-4);
+  EXPECT_NEAR(scores.farthest_m, 0, kRounding);
+  EXPECT_NEAR(*scores.add_m.value, 0.1 * std::numbers::sqrt2 / 2, kRounding);
+  EXPECT_NEAR(*scores.add_s_m.value, 0, kRounding);
+}
+
+}  // namespace
+}  // namespace tsdfpp
