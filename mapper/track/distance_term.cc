@@ -146,11 +146,10 @@ SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m) const {
   const float x1 = x01 + (x11 - x01) * fy;
   const Eigen::Vector3f slope(x0 + (x1 - x0) * fz, (c10 - c00) + ((c11 - c01) - (c10 - c00)) * fz,
                               c1 - c0);
-  const float length = slope.norm() / voxel_m_;
-  if (!(length >= kLeastSlope)) return sample;
-  sample.has_slope = true;
-  sample.distance_m = (c0 + (c1 - c0) * fz - sag_m) / length;
-  sample.normal_L = slope / (length * voxel_m_);
+  sample.value_m = c0 + (c1 - c0) * fz - sag_m;
+  sample.gradient_L = slope / voxel_m_;
+  sample.slope = sample.gradient_L.norm();
+  sample.has_slope = sample.slope >= kLeastSlope;
   return sample;
 }
 
@@ -172,13 +171,37 @@ DistanceTerm::DistanceTerm(const SurfaceReader& model, std::span<const SegmentPo
       stride_(stride),
       huber_m_(config.huber_voxels * voxel_m) {}
 
-void DistanceTerm::SetSags(const Pose& T_LC) {
-  sags_m_.assign(points_.size(), 0);
+double DistanceTerm::WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_C,
+                              const Eigen::Vector3d& y, const Eigen::Vector3d& camera_L) const {
+  const double model_m = config_.model_voxels * voxel_m_;
+  const double least_variance = model_m * model_m + config_.axial_m * config_.axial_m;
+  const Eigen::Vector3d n = at.normal_L().cast<double>();
+  const double cosine = std::min(1.0, std::abs(n.dot(y - camera_L)) / p_C.norm());
+  const double off = p_C.z() - 0.4;
+  const double axial = (config_.axial_m + config_.axial_growth * off * off) * cosine;
+  const double lateral_squared =
+      lateral_per_m_ * lateral_per_m_ * p_C.z() * p_C.z() * (1 - cosine * cosine);
+  const double variance = model_m * model_m + axial * axial + lateral_squared;
+  return std::min(1.0, least_variance / variance) *
+         double{at.weight / (at.weight + kFewObservations)};
+}
+
+void DistanceTerm::KeepAt(const Pose& T_LC) {
+  kept_.assign(points_.size(), {});
+  const Eigen::Vector3d camera_L = T_LC.translation();
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, points_.size(), kPointsPerTask),
+      tbb::blocked_range<std::size_t>(0, Taken(), kPointsPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          sags_m_[i] = model_->SagAt(T_LC * points_[i].p_C.cast<double>());
+        for (std::size_t k = range.begin(); k != range.end(); ++k) {
+          const std::size_t i = k * stride_;
+          const Eigen::Vector3d p_C = points_[i].p_C.cast<double>();
+          const Eigen::Vector3d y = T_LC * p_C;
+          Kept& kept = kept_[i];
+          if (config_.curved) kept.sag_m = model_->SagAt(y);
+          const SurfaceSample at = model_->At(y, kept.sag_m);
+          if (!at.has_slope) continue;
+          kept.per_slope = 1 / at.slope;
+          kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
         }
       },
       tbb::simple_partitioner());
@@ -187,34 +210,34 @@ void DistanceTerm::SetSags(const Pose& T_LC) {
 void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end,
                             NormalEquations& sums) const {
   const Eigen::Vector3d camera_L = T_LC.translation();
-  const double model_m = config_.model_voxels * voxel_m_;
-  const double least_variance = model_m * model_m + config_.axial_m * config_.axial_m;
   const double farthest_m = kFarthest_hubers * huber_m_;
   const double cost_of_unknown = huber_m_ * (farthest_m - huber_m_ / 2);
-  for (std::size_t i = begin; i < end; ++i) {
-    const Eigen::Vector3d p_C = points_[i * stride_].p_C.cast<double>();
+  for (std::size_t k = begin; k < end; ++k) {
+    const std::size_t i = k * stride_;
+    const Eigen::Vector3d p_C = points_[i].p_C.cast<double>();
     const Eigen::Vector3d y = T_LC * p_C;
-    const SurfaceSample at = SampleAt(T_LC, i * stride_);
-    const double r = at.distance_m;
-    if (!at.has_slope || std::abs(r) >= farthest_m) {
-      sums.cost += cost_of_unknown;
+    const SurfaceSample at = SampleAt(T_LC, i);
+    double weight = 1;
+    double per_slope = 0;
+    if (!kept_.empty()) {
+      weight = kept_[i].weight;
+      per_slope = kept_[i].per_slope;
+    } else if (at.has_slope) {
+      weight = WeightOf(at, p_C, y, camera_L);
+      per_slope = 1 / at.slope;
+    }
+    const double r = per_slope * at.value_m;
+    if (!at.is_observed || !(per_slope > 0) || std::abs(r) >= farthest_m) {
+      sums.cost += (per_slope > 0 ? weight : 1) * cost_of_unknown;
       continue;
     }
-    const Eigen::Vector3d n = at.normal_L.cast<double>();
-    const double cosine = std::min(1.0, std::abs(n.dot(y - camera_L)) / p_C.norm());
-    const double off = p_C.z() - 0.4;
-    const double axial = (config_.axial_m + config_.axial_growth * off * off) * cosine;
-    const double lateral_squared =
-        lateral_per_m_ * lateral_per_m_ * p_C.z() * p_C.z() * (1 - cosine * cosine);
-    const double variance = model_m * model_m + axial * axial + lateral_squared;
-    const double weight = std::min(1.0, least_variance / variance) *
-                          double{at.weight / (at.weight + kFewObservations)};
     const bool is_far = std::abs(r) > huber_m_;
     const double slack = is_far ? huber_m_ / std::abs(r) : 1;
     sums.cost += weight * (is_far ? huber_m_ * (std::abs(r) - huber_m_ / 2) : r * r / 2);
+    const Eigen::Vector3d g = per_slope * at.gradient_L.cast<double>();
     Vector6 J;
-    J.head<3>() = n;
-    J.tail<3>() = (y - frame_.centre).cross(n) / frame_.radius_m;
+    J.head<3>() = g;
+    J.tail<3>() = (y - frame_.centre).cross(g) / frame_.radius_m;
     const Vector6 weighted = weight * slack * J;
     sums.g += weighted * r;
     sums.H.noalias() += weighted * J.transpose();
@@ -255,7 +278,7 @@ DistanceCounts DistanceTerm::Count(const Pose& T_LC) const {
     const SurfaceSample at = SampleAt(T_LC, i);
     ++counts.points;
     counts.observed += at.is_observed ? 1 : 0;
-    counts.inliers += at.has_slope && std::abs(at.distance_m) < inlier_m ? 1 : 0;
+    counts.inliers += at.has_slope && std::abs(at.distance_m()) < inlier_m ? 1 : 0;
   }
   return counts;
 }
@@ -266,7 +289,7 @@ double DistanceTerm::RobustDeviation_m(const Pose& T_LC, double at_least_m) cons
   sizes.reserve(Taken());
   for (std::size_t i = 0; i < points_.size(); i += stride_) {
     const SurfaceSample at = SampleAt(T_LC, i);
-    if (at.has_slope) sizes.push_back(std::abs(at.distance_m));
+    if (at.has_slope) sizes.push_back(std::abs(at.distance_m()));
   }
   if (sizes.empty()) return at_least_m;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);

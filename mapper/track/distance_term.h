@@ -16,11 +16,15 @@ namespace tsdfpp {
 struct SurfaceSample {
   bool is_observed = false;  // the eight voxels around the point are
   bool has_slope = false;    // and their distances tell where the surface is
-  // The distance over the length of its gradient, metres: distances in a map are along the rays
-  // that saw them, up to 1 / cos of the angle of incidence too long.
-  float distance_m = 0;
-  Eigen::Vector3f normal_L = Eigen::Vector3f::Zero();  // the gradient's direction
+  float value_m = 0;         // the distance as the voxels have it
+  Eigen::Vector3f gradient_L = Eigen::Vector3f::Zero();
+  float slope = 0;   // the gradient's length
   float weight = 0;  // the least number of observations of the eight
+
+  // Distances in a map are along the rays that saw them, up to 1 / cos of the angle of incidence
+  // too long; this is that to the surface. Where there is a slope.
+  float distance_m() const { return value_m / slope; }
+  Eigen::Vector3f normal_L() const { return gradient_L / slope; }
 };
 
 // Reads an object's distances. The grid must not change meanwhile.
@@ -64,8 +68,11 @@ class DistanceTerm {
   // Beyond this a residual counts linearly, metres.
   void SetHuber(double huber_m) { huber_m_ = huber_m; }
 
-  // Takes the sags at the points y = T p off their distances from now on.
-  void SetSags(const Pose& T_LC);
+  // Keeps from now on what belongs to the points y = T p: their weights, the lengths of the
+  // gradients by which their distances are divided, and, where they are `curved`, their sags. These
+  // jump from one cube of voxels to the next, and a search goes astray over a cost that jumps.
+  // Points without a distance here have none in Sums() until this is called again.
+  void KeepAt(const Pose& T_LC);
 
   // The terms' sums over the points y = T p, with weights of at most 1 and so in units of a point:
   // of the least deviation that the config's noise knows. A point without a distance counts as if
@@ -80,9 +87,17 @@ class DistanceTerm {
 
  private:
   std::size_t Taken() const { return (points_.size() + stride_ - 1) / stride_; }
+  // What belongs to a point at one pose.
+  struct Kept {
+    float sag_m = 0;
+    float per_slope = 0;  // 1 / the gradient's length; 0 where there is no distance
+    float weight = 0;
+  };
   SurfaceSample SampleAt(const Pose& T_LC, std::size_t i) const {
-    return model_->At(T_LC * points_[i].p_C.cast<double>(), sags_m_.empty() ? 0 : sags_m_[i]);
+    return model_->At(T_LC * points_[i].p_C.cast<double>(), kept_.empty() ? 0 : kept_[i].sag_m);
   }
+  double WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_C, const Eigen::Vector3d& y,
+                  const Eigen::Vector3d& camera_L) const;
   void AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end, NormalEquations& sums) const;
 
   const SurfaceReader* model_;
@@ -93,7 +108,7 @@ class DistanceTerm {
   double lateral_per_m_;  // the deviation across the axis, by depth
   std::size_t stride_;
   double huber_m_;
-  std::vector<float> sags_m_;  // a point each, or empty
+  std::vector<Kept> kept_;  // a point each, or empty
 };
 
 }  // namespace tsdfpp

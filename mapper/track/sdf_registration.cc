@@ -81,14 +81,16 @@ struct FineFit {
   LeastSquaresResult found;
 };
 
-// All points, with as narrow a Huber function as the residuals ask for. Sags hold near where they
-// were read, so they are read once more.
+// Passes of the fine search: what is kept of the points holds near where it was kept.
+constexpr int kFinePasses = 3;
+
+// All points, with as narrow a Huber function as the residuals ask for.
 FineFit RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
                        const LeastSquaresOptions& options, DistanceTerm& fine,
                        SdfRegistrationResult& result) {
   FineFit fit;
-  for (int pass = 0; pass < (config.curved ? 2 : 1); ++pass) {
-    if (config.curved) fine.SetSags(result.T_LC);
+  for (int pass = 0; pass < kFinePasses; ++pass) {
+    fine.KeepAt(result.T_LC);
     const double deviation_m =
         fine.RobustDeviation_m(result.T_LC, kLeastDeviation_voxels * task.voxel_m);
     fine.SetHuber(

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <string>
@@ -116,6 +117,43 @@ TEST(SdfRegistration, FindsABallAndDoesNotMakeUpItsTurn) {
   EXPECT_LT(off.translation().norm(), kSmooth_voxels * kVoxel_m);
   // A turn by a thousandth of a voxel at its surface for each of some ten steps.
   EXPECT_LT(Turn(off), 0.01 * kVoxel_m / 0.06);
+}
+
+// A house of walls a voxel thick, whose distances have ridges between them.
+double DistanceToWalls(const Eigen::Vector3d& p) {
+  double least = reference::BoxDistance({0.09, 0.07, 0.02})(p);
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d q = p - Eigen::Vector3d(0.023 * i - 0.08, 0, 0.05);
+    least = std::min(least, reference::BoxDistance({0.005, 0.06, 0.04})(q));
+  }
+  return least;
+}
+
+// Across the ridges the interpolated gradients jump. The search must not end at the first jump, but
+// where the noise allows no more.
+TEST(SdfRegistration, IsAsGoodAsTheNoiseBetweenRidges) {
+  // The mean of the squared error in units of its covariance is 6; some of the covariance is lost
+  // where Huber's function cuts, and voxels of a wall's thickness bend the distances.
+  constexpr double kMostSquares = 3 * 6;
+  constexpr double kNoise_m = 0.003;
+  constexpr int kRuns = 12;
+  const TsdfGrid grid = GridOf(DistanceToWalls);
+  const SurfaceReader model(grid, kVoxel_m);
+  const auto exact = InCamera(reference::VisiblePoints(DistanceToWalls, kEye, 60));
+  std::vector<double> squares;
+  for (std::uint32_t run = 0; run < kRuns; ++run) {
+    std::vector<SegmentPoint> points = exact;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto draw = static_cast<float>(GaussianDraw(1, run, static_cast<std::uint32_t>(i))[0]);
+      points[i].p_C += kNoise_m * draw * points[i].p_C.normalized();
+    }
+    const auto found = RegisterToDistances(TaskFrom(model, points, kMotion), {});
+    ASSERT_TRUE(found.converged) << run;
+    const Vector6 off = found.frame.LengthsOf(found.T_LC * TrueLC().inverse());
+    squares.push_back(off.dot(found.information * off) / (found.deviation_m * found.deviation_m));
+  }
+  std::ranges::sort(squares);
+  EXPECT_LT(squares[kRuns / 2], kMostSquares);
 }
 
 // The trilinear surface of a ball lies inside it where distances bend upwards; the sag says so.
