@@ -1,5 +1,6 @@
 // The rooms (docs/architecture.md): a lower one includes no higher one, and within the large rooms
 // what includes what never leads back.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -52,8 +53,8 @@ std::string WayBack(const Arrows& arrows, const std::string& room, const std::st
   for (const auto& [to, include] : from->second) {
     if (to == room) return include;
     if (!visited.insert(to).second) continue;
-    const std::string rest = WayBack(arrows, room, to, visited);
-    if (!rest.empty()) return include + ", " + rest;
+    std::string rest = WayBack(arrows, room, to, visited);
+    if (!rest.empty()) return rest.insert(0, include + ", ");
   }
   return "";
 }
@@ -61,7 +62,7 @@ std::string WayBack(const Arrows& arrows, const std::string& room, const std::st
 std::string Circle(const Arrows& arrows) {
   for (const auto& [room, to] : arrows) {
     std::set<std::string> visited;
-    const std::string way = WayBack(arrows, room, room, visited);
+    std::string way = WayBack(arrows, room, room, visited);
     if (!way.empty()) return way;
   }
   return "";
@@ -91,7 +92,8 @@ std::vector<std::string> NotAllowed(const fs::path& source, const std::string& r
                                     const std::set<std::string>& allowed) {
   std::vector<std::string> faults;
   for (const auto& [other, file] : RoomsIncludedBy(source, room)) {
-    if (!allowed.contains(other)) faults.push_back(file + " includes a header of " + other);
+    if (!allowed.contains(other))
+      faults.push_back(fmt::format("{} includes a header of {}", file, other));
   }
   return faults;
 }

@@ -268,7 +268,9 @@ TEST(SdfRegistration, DoesNotSlideAlongAPlane) {
   const TsdfGrid grid = GridOf(plane);
   const SurfaceReader model(grid, kVoxel_m);
   Points points_L;
-  for (int i = 0; i < 900; ++i) points_L.emplace_back(0.004 * (i % 30), 0.003 * (i / 30), 0.013);
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 30; ++x) points_L.emplace_back(0.004 * x, 0.003 * y, 0.013);
+  }
   const auto points = InCamera(points_L);
   const Pose start(Eigen::Translation3d(0.006, -0.004, 0.005));
   const auto found = RegisterToDistances(TaskFrom(model, points, start), {});

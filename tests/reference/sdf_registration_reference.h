@@ -36,8 +36,9 @@ inline std::vector<Eigen::Vector3d> VisiblePoints(const DistanceFunction& distan
   const Eigen::Vector3d down = forward.cross(right);
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < side * side; ++i) {
+    const int row = i / side;
     const double u = (i % side + 0.5) / side - 0.5;
-    const double v = (static_cast<double>(i / side) + 0.5) / side - 0.5;
+    const double v = (row + 0.5) / side - 0.5;
     const Eigen::Vector3d direction = (u * right + v * down - eye).normalized();
     Eigen::Vector3d p = eye;
     double step = distance(p);
