@@ -27,7 +27,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 LISTS = ["metrics", "eval"]
 WORK = ROOT / "build" / "mutations"
 PAGE = "docs/metrics-mutations.md"
-COPIED = ["CMakeLists.txt", "cmake", "core", "mapper", "metrics", "eval", "tests"]
+# Of the rooms all, though few are built: cmake/compiled_together.txt names files of each, which have to be there.
+COPIED = ["CMakeLists.txt", "cmake", "core", "sim", "sequence", "mapper", "metrics", "eval", "cli", "bench", "tests"]
 # The test binary of a room, with the sources it is made of: what the room's tests build without a
 # simulator.
 TARGETS = {"metrics": "metrics_tests", "eval": "score_tests"}

@@ -70,6 +70,14 @@ class Check(unittest.TestCase):
             self.assertIn("cannot read the line", str(refused.exception))
 
 
+class Copy(unittest.TestCase):
+    def test_has_what_configuring_asks_for(self):
+        lines = (mutate_metrics.ROOT / "cmake" / "compiled_together.txt").read_text().splitlines()
+        files = [file for line in lines if not line.startswith("#") for file in line.split()]
+        self.assertTrue(files)
+        self.assertEqual({file.split("/")[0] for file in files} - set(mutate_metrics.COPIED), set())
+
+
 class Page(unittest.TestCase):
     def rows(self, root, options, caught):
         """What a run leaves of the page's table; building and running tests is left out."""
