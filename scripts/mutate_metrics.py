@@ -8,8 +8,9 @@ and checks that a test notices.
 tests/mutations/*.txt list the mutations: a header line "# name | file | test", then the text to
 replace after "- " and its replacement after "+ ". They are applied to a copy of the tree in
 build/mutations, never here. `test` is a GoogleTest filter: one of its tests has to fail. Exit code 1
-where none does, so that a mutation survives. --check builds nothing: it looks whether each mutation
-can still be made and names tests that there are; exit code 1 where one cannot.
+where none does, so that a mutation survives. --page FILE writes a table there; of mutations that
+were not run it has the rows of docs/metrics-mutations.md. --check builds nothing: it looks whether
+each mutation can still be made and names tests that there are; exit code 1 where one cannot.
 """
 
 import argparse
@@ -25,7 +26,9 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LISTS = ["metrics", "eval"]
 WORK = ROOT / "build" / "mutations"
-COPIED = ["CMakeLists.txt", "cmake", "core", "mapper", "metrics", "eval", "tests"]
+PAGE = "docs/metrics-mutations.md"
+# Of the rooms all, though few are built: cmake/compiled_together.txt names files of each, which have to be there.
+COPIED = ["CMakeLists.txt", "cmake", "core", "sim", "sequence", "mapper", "metrics", "eval", "cli", "bench", "tests"]
 # The test binary of a room, with the sources it is made of: what the room's tests build without a
 # simulator.
 TARGETS = {"metrics": "metrics_tests", "eval": "score_tests"}
@@ -167,12 +170,11 @@ def row_begin(mutation):
             f"{one_line(mutation.after)} | ")
 
 
-def page(mutations, rows, path):
-    """The table in the list's order; of mutations that were not run now, the row of the page as it
-    was, where that mutation has not changed since."""
+def page(mutations, rows, old):
+    """The table in the list's order; of mutations that were not run now, the row of the old page's
+    lines, where that mutation has not changed since."""
     found = {row_begin(m): row_begin(m) + (", ".join(caught[:2]) or "**survived**") + " |"
              for m, caught in rows}
-    old = path.read_text().splitlines() if path.exists() else []
     lines = []
     for mutation in mutations:
         begin = row_begin(mutation)
@@ -200,18 +202,18 @@ def page(mutations, rows, path):
     return "\n".join(head + lines) + "\n"
 
 
-def main():
+def main(options=None, root=ROOT):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="", help="the mutations whose 'name file' matches this regular expression")
     parser.add_argument("--page", type=pathlib.Path, help="write the table here")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--check", action="store_true", help="build nothing: can each mutation still be made?")
-    arguments = parser.parse_args()
-    listed = read_lists()
+    arguments = parser.parse_args(options)
+    listed = read_lists(root)
     mutations = [m for m in listed if re.search(arguments.only, m.name + " " + m.file)]
     if not mutations:
         sys.exit(f"no mutation matches '{arguments.only}'")
-    faults = faults_of(mutations)
+    faults = faults_of(mutations, root)
     if faults:
         sys.exit("\n".join(faults))
     if arguments.check:
@@ -228,6 +230,9 @@ def main():
         if sound:
             sys.exit(f"fails before anything is broken: {', '.join(sound)}")
 
+    # Not of the page that is written: `pages.py make` writes into out/, where there may be none, or
+    # one of an earlier time.
+    old = (root / PAGE).read_text().splitlines() if (root / PAGE).exists() else []
     rows = []
     uncompiled = []
     for mutation in mutations:
@@ -243,7 +248,7 @@ def main():
         rows.append((mutation, caught))
         print(f"{mutation.name}: {', '.join(caught[:2]) or 'SURVIVED'}", flush=True)
         if arguments.page:
-            arguments.page.write_text(page(listed, rows, arguments.page))
+            arguments.page.write_text(page(listed, rows, old))
     survivors = [mutation.name for mutation, caught in rows if not caught]
     print(f"{len(rows)} mutations, {len(rows) - len(survivors)} caught; {len(uncompiled)} do not compile")
     sys.exit(1 if survivors or uncompiled else 0)

@@ -98,6 +98,14 @@ class Report : public testing::Test {
   TempFolder folder_;
 };
 
+// A cache of the compiler's may know the page by its path alone.
+TEST(ReportTemplate, IsThePageThatWasBundledLast) {
+  const auto bundled =
+      ReadFile(std::filesystem::path(TSDFPP_COMMAND).parent_path() / "viewer" / "report.html");
+  ASSERT_TRUE(bundled.has_value()) << bundled.error().message;
+  EXPECT_TRUE(ReportTemplate() == *bundled);
+}
+
 TEST_F(Report, MakesAPageWithItsFiguresAndNoPlaceLeft) {
   TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
   const auto page = MakeReportPage({Run(), Copy("second")}, "tsdfpp report run");

@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "sequence/export.h"
 #include "sequence/open_sequence.h"
 #include "tests/core/temp_folder.h"
@@ -358,6 +359,20 @@ TEST(ForeignFormats, ThePageHasThemAll) {
     choice += (choice.empty() ? "" : "|") + name;
   }
   EXPECT_NE(page.find("`--dataset " + choice + "`"), std::string::npos) << "at its top";
+}
+
+TEST(ForeignFormats, TheSourcesNameEveryReader) {
+  const fs::path root = TSDFPP_SOURCE_DIR;
+  const std::string page = ReadFile(root / "docs" / "sources.md").value();
+  int readers = 0;
+  for (const fs::path& file : EntriesOf(root / "sequence")) {
+    const std::string name = file.filename().string();
+    if (!name.ends_with("_reader.cc")) continue;
+    EXPECT_NE(page.find("`sequence/" + name + "`"), std::string::npos)
+        << "docs/sources.md does not say where the layout of sequence/" << name << " is from";
+    ++readers;
+  }
+  EXPECT_GT(readers, 0);
 }
 
 }  // namespace
