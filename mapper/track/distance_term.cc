@@ -202,6 +202,7 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
           if (!at.has_slope) continue;
           kept.per_slope = 1 / at.slope;
           kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
+          kept.distance_m = at.distance_m();
         }
       },
       tbb::simple_partitioner());
@@ -211,30 +212,30 @@ void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end
                             NormalEquations& sums) const {
   const Eigen::Vector3d camera_L = T_LC.translation();
   const double farthest_m = kFarthest_hubers * huber_m_;
-  const double cost_of_unknown = huber_m_ * (farthest_m - huber_m_ / 2);
   for (std::size_t k = begin; k < end; ++k) {
     const std::size_t i = k * stride_;
     const Eigen::Vector3d p_C = points_[i].p_C.cast<double>();
     const Eigen::Vector3d y = T_LC * p_C;
     const SurfaceSample at = SampleAt(T_LC, i);
-    double weight = 1;
-    double per_slope = 0;
+    Kept kept;
     if (!kept_.empty()) {
-      weight = kept_[i].weight;
-      per_slope = kept_[i].per_slope;
+      kept = kept_[i];
     } else if (at.has_slope) {
-      weight = WeightOf(at, p_C, y, camera_L);
-      per_slope = 1 / at.slope;
+      kept.per_slope = 1 / at.slope;
+      kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
     }
-    const double r = per_slope * at.value_m;
-    if (!at.is_observed || !(per_slope > 0) || std::abs(r) >= farthest_m) {
-      sums.cost += (per_slope > 0 ? weight : 1) * cost_of_unknown;
+    if (!(kept.per_slope > 0)) {
+      sums.cost += huber_m_ * huber_m_ / 2;
       continue;
     }
-    const bool is_far = std::abs(r) > huber_m_;
-    const double slack = is_far ? huber_m_ / std::abs(r) : 1;
-    sums.cost += weight * (is_far ? huber_m_ * (std::abs(r) - huber_m_ / 2) : r * r / 2);
-    const Eigen::Vector3d g = per_slope * at.gradient_L.cast<double>();
+    const double weight = kept.weight;
+    const double r = at.is_observed ? double{kept.per_slope * at.value_m} : kept.distance_m;
+    const double size = std::min(std::abs(r), farthest_m);
+    const bool is_far = size > huber_m_;
+    sums.cost += weight * (is_far ? huber_m_ * (size - huber_m_ / 2) : r * r / 2);
+    if (!at.is_observed || size >= farthest_m) continue;
+    const double slack = is_far ? huber_m_ / size : 1;
+    const Eigen::Vector3d g = kept.per_slope * at.gradient_L.cast<double>();
     Vector6 J;
     J.head<3>() = g;
     J.tail<3>() = (y - frame_.centre).cross(g) / frame_.radius_m;

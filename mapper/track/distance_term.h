@@ -75,8 +75,9 @@ class DistanceTerm {
   void KeepAt(const Pose& T_LC);
 
   // The terms' sums over the points y = T p, with weights of at most 1 and so in units of a point:
-  // of the least deviation that the config's noise knows. A point without a distance counts as if
-  // it were as far from the surface as an outlier may be. In parallel, in fixed chunks.
+  // of the least deviation that the config's noise knows. A point without a distance costs as much
+  // as one at the Huber width: a side that the model lacks is no reason to be elsewhere. One that
+  // had a distance where it was kept costs as much as it did there. In parallel, in fixed chunks.
   NormalEquations Sums(const Pose& T_LC) const;
 
   DistanceCounts Count(const Pose& T_LC) const;
@@ -92,6 +93,7 @@ class DistanceTerm {
     float sag_m = 0;
     float per_slope = 0;  // 1 / the gradient's length; 0 where there is no distance
     float weight = 0;
+    float distance_m = 0;
   };
   SurfaceSample SampleAt(const Pose& T_LC, std::size_t i) const {
     return model_->At(T_LC * points_[i].p_C.cast<double>(), kept_.empty() ? 0 : kept_[i].sag_m);

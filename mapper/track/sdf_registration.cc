@@ -55,22 +55,32 @@ DistanceTerm TermOf(const SdfRegistration& task, const MotionFrame& frame,
   return {*task.model, task.points, frame, task.voxel_m, task.camera, config, stride};
 }
 
+constexpr int kCoarsePasses = 2;
+
 // From every seed, with a share of the points: the pose of least cost, in the result.
 void RegisterCoarsely(const SdfRegistration& task, const SdfTrackConfig& config,
                       LeastSquaresOptions options, SdfRegistrationResult& result) {
   options.settled_m *= 10;
   const std::size_t stride =
       std::max<std::size_t>(1, task.points.size() / static_cast<std::size_t>(config.coarse_points));
-  const DistanceTerm coarse = TermOf(task, result.frame, config, stride);
+  DistanceTerm coarse = TermOf(task, result.frame, config, stride);
   const auto sums = [&](const Pose& T) { return coarse.Sums(T); };
   double least = std::numeric_limits<double>::infinity();
   const auto try_seed = [&](const Pose& seed) {
-    const MotionPrior prior = PriorFor(coarse.Sums(seed).H, task.T_LC_expected, config.weak_share);
-    const LeastSquaresResult found = MinimiseOverPose(sums, seed, result.frame, prior, options);
-    result.iterations += found.iterations;
-    if (!(found.at.cost < least)) return;
-    least = found.at.cost;
-    result.T_LC = found.T;
+    Pose T_LC = seed;
+    for (int pass = 0; pass < kCoarsePasses; ++pass) {
+      coarse.KeepAt(T_LC);
+      const MotionPrior prior =
+          PriorFor(coarse.Sums(T_LC).H, task.T_LC_expected, config.weak_share);
+      const LeastSquaresResult found = MinimiseOverPose(sums, T_LC, result.frame, prior, options);
+      result.iterations += found.iterations;
+      T_LC = found.T;
+    }
+    coarse.KeepAt(T_LC);
+    const double cost = coarse.Sums(T_LC).cost;
+    if (!(cost < least)) return;
+    least = cost;
+    result.T_LC = T_LC;
   };
   if (!task.is_near) try_seed(task.T_LC_expected);
   for (const Pose& seed : task.T_LC_seeds) try_seed(seed);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "core/random.h"
@@ -154,6 +155,52 @@ TEST(SdfRegistration, IsAsGoodAsTheNoiseBetweenRidges) {
   }
   std::ranges::sort(squares);
   EXPECT_LT(squares[kRuns / 2], kMostSquares);
+}
+
+// As a map knows a box that it has seen from elsewhere: voxels in front of what was seen, and up to
+// three behind it.
+TsdfGrid GridSeenFrom(const DistanceFunction& distance, const Eigen::Vector3d& eye) {
+  constexpr double kBehind_m = 3 * kVoxel_m;
+  TsdfGrid grid = GridOf(distance);
+  for (const auto& entry : grid.entries()) {
+    for (int place = 0; place < kBlockVoxels; ++place) {
+      const Index3 voxel = VoxelAt(entry.index, place);
+      const Eigen::Vector3d p = kVoxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z);
+      const Eigen::Vector3d ray = (p - eye).normalized();
+      double along = 0;
+      double step = distance(eye);
+      while (step > 1e-4 && along < 2 * eye.norm()) {
+        along += step;
+        step = distance(eye + along * ray);
+      }
+      const bool is_seen = step <= 1e-4 && (p - eye).norm() < along + kBehind_m;
+      if (!is_seen) entry.block->weight[static_cast<std::size_t>(place)] = 0;
+    }
+  }
+  return grid;
+}
+
+// A side that the model lacks has no distances where it is, and its points come and go at the rim
+// of what is known. That is no reason to end here from one place and there from another.
+TEST(SdfRegistration, EndsAtOnePlaceWhereAModelLacksASide) {
+  const DistanceFunction box = reference::BoxDistance({0.08, 0.05, 0.06});
+  const auto points = InCamera(reference::VisiblePoints(box, kEye, 120));
+  for (const double x : {0.0, -0.3, -0.6}) {
+    SCOPED_TRACE(x);
+    const TsdfGrid grid = GridSeenFrom(box, {x, -0.9, 0.5});
+    const SurfaceReader model(grid, kVoxel_m);
+    std::optional<Pose> first;
+    for (const double turn_deg : {-16, -12, -8, 8, 12, 16}) {
+      SdfRegistration task = TaskFrom(model, points, MakePose(2 * kDegree, {0, 0, 1}, {0, 0, 0}));
+      task.T_LC_seeds = {MakePose(turn_deg * kDegree, {0, 0, 1}, {0.01, 0, 0}) * TrueLC()};
+      const auto found = RegisterToDistances(task, {});
+      ASSERT_TRUE(found.converged);
+      EXPECT_LT(Turn(found.T_LC * TrueLC().inverse()), kEdges_rad);
+      if (!first) first = found.T_LC;
+      const Pose off = found.T_LC * first->inverse();
+      EXPECT_LT(off.translation().norm(), kEdges_voxels * kVoxel_m) << turn_deg;
+    }
+  }
 }
 
 // The trilinear surface of a ball lies inside it where distances bend upwards; the sag says so.
