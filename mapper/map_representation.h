@@ -72,8 +72,8 @@ class MapRepresentation {
 
   virtual MapMemory Memory() const = 0;
 
-  // What only some maps can do, each in a header of its own; nullptr from the others. Whoever asks
-  // says in a sentence what he lacks.
+  // What only some maps can do, each in a header of its own; nullptr from the others. A caller that
+  // needs one tells its user in a sentence that the map lacks it.
   virtual const VoxelInspection* inspection() const { return nullptr; }
   virtual MapEditing* editing() { return nullptr; }
   virtual const MapPersistence* persistence() const { return nullptr; }

@@ -33,10 +33,10 @@ class SceneMesher {
 
   // The visible scene for somebody who follows it: the parts of it that are not as they were when
   // this was last asked, all that have triangles the first time, at a cost that goes with their
-  // number. By id, then block. Who replaces what he has of an id and block by what he is told,
-  // dropping it where it has no triangles, has the triangles of SceneMesh(), in its order where
-  // parts are by id and block. Of a map without blocks an object's triangles are one part, at
-  // block 0.
+  // number. By id, then block. A follower replaces what it has of an id and block by the new part,
+  // and drops it where the part has no triangles; it then has the triangles of SceneMesh(), in the
+  // order of ids and blocks. Of a map without blocks an object's triangles are one part, at block
+  // 0.
   SceneChanges TakeSceneChanges(const MapRepresentation& map);
 
   // Of what is kept.

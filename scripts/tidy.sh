@@ -3,7 +3,8 @@
 # one by one: the commands are those of a plain build, in build/plain, which is only configured; without OpenMP, whose
 # header clang has not.
 # Usage: bash scripts/tidy.sh [FILES]
-#        bash scripts/tidy.sh --since REVISION [--seconds S]     those that changed since, uncommitted ones too
+#        bash scripts/tidy.sh --since REVISION [--seconds S]     those that changed since, uncommitted ones too,
+#                                                                 and for each header that did a source that includes it
 # After S seconds no other file is begun; those that were left out are named. A file takes some twenty seconds of a core.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -29,6 +30,14 @@ if [ -n "$since" ]; then
     exit 2
   fi
   mapfile -t files < <(git diff --name-only --diff-filter=d "$since" -- '*.cc')
+  # A header is looked at with a source that includes it: its own, one of its folder, or any.
+  while read -r header; do
+    include="#include \"$header\""
+    if [ ${#files[@]} -gt 0 ] && grep -qF "$include" -- "${files[@]}"; then continue; fi
+    reader=$(for where in "${header%.h}.cc" "${header%/*}/*.cc" '*.cc'; do git grep -lF "$include" -- "$where" || true; done |
+      sed -n 1p)
+    if [ -n "$reader" ]; then files+=("$reader"); fi
+  done < <(git diff --name-only --diff-filter=d "$since" -- '*.h')
 elif [ $# -eq 0 ]; then
   mapfile -t files < <(git ls-files '*.cc')
 else
