@@ -46,11 +46,12 @@ std::map<const CLI::App*, tsdfpp::Run> AddSubcommands(CLI::App& app, CommonOptio
     runs[command] = function(*command, common);
     return command;
   };
-  const auto add_that_maps = [&](const char* name, const char* help, const auto& function) {
+  const auto add_with_kernels = [&](const char* name, const char* help, const auto& function) {
     add(name, help, function)
-        ->add_option("--kernels", common.kernels,
-                     "The mapper's inner loops: simd (vectors) or plain (voxel by voxel, slower); "
-                     "the results are the same")
+        ->add_option(
+            "--kernels", common.kernels,
+            "The mapper's inner loops: simd (vectors) or plain (voxel by voxel, pixel by pixel, "
+            "slower); the results are the same")
         ->check(tsdfpp::OneOf({"simd", "plain"}))
         ->capture_default_str();
   };
@@ -58,22 +59,23 @@ std::map<const CLI::App*, tsdfpp::Run> AddSubcommands(CLI::App& app, CommonOptio
   add("generate", "Render a scene to a sequence on disk", tsdfpp::AddGenerate);
   add("verify", "Check a sequence of ours against itself and against rays", tsdfpp::AddVerify);
   add("export", "Write a sequence or a scene in another dataset's format", tsdfpp::AddExport);
-  add_that_maps("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
-  add("segment", "Write the segments of each frame as images of ids", tsdfpp::AddSegment);
+  add_with_kernels("map", "Map a sequence or a scene and write the meshes", tsdfpp::AddMap);
+  add_with_kernels("segment", "Write the segments of each frame as images of ids",
+                   tsdfpp::AddSegment);
   add("methods", "List the methods that map knows", tsdfpp::AddMethods);
-  add_that_maps("compare", "Run the paper's experiment on a scene or a sequence",
-                tsdfpp::AddCompare);
+  add_with_kernels("compare", "Run the paper's experiment on a scene or a sequence",
+                   tsdfpp::AddCompare);
   add("evaluate", "Score the meshes that any mapper wrote, against a sequence's truth",
       tsdfpp::AddEvaluate);
   add("report", "Make a page of what compare wrote, in one HTML file", tsdfpp::AddReport);
   add("metric", "Measure files against true ones: trajectories, surfaces, masks, poses",
       tsdfpp::AddMetric);
-  add_that_maps("sweep", "Run an experiment: methods, scenes, seeds and settings, paired",
-                tsdfpp::AddSweep);
-  add_that_maps("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
-  add_that_maps("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
-                tsdfpp::AddBenchSet);
-  add_that_maps("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
+  add_with_kernels("sweep", "Run an experiment: methods, scenes, seeds and settings, paired",
+                   tsdfpp::AddSweep);
+  add_with_kernels("replay", "Make one frame of an experiment's cell again", tsdfpp::AddReplay);
+  add_with_kernels("bench-set", "Describe or run a frozen benchmark, or print its leaderboard",
+                   tsdfpp::AddBenchSet);
+  add_with_kernels("gate", "Run accuracy gates and say which hold", tsdfpp::AddGate);
   return runs;
 }
 

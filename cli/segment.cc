@@ -15,6 +15,7 @@
 #include "eval/picture/segment_picture.h"
 #include "eval/run/run_folder.h"
 #include "eval/score/segment_scores.h"
+#include "mapper/kernels.h"
 #include "mapper/segment/depth_segments.h"
 #include "mapper/segment/given_masks.h"
 #include "mapper/segment/no_masks.h"
@@ -141,6 +142,7 @@ Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::A
   nlohmann::json json{{"run", run_folder.id()},
                       {"sequence", info.name},
                       {"segmentation", options.segmentation},
+                      {"kernels", KernelsName(UsedKernels())},
                       {"frames", writer.frames()},
                       {"every", options.every},
                       {"ms_a_frame", 1000 * writer.SecondsAFrame()}};

@@ -9,6 +9,7 @@ foreach(room core mapper)
 endforeach()
 # Headers include each other as "core/types.h", whatever folder holds the rooms.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/core DESTINATION include/tsdfpp FILES_MATCHING PATTERN "*.h")
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/mapper/public_headers.txt)
 file(STRINGS ${PROJECT_SOURCE_DIR}/mapper/public_headers.txt _tsdfpp_public REGEX "^[^#]")
 foreach(header ${_tsdfpp_public})
   get_filename_component(_tsdfpp_folder ${header} DIRECTORY)

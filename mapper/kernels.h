@@ -1,6 +1,6 @@
 // Which versions of the mapper's inner loops run. Those named *_simd.cc work on vectors; beside
 // each lies a *_plain.cc, which does the same voxel by voxel, pixel by pixel or ray by ray, in the
-// words of docs/map.md: it is the specification. Both give the same bytes.
+// words of docs/map.md or docs/segmentation.md: it is the specification. Both give the same bytes.
 #pragma once
 
 #include <atomic>

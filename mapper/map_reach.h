@@ -1,4 +1,4 @@
-// The checks that keep out of a map what lies beyond its range (mapper/volume/lattice_range.h).
+// The checks that keep out of a map what lies beyond its range (docs/map.md, "Range").
 #pragma once
 
 #include <map>

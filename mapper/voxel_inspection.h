@@ -44,7 +44,7 @@ class VoxelInspection {
   virtual std::vector<Eigen::Vector3i> ListedVoxels() const = 0;
 
   // The first thing found in what is stored that docs/map.md rules out, in a sentence; nothing
-  // where all is well. Slow (mapper/methods/map_invariants.h).
+  // where all is well. Slow: it looks at every voxel.
   virtual std::optional<std::string> FindFault() const = 0;
 };
 

@@ -20,7 +20,8 @@ Expected<DepthNoise> DepthNoiseFromName(std::string_view name);
 // The noise of a depth image, by depth z and the angle of incidence th, between ray and normal
 // (docs/sensors.md). nguyen2012: along the ray 0.0012 + 0.0019 (z - 0.4)^2 metres, to which
 // (0.0001 / sqrt z) th^2 / (pi/2 - th)^2 is added for th above 60 deg; across it 0.8 + 0.035 th /
-// (pi/2 - th) pixels; th is at most 85 deg in both. What depends on th is in surface_kernels.cc.
+// (pi/2 - th) pixels; th is at most 85 deg in both. What depends on th is in
+// surface_kernels_plain.cc.
 struct NoiseModel {
   float scale = 0;  // 0: exact
 

@@ -1,5 +1,5 @@
-// The inner loops of the surface's maps over one row of pixels, several at once, with the same bits
-// on every instruction set. Formulae: docs/segmentation.md, "Maps". No arrays overlap.
+// The inner loops of the surface's maps over one row of pixels. Formulae:
+// docs/segmentation.md, "Maps". No arrays overlap.
 #pragma once
 
 #include <cstddef>
@@ -80,5 +80,13 @@ struct ChordRow {
 };
 void TurnsOfRow(const ChordRow& row, std::size_t pixels, const ChordScale& scale,
                 std::uint8_t* turns);
+
+// The specification of each, in plain C++: the same bytes (mapper/kernels.h).
+namespace plain {
+decltype(tsdfpp::AddPairs) AddPairs;
+decltype(tsdfpp::NormalsOfRow) NormalsOfRow;
+decltype(tsdfpp::LinksOfRow) LinksOfRow;
+decltype(tsdfpp::TurnsOfRow) TurnsOfRow;
+}  // namespace plain
 
 }  // namespace tsdfpp

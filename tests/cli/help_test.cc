@@ -146,7 +146,8 @@ TEST(CommandMap, GoesOnFromAFileAsIfItHadNotStopped) {
   EXPECT_FALSE(std::filesystem::exists(folder / "none"));
 }
 
-// The plain kernels leave the same files as those of vectors; only what maps takes the option.
+// The plain kernels leave the same files as those of vectors; only what maps or segments takes the
+// option.
 TEST(CommandMap, KernelsChangeNoByte) {
   const TempFolder folder;
   for (const std::string kernels : {"simd", "plain"}) {
@@ -163,7 +164,8 @@ TEST(CommandMap, KernelsChangeNoByte) {
   EXPECT_TRUE(FilesOf(folder / "plain") == files);
   EXPECT_TRUE(ReadFile(folder / "plain.map").value() == ReadFile(folder / "simd.map").value());
 
-  for (const char* command : {"map", "compare", "sweep", "replay", "bench-set", "gate"}) {
+  for (const char* command :
+       {"map", "segment", "compare", "sweep", "replay", "bench-set", "gate"}) {
     const CommandOutput help = RunTsdfpp({command, "--help"}, folder.path());
     EXPECT_NE(help.out.find("--kernels"), std::string::npos) << command;
   }

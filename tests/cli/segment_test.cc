@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
@@ -73,6 +74,20 @@ TEST_F(SegmentCommand, DepthLeavesSegmentsPicturesAndNoOtherRunsFiles) {
                                           "segments.json"}));
   EXPECT_EQ(cv::imread((folder_ / "out/colour/000003.png").string(), cv::IMREAD_UNCHANGED).type(),
             CV_8UC3);
+}
+
+TEST_F(SegmentCommand, KernelsChangeNoByte) {
+  const fs::path recording = Recording();
+  std::map<std::string, std::vector<std::string>> images;
+  for (const std::string kernels : {"simd", "plain"}) {
+    const CommandOutput run = Run({"--kernels", kernels, "--json"}, recording);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(nlohmann::json::parse(run.out).at("kernels"), kernels);
+    for (int i = 0; i < 4; ++i) {
+      images[kernels].push_back(ReadFile(folder_ / fmt::format("out/{:06d}.png", i)).value());
+    }
+  }
+  EXPECT_TRUE(images["plain"] == images["simd"]);
 }
 
 TEST_F(SegmentCommand, RefusesWithOneSentence) {

@@ -1,12 +1,10 @@
-// Reading one lattice at the voxels of another, cubes, and lists: the kernels of vectors and the
-// plain ones give the same bits.
+// Reading one lattice at the voxels of another: the kernels of vectors and the plain ones give the
+// same bits.
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <memory>
 
-#include "mapper/index/index_kernels.h"
-#include "mapper/volume/cube_masks.h"
 #include "mapper/volume/pull_back.h"
 #include "tests/mapper/kernel_twins.h"
 
@@ -206,92 +204,6 @@ TEST(PullBackTwins, TheSameBlockIsPut) {
     for (std::size_t i = 0; i < kBlockVoxels; ++i) coloured += found.ColourCount(i) > 0 ? 1 : 0;
   });
   EXPECT_GT(coloured, 5000);
-}
-
-TEST(CubeMasksTwins, TheSameCubes) {
-  OnEveryInstructionSet([&] {
-    Dice dice(25);
-    for (int round = 0; round < 30; ++round) {
-      std::array<BlockMask, 8> observed;
-      std::array<BlockMask, 8> negative;
-      UpperMasks upper_observed{};
-      UpperMasks upper_negative{};
-      const double density = dice.Uniform(0, 1);
-      for (std::size_t i = 0; i < 8; ++i) {
-        observed[i] = RandomMask(dice, 0.97);
-        negative[i] = RandomMask(dice, density);
-        for (std::size_t z = 0; z < kBlockSide; ++z) negative[i][z] &= observed[i][z];
-        upper_observed[i] = &observed[i];
-        upper_negative[i] = &negative[i];
-      }
-      const CubeMasks found = FindCubeMasks(upper_observed, upper_negative);
-      const CubeMasks expected = plain::FindCubeMasks(upper_observed, upper_negative);
-      ASSERT_EQ(found.complete, expected.complete);
-      ASSERT_EQ(found.crossed, expected.crossed);
-      const BlockMask few = RandomMask(dice, 0.02);
-      upper_negative[static_cast<std::size_t>(dice.Whole(8))] = &few;
-      ASSERT_EQ(CornersOfCubes(upper_negative), plain::CornersOfCubes(upper_negative));
-      // The signs of a block that is mostly inside, or outside.
-      for (std::size_t k = 0; k < 8; k += 2) {
-        BlockMask now = negative[k + 1];
-        for (std::size_t z = 0; z < kBlockSide; ++z) now[z] &= observed[k][z];
-        ASSERT_EQ(ChangedSigns(observed[k], negative[k], observed[k], now),
-                  plain::ChangedSigns(observed[k], negative[k], observed[k], now));
-        ASSERT_EQ(ChangedSigns(observed[k], negative[k], observed[k + 1], negative[k + 1]),
-                  plain::ChangedSigns(observed[k], negative[k], observed[k + 1], negative[k + 1]));
-      }
-    }
-  });
-}
-
-TEST(IndexTwins, TheSameVotesAndLists) {
-  OnEveryInstructionSet([&] {
-    Dice dice(26);
-    for (int round = 0; round < 30; ++round) {
-      const InstanceId id = round % 3 == 0 ? InstanceId{0xFFFE} : InstanceId{2};
-      const int cap = 1 + dice.Whole(255);
-      const BlockMask marked = RandomMask(dice, dice.Uniform(0, 1.2));
-      std::array<InstanceId, kBlockVoxels> active{};
-      std::array<std::uint8_t, kBlockVoxels> confidence{};
-      for (std::size_t i = 0; i < kBlockVoxels; ++i) {
-        active[i] = dice.Whole(3) > 0 ? id : dice.Whole(2) == 0 ? kNoInstance : InstanceId{1};
-        confidence[i] = static_cast<std::uint8_t>(dice.Whole(cap + 1));
-      }
-      auto plain_confidence = confidence;
-      const VotesCounted found = VoteForActive(marked, id, cap, active.data(), confidence.data());
-      const VotesCounted expected =
-          plain::VoteForActive(marked, id, cap, active.data(), plain_confidence.data());
-      ASSERT_EQ(found.others, expected.others);
-      ASSERT_EQ(found.saturated, expected.saturated);
-      ASSERT_EQ(confidence, plain_confidence);
-
-      auto plain_active = active;
-      ListAlone(marked, id, active.data());
-      plain::ListAlone(marked, id, plain_active.data());
-      ASSERT_EQ(active, plain_active);
-
-      constexpr int kMostLayers = 4;
-      const int layers = 1 + dice.Whole(kMostLayers);
-      std::array<float, kMostLayers * kBlockVoxels> near;
-      std::array<InstanceId, kMostLayers * kBlockVoxels> ids;
-      near.fill(std::numeric_limits<float>::infinity());
-      ids.fill(kNoInstance);
-      auto plain_near = near;
-      auto plain_ids = ids;
-      for (int o = 0; o < 6; ++o) {
-        std::array<float, kBlockVoxels> distance{};
-        // Few, so that some are equal.
-        for (float& d : distance) d = 0.01F * static_cast<float>(dice.Whole(4) - 2);
-        const BlockMask covered = RandomMask(dice, 0.7);
-        const auto object = static_cast<InstanceId>(o);
-        InsertByDistance(covered, distance.data(), object, {layers, near.data(), ids.data()});
-        plain::InsertByDistance(covered, distance.data(), object,
-                                {layers, plain_near.data(), plain_ids.data()});
-      }
-      ASSERT_EQ(near, plain_near);
-      ASSERT_EQ(ids, plain_ids);
-    }
-  });
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
-#include "mapper/segment/surface_kernels.h"
-
 #include <numbers>
 
-// One pass of this file an instruction set (mapper/volume/fusion_kernels_simd.cc).
+#include "mapper/kernels.h"
+#include "mapper/segment/surface_kernels.h"
+
+// One pass of this file an instruction set, as mapper/volume/fusion_kernels_simd.cc.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapper/segment/surface_kernels.cc"
+#define HWY_TARGET_INCLUDE "mapper/segment/surface_kernels_simd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -16,6 +17,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::CappedTag<float, 16>;
 using OneFloat = hn::CappedTag<float, 1>;
+
+// What is known is asked by Eq: some instruction sets' Ne is false of what is not a number.
 
 // Calls lanes(d, u) for whole vectors, then for single pixels.
 template <class Lanes>
@@ -73,8 +76,8 @@ void Pairs(const float* before, const float* q, const float* behind, std::size_t
         hn::Mul(hn::Set(d, scale.sigmas), hn::Add(HeadOnInverse(d, middle, scale.noise), shift));
     const auto both = hn::Add(first, last);
     const auto off = hn::Abs(hn::Sub(both, hn::Add(middle, middle)));
-    const auto known = hn::And(hn::Ne(first, zero), hn::Ne(last, zero));
-    const auto taken = hn::And(known, hn::Le(off, tolerance));
+    const auto unknown = hn::Or(hn::Eq(first, zero), hn::Eq(last, zero));
+    const auto taken = hn::AndNot(unknown, hn::Le(off, tolerance));
     hn::StoreU(hn::Add(hn::LoadU(d, sum + u), hn::IfThenElseZero(taken, both)), d, sum + u);
     hn::StoreU(hn::Add(hn::LoadU(d, count + u), hn::IfThenElseZero(taken, hn::Set(d, 2.0F))), d,
                count + u);
@@ -85,16 +88,16 @@ void Pairs(const float* before, const float* q, const float* behind, std::size_t
 template <class D, class V>
 V SlopeAt(D d, V before, V q, V after, V per_step, V tolerance) {
   const auto zero = hn::Zero(d);
-  const auto has0 = hn::Ne(before, zero);
-  const auto has1 = hn::Ne(after, zero);
+  const auto lacks0 = hn::Eq(before, zero);
+  const auto lacks1 = hn::Eq(after, zero);
   const auto back = hn::Mul(hn::Sub(q, before), per_step);
   const auto ahead = hn::Mul(hn::Sub(after, q), per_step);
   const auto nearer = hn::IfThenElse(hn::Lt(hn::Abs(back), hn::Abs(ahead)), back, ahead);
   const auto mean = hn::Mul(hn::Add(back, ahead), hn::Set(d, 0.5F));
   const auto agree = hn::Le(hn::Abs(hn::Sub(back, ahead)), tolerance);
   const auto both = hn::IfThenElse(agree, mean, nearer);
-  const auto one = hn::IfThenElse(has0, back, hn::IfThenElseZero(has1, ahead));
-  return hn::IfThenElse(hn::And(has0, has1), both, one);
+  const auto one = hn::IfThenElse(lacks0, hn::IfThenZeroElse(lacks1, ahead), back);
+  return hn::IfThenElse(hn::Or(lacks0, lacks1), one, both);
 }
 
 void Normals(const NormalRow& row, std::size_t pixels, const NormalScale& scale, float* normal,
@@ -104,7 +107,7 @@ void Normals(const NormalRow& row, std::size_t pixels, const NormalScale& scale,
     const auto one = hn::Set(d, 1.0F);
     const auto noise = hn::Set(d, scale.noise);
     const auto q = hn::LoadU(d, row.q + u);
-    const auto known = hn::Ne(q, zero);
+    const auto unknown = hn::Eq(q, zero);
     const auto per_step = hn::Set(d, scale.per_step);
     const auto head_on = HeadOnInverse(d, q, scale.noise);
     const auto width = hn::Mul(hn::Set(d, scale.pixel_width), q);
@@ -121,13 +124,15 @@ void Normals(const NormalRow& row, std::size_t pixels, const NormalScale& scale,
     const auto c = hn::Sub(hn::Sub(q, hn::Mul(a, ray_x)), hn::Mul(b, ray_y));
     // q is the plane's inverse distance times ray * normal, and positive.
     const auto square = hn::Add(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Mul(c, c));
-    const auto length = hn::Sqrt(hn::IfThenElse(known, square, one));
-    const auto per_length = hn::IfThenElseZero(known, hn::Div(hn::Set(d, -1.0F), length));
-    hn::StoreInterleaved3(hn::Mul(a, per_length), hn::Mul(b, per_length), hn::Mul(c, per_length), d,
-                          normal + 3 * u);
+    const auto length = hn::Sqrt(hn::IfThenElse(unknown, one, square));
+    const auto per_length = hn::Div(hn::Set(d, -1.0F), length);
+    const auto part = [&](auto along) HWY_ATTR {
+      return hn::IfThenZeroElse(unknown, hn::Mul(along, per_length));
+    };
+    hn::StoreInterleaved3(part(a), part(b), part(c), d, normal + 3 * u);
     const auto ray = hn::Sqrt(hn::Add(hn::Add(hn::Mul(ray_x, ray_x), hn::Mul(ray_y, ray_y)), one));
     const auto cosine = hn::Div(hn::Neg(hn::Mul(q, per_length)), ray);
-    const auto z = hn::Div(one, hn::IfThenElse(known, q, one));
+    const auto z = hn::Div(one, hn::IfThenElse(unknown, one, q));
     const auto ratio = AngleRatio(d, cosine);
     // Along the ray and across it (depth_noise.h).
     const auto beyond = hn::Sub(z, hn::Set(d, 0.4F));
@@ -141,7 +146,7 @@ void Normals(const NormalRow& row, std::size_t pixels, const NormalScale& scale,
     const auto steep = hn::Sqrt(hn::Add(hn::Mul(slope_x, slope_x), hn::Mul(slope_y, slope_y)));
     const auto across = hn::Mul(pixels_across, hn::Mul(steep, hn::Mul(z, z)));
     const auto all = hn::Sqrt(hn::Add(hn::Mul(along, along), hn::Mul(across, across)));
-    hn::StoreU(hn::IfThenElseZero(known, all), d, sigma + u);
+    hn::StoreU(hn::IfThenZeroElse(unknown, all), d, sigma + u);
   });
 }
 
@@ -161,15 +166,16 @@ void Links(const JumpRow& row, std::size_t pixels, const JumpScale& scale, std::
     const auto tolerance = hn::Add(hn::Mul(hn::Mul(hn::Mul(hn::Set(d, scale.noise), sigma), q), q),
                                    hn::Mul(hn::Set(d, scale.width), q));
     const auto step = hn::Sub(q1, q0);
-    const auto has0 = hn::Ne(before, zero);
-    const auto has1 = hn::Ne(behind, zero);
+    const auto lacks0 = hn::Eq(before, zero);
+    const auto lacks1 = hn::Eq(behind, zero);
     const auto off0 = hn::Abs(hn::Sub(step, hn::Mul(hn::Sub(q0, before), per_step)));
     const auto off1 = hn::Abs(hn::Sub(step, hn::Mul(hn::Sub(behind, q1), per_step)));
     const auto alone = hn::Sub(hn::Abs(step), hn::Mul(hn::Set(d, scale.steepest), q));
-    const auto best0 = hn::IfThenElse(has0, off0, hn::IfThenElse(has1, off1, alone));
-    const auto best1 = hn::IfThenElse(has1, off1, hn::IfThenElse(has0, off0, alone));
-    const auto known = hn::And(hn::Ne(q0, zero), hn::Ne(q1, zero));
-    const auto is_linked = hn::And(known, hn::Le(hn::Min(best0, best1), tolerance));
+    const auto best0 = hn::IfThenElse(lacks0, hn::IfThenElse(lacks1, alone, off1), off0);
+    const auto best1 = hn::IfThenElse(lacks1, best0, off1);
+    const auto goes_on = hn::Or(hn::Le(best0, tolerance), hn::Le(best1, tolerance));
+    const auto unknown = hn::Or(hn::Eq(q0, zero), hn::Eq(q1, zero));
+    const auto is_linked = hn::AndNot(unknown, goes_on);
     StoreBytes(d, is_linked, 1, linked + u);
   });
 }
@@ -217,22 +223,26 @@ HWY_EXPORT(Turns);
 
 void AddPairs(const float* before, const float* q, const float* behind, std::size_t pixels,
               const PairScale& scale, float* sum, float* count) {
-  HWY_DYNAMIC_DISPATCH(Pairs)(before, q, behind, pixels, scale, sum, count);
+  const auto run = UsesPlainKernels() ? plain::AddPairs : HWY_DYNAMIC_DISPATCH(Pairs);
+  run(before, q, behind, pixels, scale, sum, count);
 }
 
 void NormalsOfRow(const NormalRow& row, std::size_t pixels, const NormalScale& scale, float* normal,
                   float* sigma) {
-  HWY_DYNAMIC_DISPATCH(Normals)(row, pixels, scale, normal, sigma);
+  const auto run = UsesPlainKernels() ? plain::NormalsOfRow : HWY_DYNAMIC_DISPATCH(Normals);
+  run(row, pixels, scale, normal, sigma);
 }
 
 void LinksOfRow(const JumpRow& row, std::size_t pixels, const JumpScale& scale,
                 std::uint8_t* linked) {
-  HWY_DYNAMIC_DISPATCH(Links)(row, pixels, scale, linked);
+  const auto run = UsesPlainKernels() ? plain::LinksOfRow : HWY_DYNAMIC_DISPATCH(Links);
+  run(row, pixels, scale, linked);
 }
 
 void TurnsOfRow(const ChordRow& row, std::size_t pixels, const ChordScale& scale,
                 std::uint8_t* turns) {
-  HWY_DYNAMIC_DISPATCH(Turns)(row, pixels, scale, turns);
+  const auto run = UsesPlainKernels() ? plain::TurnsOfRow : HWY_DYNAMIC_DISPATCH(Turns);
+  run(row, pixels, scale, turns);
 }
 
 }  // namespace tsdfpp
