@@ -42,6 +42,7 @@ const MethodInfo& InfoOf(Method method) {
 
 std::vector<Method> AllMethods() {
   std::vector<Method> methods;
+  methods.reserve(kMethods.size());
   for (const MethodInfo& info : kMethods) methods.push_back(info.method);
   return methods;
 }

@@ -38,7 +38,7 @@ std::string ColumnText(const EvaluationColumn& column, const Movers& movers,
                        const Evaluation& evaluation) {
   const Measured value = column.value(movers, evaluation);
   if (!value.value) return "-";
-  const std::string text = fmt::format("{:.{}f}", *value.value, column.decimals);
+  std::string text = fmt::format("{:.{}f}", *value.value, column.decimals);
   const Measured error = column.error ? column.error(evaluation) : Measured{};
   if (!error.value) return text;
   // One digit more than the value has, while the error is that small.

@@ -96,7 +96,7 @@ class Report : public testing::Test {
   void SetUp() override { WriteTinyRun(Run()); }
   std::filesystem::path Run() const { return folder_ / "run"; }
   std::filesystem::path Copy(const std::string& name) const {
-    const std::filesystem::path copy = folder_ / name;
+    std::filesystem::path copy = folder_ / name;
     std::filesystem::copy(Run(), copy, std::filesystem::copy_options::recursive);
     return copy;
   }
