@@ -15,6 +15,7 @@ Run AddMethods(CLI::App&, const CommonOptions&) {
                              {"layers_can_be_set", info.layers_can_be_set},
                              {"one_field", info.one_field},
                              {"moves_values", info.moves_values},
+                             {"has_voxels", info.has_voxels},
                              {"on_light", info.on_light},
                              {"on_dark", info.on_dark}});
       result.text += fmt::format("{:<16} {}\n", info.name, info.help);

@@ -7,24 +7,24 @@ namespace tsdfpp {
 namespace {
 
 constexpr auto kMethods = std::to_array<MethodInfo>(
-    {{Method::kTsdf, "tsdf", "one field, in which an object's voxels move with it", "#c04a00",
-      "#ff8a4c", true, true, 1, false},
+    {{Method::kTsdf, "tsdf", "one field, in which an object's voxels move with it", "#000000",
+      "#f0f0f0", true, true, 1, false},
      {Method::kTsdfMin, "tsdf/min", "one field, in which the nearer surface stays", "#8a6100",
-      "#e6b422", true, true, 1, false},
+      "#c9a27e", true, true, 1, false},
      {Method::kTsdfGuarded, "tsdf/guarded",
-      "one field, in which a voxel at a surface takes nothing from behind another's", "#8f1d1d",
-      "#ff6b6b", true, true, 1, false},
-     {Method::kTsdfStatic, "tsdf/static", "one field, in which nothing moves", "#6b4a2f", "#c9a27e",
+      "one field, in which a voxel at a surface takes nothing from behind another's", "#882255",
+      "#e58bb4", true, true, 1, false},
+     {Method::kTsdfStatic, "tsdf/static", "one field, in which nothing moves", "#777777", "#a8a8a8",
       true, false, 1, false},
-     {Method::kTsdfpp, "tsdf++", "layers, in a careful reading of the paper", "#0064a8", "#62b5ee",
+     {Method::kTsdfpp, "tsdf++", "layers, in a careful reading of the paper", "#0072b2", "#56b4e9",
       false, true, 2, true},
      {Method::kTsdfppLiteral, "tsdf++/literal", "layers, with the paper's sentences at their word",
-      "#9a3f78", "#e29ac6", false, true, 2, false},
+      "#e69f00", "#f0c14d", false, true, 2, false},
      {Method::kTsdfppAnchored, "tsdf++/anchored",
-      "layers over volumes that stay in their objects' own frames", "#00795a", "#2fcfa0", false,
+      "layers over volumes that stay in their objects' own frames", "#d55e00", "#ff8a4c", false,
       false, 4, true},
      {Method::kVolumes, "volumes", "a volume for each object in its own frame, and no index",
-      "#5a5a5a", "#b4b4b4", false, false, kMaxLayers, false},
+      "#009e73", "#2fcfa0", false, false, kMaxLayers, false},
      {Method::kSurfels, "surfels",
       "a list of discs for each object in its own frame, and no voxels", "#6a3fb5", "#b79bff",
       false, false, kMaxLayers, false, false}});
@@ -42,6 +42,7 @@ const MethodInfo& InfoOf(Method method) {
 
 std::vector<Method> AllMethods() {
   std::vector<Method> methods;
+  methods.reserve(kMethods.size());
   for (const MethodInfo& info : kMethods) methods.push_back(info.method);
   return methods;
 }

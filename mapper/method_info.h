@@ -26,12 +26,16 @@ enum class Method {
   kSurfels
 };
 
+// A row has no maker: this file is below the maps, which ask it what they are, so MakeMap stands
+// above them (mapper/methods/make_map.cc), where the compiler asks for every method.
 struct MethodInfo {
   Method method;
   std::string_view name;
-  std::string_view help;      // one line
-  std::string_view on_light;  // the colour of its lines on light ground, "#rrggbb",
-  std::string_view on_dark;   // and on dark
+  std::string_view help;  // one line
+  // The colour of its lines on light ground, "#rrggbb", and on dark, in the report and in plots.
+  // Most are Okabe and Ito's.
+  std::string_view on_light;
+  std::string_view on_dark;
   // All objects share one field, in which a voxel has one distance and one label.
   bool one_field;
   // A pose moves values through the lattice, by resampling.

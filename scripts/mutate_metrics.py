@@ -188,10 +188,11 @@ def page(mutations, rows, old):
         "Each row breaks one sign, unit, set or definition in `metrics/` or in what scores a map with "
         "them (`eval/`), and names",
         "tests that then fail. Made by `python3 scripts/mutate_metrics.py --page "
-        "docs/metrics-mutations.md` from `tests/mutations/*.txt`",
-        "(`--only PATTERN` runs some of them); the script ends with exit code 1 where a mutation "
-        "survives. That each can still be",
-        "made is a test of every build (`--check`); that each is still caught, of "
+        "docs/metrics-mutations.md` from",
+        "`tests/mutations/*.txt` (`--only PATTERN` runs some of them); the script ends with exit code "
+        "1 where a mutation",
+        "survives. That each can still be made is a test of every build (`--check`); that each is "
+        "still caught, of",
         "`scripts/nightly.sh`.",
         "",
         f"{len(lines)} mutations, {len(lines) - survived} caught.",

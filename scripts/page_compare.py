@@ -6,6 +6,7 @@ import io
 import json
 import re
 
+import page_prose
 import page_text
 
 # What names the program that made something is printed, never judged.
@@ -61,9 +62,11 @@ def is_rule(line):
 
 
 def read(text):
-    """The tables of Markdown, fenced tables of aligned columns too, and the other lines."""
+    """The tables of Markdown, fenced tables of aligned columns too, and the other lines; of prose, paragraphs."""
     tables, sentences = [], []
     lines = text.splitlines()
+    for paragraph in reversed(page_prose.paragraphs_of(lines)):
+        lines[paragraph.start:paragraph.stop] = [" ".join(line.strip() for line in lines[paragraph.start:paragraph.stop])]
     fenced = False
     i = 0
     while i < len(lines):

@@ -5,6 +5,7 @@ import pathlib
 import re
 
 import experiment_text
+import page_prose
 
 
 def markdown(rows):
@@ -216,4 +217,5 @@ def text_of(source, kind=None, without=()):
     source = pathlib.Path(source)
     if without:
         return csv_without(source, without)
-    return KINDS[kind or "text"](source)
+    text = KINDS[kind or "text"](source)
+    return page_prose.wrapped(text) if kind or source.suffix == ".md" else text

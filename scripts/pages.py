@@ -135,7 +135,7 @@ def forget(out, command):
 
 
 def build(root, commands):
-    targets = sorted({command["target"] for command in commands if "target" in command})
+    targets = sorted({target for command in commands for target in command.get("target", "").split()})
     if targets:
         subprocess.run(["bash", "scripts/build.sh", "--target", *targets], cwd=root, check=True)
 

@@ -3,8 +3,7 @@
 
 Usage: plot_experiment.py FOLDER PICTURES
 FOLDER holds results.json and results.csv. PICTURES gets experiment-NAME.svg and .png.
-Colours are Okabe and Ito's, and every line has a marker and a dash of its own, so that neither colour-blind readers nor a
-black-and-white printer lose one. Bands and bars are the experiment's confidence intervals.
+Every line has a colour, a marker and a dash of its own (scripts/method_rows.py). Bands and bars are the experiment's confidence intervals.
 """
 import csv
 import json
@@ -28,21 +27,14 @@ import matplotlib.pyplot as plt  # noqa: E402
 import matplotlib.ticker  # noqa: E402
 
 from experiment_text import number, title_of  # noqa: E402
+from method_rows import method_line, method_styles  # noqa: E402
 
-STYLES = {
-    "tsdf": ("#000000", "s", "-"),
-    "tsdf/min": ("#999999", "D", "--"),
-    "tsdf/guarded": ("#882255", "p", "-"),
-    "tsdf/static": ("#777777", "x", ":"),
-    "tsdf++": ("#0072B2", "o", "-"),
-    "tsdf++/literal": ("#E69F00", "v", "-."),
-    "tsdf++/anchored": ("#D55E00", "^", "-"),
-    "volumes": ("#009E73", "P", "--"),
-    "open3d/3": ("#CC79A7", "X", ":"),
-    "open3d/10": ("#A0527D", "x", ":"),
-}
-# A second line of one method, of another setting.
-SECOND = {"tsdf++": ("#56B4E9", "h", "--")}
+METHODS = method_styles()
+# Other people's maps beside the methods.
+STYLES = {**METHODS, "open3d/3": ("#CC79A7", "X", ":"), "open3d/10": ("#A0527D", "x", ":")}
+# Where there is no row.
+PLAIN = ("#666666", ".", "-")
+PLAIN_SECOND = ("#666666", "*", ":")
 
 
 def save(figure, folder, name):
@@ -70,8 +62,10 @@ class Panels:
         if label not in self.styles:
             method = label.split(",")[0]
             taken = [STYLES.get(known.split(",")[0]) for known in self.styles if known.split(",")[0] == method]
-            style = STYLES.get(method, ("#666666", ".", "-"))
-            self.styles[label] = SECOND.get(method, ("#666666", "*", ":")) if taken else style
+            style = STYLES.get(method, PLAIN)
+            if taken:  # a second line of one method, of another setting
+                style = method_line(method, "h", "--", second=True) if method in METHODS else PLAIN_SECOND
+            self.styles[label] = style
         return self.styles[label]
 
     def line(self, axes, label, x, y, low=None, high=None, every=1):
@@ -178,7 +172,7 @@ def plot_differences(results, folder):
         for row in range(0, len(conditions), 2):
             axes.axhspan(row - 0.5, row + 0.5, color="#f2f2f2", linewidth=0, zorder=0)
         for k, method in enumerate(methods):
-            colour, marker, _ = STYLES.get(method, ("#666666", ".", "-"))
+            colour, marker, _ = STYLES.get(method, PLAIN)
             for row, condition in enumerate(conditions):
                 paired = condition["paired"].get(method, {}).get(metric)
                 if paired is None or number(paired["mean_difference"]) is None:

@@ -2,8 +2,7 @@
 """Draws the plots of docs/map-figures.md and docs/map.md from the tables of `tsdfpp_bench figures`.
 
 Usage: plot_map_figures.py TABLES PICTURES
-Colours are Okabe and Ito's, and every line has a marker of its own, so that neither colour-blind readers nor a
-black-and-white printer lose one.
+Every line has a colour and a marker of its own (scripts/method_rows.py).
 """
 import csv
 import os
@@ -24,15 +23,12 @@ matplotlib.rcParams.update({
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 
+from method_rows import method_line, method_styles  # noqa: E402
+
+# Methods, and the settings of methods that have lines of their own.
 STYLES = {
-    "tsdf": ("#000000", "s", "-"),
-    "tsdf/min": ("#999999", "D", "--"),
-    "tsdf/guarded": ("#882255", "p", "-"),
-    "tsdf/static": ("#777777", "x", ":"),
-    "tsdf++": ("#0072B2", "o", "-"),
-    "tsdf++ observed": ("#56B4E9", "P", "--"),
-    "tsdf++/literal": ("#E69F00", "v", "-."),
-    "tsdf++/anchored": ("#D55E00", "^", "-"),
+    **method_styles(),
+    "tsdf++ observed": method_line("tsdf++", "P", "--", second=True),
     "tsdf observed": ("#666666", "d", "--"),
     "tsdf nearest": ("#CC79A7", "*", ":"),
     "tsdf++ nearest": ("#009E73", "X", ":"),

@@ -6,12 +6,13 @@ Usage: plot_scaling_figures.py TABLES PICTURES
 import os
 import sys
 
+from method_rows import method_line
 from plot_map_figures import STYLES, plt, rows_of, save
 
 STYLES.update({
-    "volumes": ("#009E73", "X", "-"),
-    "tsdf++/anchored moved": ("#D55E00", "^", "--"),
-    "volumes moved": ("#009E73", "X", "--"),
+    "volumes": method_line("volumes", "X", "-"),
+    "tsdf++/anchored moved": method_line("tsdf++/anchored", "^", "--"),
+    "volumes moved": method_line("volumes", "X", "--"),
 })
 
 

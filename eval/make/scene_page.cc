@@ -81,7 +81,7 @@ Expected<void> WriteScenePage(const std::filesystem::path& scenes, const std::fi
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(pictures));
   std::string page =
       "# The scenes\n\nEach isolates one difficulty. The keys of a scene file are explained in "
-      "[scene-files.md](scene-files.md); the pictures show frames at 12, 50 and 88 % of each.\n"
+      "[scene-files.md](scene-files.md); the pictures\nshow frames at 12, 50 and 88 % of each. "
       "Made by `tsdfpp generate --page docs`.\n\n![All scenes](pictures/scenes.jpg)\n\n"
       "| scene | what it is for | frames | image | objects | pictures "
       "|\n|---|---|---|---|---|---|\n";

@@ -12,6 +12,7 @@
 #include "eval/report/report_gates.h"
 #include "eval/run/compare_names.h"
 #include "eval/run/run_folder.h"
+#include "eval/sweep/sweep_metrics.h"
 #include "eval/tools/base64.h"
 #include "mapper/method_info.h"
 #include "sequence/sequence_json.h"
@@ -168,6 +169,7 @@ std::string DataText(const std::vector<Comparison>& comparisons, const json& gat
   }
   const json data{{"schema", 1},
                   {"colours", std::move(colours)},
+                  {"metrics", MetricsJson()},
                   {"version", TSDFPP_VERSION},
                   {"command", command},
                   {"gates", gates},

@@ -38,7 +38,7 @@ std::string ColumnText(const EvaluationColumn& column, const Movers& movers,
                        const Evaluation& evaluation) {
   const Measured value = column.value(movers, evaluation);
   if (!value.value) return "-";
-  const std::string text = fmt::format("{:.{}f}", *value.value, column.decimals);
+  std::string text = fmt::format("{:.{}f}", *value.value, column.decimals);
   const Measured error = column.error ? column.error(evaluation) : Measured{};
   if (!error.value) return text;
   // One digit more than the value has, while the error is that small.
@@ -60,16 +60,18 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "",
        Better::kHigher,
        3,
-       "the same over the share that was reconstructed when an evaluation last "
-       "saw those samples: it isolates forgetting from never having mapped; "
-       "above 1 where the map gained. Empty until such samples exist",
+       "share of the hidden table that is kept over the share that was "
+       "reconstructed when an evaluation last saw those samples: it isolates "
+       "forgetting from never having mapped; above 1 where the map gained. Empty "
+       "until such samples exist",
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.retention_behind_other;
        },
        {},
        true},
       {"hole cm2", "table_hole_area_cm2", "hole in the table", "cm²", Better::kLower, 0,
-       "(1 - kept) x the area hidden behind another object",
+       "area of the table hidden behind another object x the share of it that is "
+       "not kept",
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.hole_area_cm2;
        }},
@@ -78,7 +80,9 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "nothing removed, has",
        [](const Movers&, const Evaluation& e) { return e.visible_completion; }},
       {"table", "table_visible_completion", "visible completion of the table", "", Better::kHigher,
-       3, "the same of the table alone",
+       3,
+       "share of the table that is seen and visible now and that the visible "
+       "scene, nothing removed, has",
        [](const Movers&, const Evaluation& e) { return e.objects.front().visible_completion; }},
       {"movers", "movers_completion", "completion of the moving objects", "", Better::kHigher, 3,
        "completion of the moving objects over all that was seen of them, mean", MoversCompletion},
@@ -90,15 +94,17 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        [](const Evaluation& e) { return Measured::Of(kCm2PerM2 * e.ghost_error_m2); }},
       {"ghost after", "revealed_ghost_area_cm2", "ghost area after the removal", "cm²",
        Better::kLower, 0,
-       "the same after the removal, in space that is known to be free: seen so, "
-       "or where a removed object was (in its solid or within tau of its "
+       "reconstructed area after the removal, farther than tau from every current "
+       "true surface, outside the solids, in space that is known to be free: seen "
+       "so, or where a removed object was (in its solid or within tau of its "
        "surface, at its last pose)",
        [](const Movers&, const Evaluation& e) { return Cm2(e.revealed_ghost_area_m2); },
        [](const Evaluation& e) { return Cm2(e.revealed_ghost_error_m2); }},
       {"unseen after", "revealed_unseen_area_cm2", "surface in unseen space after the removal",
        "cm²", Better::kLower, 0,
-       "the same after the removal in the space that is left: behind things, "
-       "outside all images, or where something moved away unseen. In truth "
+       "reconstructed area after the removal, farther than tau from every current "
+       "true surface, outside the solids, in the space that is not known to be "
+       "free: behind things, outside all images, or where something moved away unseen. In truth "
        "nothing is there, but nobody has seen that, so no map can know",
        [](const Movers&, const Evaluation& e) { return Cm2(e.revealed_unseen_area_m2); },
        [](const Evaluation& e) { return Cm2(e.revealed_unseen_error_m2); }},
@@ -110,11 +116,11 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "frames before did not see. An unlabelled or hidden surface fails",
        [](const Movers&, const Evaluation& e) { return e.sanity.all; }},
       {"sane least", "sanity_least", "right pixels of the worst object", "", Better::kHigher, 3,
-       "the least of that share over the whole image and each object",
+       "the least share of right pixels over the whole image and each object",
        [](const Movers&, const Evaluation& e) { return LeastSanity(e); }},
       {"seam", "seam_share", "missing background beside objects", "", Better::kLower, 4,
-       "of the background's pixels in the border that `sane` leaves out around "
-       "the objects' outlines, the share at which the visible scene, cast from "
+       "of the background's pixels in the border that `sanity_all` leaves out "
+       "around the objects' outlines, the share at which the visible scene, cast from "
        "the camera, has nothing, or something more than a voxel behind the true "
        "depth. Asked are pixels that the two frames before saw as well, at an "
        "incidence under 75°. Where the border is also that of a step in the "
@@ -124,22 +130,23 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        [](const Movers&, const Evaluation& e) { return e.seams.beside_objects.share; }},
       {"seam cm2", "seam_area_cm2", "ring of missing background around objects", "cm²",
        Better::kLower, 1,
-       "the area of true surface that these pixels see, each z^2 / (f_x f_y \\|n "
-       "d\\|), with n the surface's normal and d = ((x - c_x) / f_x, (y - c_y) / "
+       "the area of true surface that the missing pixels of `seam_share` see, "
+       "each z^2 / (f_x f_y |n d|), with n the surface's normal and d = ((x - c_x) / f_x, (y - "
+       "c_y) / "
        "f_y, 1): its footprint over the cosine of incidence",
        [](const Movers&, const Evaluation& e) {
          return Measured::Of(1e4 * e.seams.beside_objects.area_m2);
        }},
       {"bulge", "bulge_share", "background beside objects hidden by bulges", "", Better::kLower, 4,
-       "of the pixels that `seam` asks, the share at which the cast has "
-       "something more than a voxel *in front* of the true depth: an object "
+       "of the pixels that `seam_share` asks, the share at which the cast has "
+       "something more than a voxel in front of the true depth: an object "
        "that is too large, or a surface that was made up. What closes a seam "
        "must not pay with bulges",
        [](const Movers&, const Evaluation& e) { return e.seams.beside_objects.in_front; }},
       {"kept any label", "table_preservation_any_label", "hidden table kept under any label", "",
        Better::kHigher, 3,
-       "as kept, with faces of any label: surface that was kept under another "
-       "object's name counts",
+       "share of the hidden table that is kept, with faces of any label: surface "
+       "that was kept under another object's name counts",
        [](const Movers&, const Evaluation& e) {
          return e.objects.front().preserved.by_cause.front().any_label;
        }},

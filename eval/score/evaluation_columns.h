@@ -27,10 +27,11 @@ struct EvaluationColumn {
   std::string title;  // in tables
   std::string csv;    // in frames.csv, JSON and experiments
   std::string words;  // in sentences and on axes, e.g. "hidden table kept"
-  std::string unit;   // empty: a share or a count
+  std::string unit;   // empty: a share or a ratio, which the report shows in %
   Direction better;
   int decimals;
-  std::string definition;  // as docs/metrics.md prints it
+  // As docs/metrics.md and the report print it; read alone, so "the same" is nothing to say.
+  std::string definition;
   // Of the evaluation, where these objects are the ones that the experiment removes.
   std::function<Measured(const std::set<InstanceId>& movers, const Evaluation&)> value;
   // Its standard error, of sampling alone, in the same unit; empty where none is known. In

@@ -281,7 +281,7 @@ Expected<std::string> Leaderboard(const BenchSet& set, const fs::path& folder) {
   Rank(rows, set);
   std::string page = fmt::format(
       "# Benchmark {}\n\n{} sequences, images of {} times the scenes' size, voxels of {} m, "
-      "truncation {} voxels in front and {} behind; set file hash {}. Means over the sequences, "
+      "truncation {} voxels in front and {} behind; set\nfile hash {}. Means over the sequences, "
       "with 95 % bootstrap intervals; `-` is undefined.\n\n",
       set.name, set.sequences.size(), set.scale, set.voxel_m, set.trunc_front, set.trunc_back,
       set.hash);

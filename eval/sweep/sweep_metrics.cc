@@ -60,7 +60,7 @@ const std::vector<RunMetric>& RunMetrics() {
         "objects"},
        MoversAccuracy},
       {{"table_accuracy_rmse_mm", "", "distance error of the table", "mm", Better::kLower, 2,
-        "the same of the background"},
+        "root mean square distance of the reconstruction to the truth, of the background"},
        TableAccuracy},
       {{kFrameTimeMetric, "", "time to map a frame", "ms", Better::kLower, 2,
         "median wall-clock time of a frame, all steps together"},
@@ -148,10 +148,20 @@ nlohmann::json MetricsJson() {
 }
 
 std::string MetricsMarkdown() {
+  // A bar would end the cell.
+  const auto cell = [](const std::string& text) {
+    std::string safe;
+    for (const char c : text) {
+      if (c == '|') safe += '\\';
+      safe += c;
+    }
+    return safe;
+  };
   std::string text = "| metric | in tables | unit | better | meaning |\n|---|---|---|---|---|\n";
   for (const SweepMetric& metric : SweepMetrics()) {
-    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", metric.name, metric.title, metric.unit,
-                        metric.better == Better::kHigher ? "higher" : "lower", metric.definition);
+    text +=
+        fmt::format("| `{}` | {} | {} | {} | {} |\n", metric.name, metric.title, metric.unit,
+                    metric.better == Better::kHigher ? "higher" : "lower", cell(metric.definition));
   }
   return text;
 }

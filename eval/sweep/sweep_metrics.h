@@ -23,7 +23,7 @@ struct SweepMetric {
   std::string name;   // in CSV, JSON and experiments
   std::string title;  // in tables; empty for those that no table of a comparison has
   std::string words;  // in sentences and on axes, e.g. "hidden table kept"
-  std::string unit;   // empty: a share or a count
+  std::string unit;   // empty: a share or a ratio, which the report shows in %
   Direction better;
   int decimals;
   std::string definition;       // as docs/metrics.md prints it
@@ -53,7 +53,7 @@ std::vector<Measured> MeasureAll(const Evaluation& evaluation, const std::set<In
                                  const RunCosts& costs);
 
 // SweepMetrics() as a list of objects: name, title, words, unit, better ("higher" or "lower"),
-// decimals, definition.
+// decimals, definition. `metric list` prints it, and the report's page reads it.
 nlohmann::json MetricsJson();
 // The same as a table in Markdown: what docs/metrics.md has.
 std::string MetricsMarkdown();

@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
 #include <string>
 
 #include "core/files.h"
@@ -39,6 +42,38 @@ TEST(CommandHelp, EverySubcommandHasHelp) {
   const CommandOutput version = RunTsdfpp({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);
   EXPECT_FALSE(version.out.empty());
+}
+
+// What `tsdfpp methods` prints for plots and other programs is the row of the method.
+TEST(CommandMethods, AreTheRows) {
+  const TempFolder folder;
+  const CommandOutput listed = RunTsdfpp({"methods", "--json"}, folder.path());
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  const auto rows = nlohmann::json::parse(listed.out);
+  std::set<std::string> names;
+  std::set<std::string> colours;
+  const std::regex colour("#[0-9a-f]{6}");
+  for (const auto& row : rows) {
+    const std::string name = row.at("name");
+    EXPECT_TRUE(names.insert(name).second) << name;
+    EXPECT_EQ(row.at("has_voxels").get<bool>(), name != "surfels");
+    for (const char* ground : {"on_light", "on_dark"}) {
+      const std::string value = row.at(ground);
+      EXPECT_TRUE(std::regex_match(value, colour)) << value;
+      EXPECT_TRUE(colours.insert(ground + value).second) << name << " looks like another";
+    }
+  }
+  // The default of --methods is a choice among them.
+  const std::string help = RunTsdfpp({"compare", "--help"}, folder.path()).out;
+  const std::regex chosen(R"(--methods TEXT=(\S+))");
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(help, found, chosen)) << help;
+  std::istringstream choice(found.str(1));
+  int count = 0;
+  for (std::string name; std::getline(choice, name, ','); ++count) {
+    EXPECT_TRUE(names.contains(name)) << name;
+  }
+  EXPECT_GT(count, 1);
 }
 
 TEST(CommandDoctor, SaysWhatRenders) {

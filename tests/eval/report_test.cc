@@ -2,11 +2,18 @@
 // in it.
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <regex>
+#include <string>
+#include <vector>
+
 #include "core/files.h"
 #include "eval/report/recording.h"
 #include "eval/report/report_page.h"
 #include "eval/report/report_video.h"
+#include "eval/sweep/sweep_metrics.h"
 #include "eval/tools/base64.h"
+#include "mapper/method_info.h"
 #include "tests/core/temp_folder.h"
 #include "tests/needs.h"
 #include "viewer/report_template.h"
@@ -89,7 +96,7 @@ class Report : public testing::Test {
   void SetUp() override { WriteTinyRun(Run()); }
   std::filesystem::path Run() const { return folder_ / "run"; }
   std::filesystem::path Copy(const std::string& name) const {
-    const std::filesystem::path copy = folder_ / name;
+    std::filesystem::path copy = folder_ / name;
     std::filesystem::copy(Run(), copy, std::filesystem::copy_options::recursive);
     return copy;
   }
@@ -114,6 +121,54 @@ TEST_F(Report, MakesAPageWithItsFiguresAndNoPlaceLeft) {
   EXPECT_EQ(page->html.find(kReportDataMark), std::string::npos);
   EXPECT_NE(page->html.find("id=\"report-bytes-1\""), std::string::npos);
   EXPECT_EQ(page->html.find("http-equiv=\"refresh\""), std::string::npos);
+}
+
+// The data of a page, as its script reads them.
+json DataOf(const std::string& html) {
+  const std::string begin = "<script type=\"application/json\" id=\"report-data\">";
+  const std::size_t at = html.find(begin) + begin.size();
+  return json::parse(html.substr(at, html.find("</script>", at) - at));
+}
+
+// What a metric is called, its unit and its direction the page has from the one table.
+TEST_F(Report, ThePageHasTheTableOfMetrics) {
+  TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
+  const auto page = MakeReportPage({Run()}, "c");
+  ASSERT_TRUE(page.has_value()) << page.error().message;
+  EXPECT_EQ(DataOf(page->html)["metrics"], MetricsJson());
+}
+
+// The strings of a list in JavaScript: const kName = ['a', 'b'];
+std::vector<std::string> QuotedIn(const std::string& script, const std::string& list) {
+  const std::size_t begin = script.find("const " + list + " = [");
+  if (begin == std::string::npos) return {};
+  const std::string items = script.substr(begin, script.find(']', begin) - begin);
+  const std::regex quoted("'([^']+)'");
+  std::vector<std::string> names;
+  for (std::sregex_iterator it(items.begin(), items.end(), quoted), end; it != end; ++it) {
+    names.push_back((*it)[1]);
+  }
+  return names;
+}
+
+// Which metrics and methods it shows first a page chooses; what they are it reads.
+TEST(ReportPage, NamesOnlyWhatTheTablesHave) {
+  const std::filesystem::path sources = TSDFPP_SOURCE_DIR "/viewer/src";
+  const std::string measures = ReadFile(sources / "measures.js").value();
+  for (const SweepMetric& metric : SweepMetrics()) {
+    EXPECT_EQ(measures.find(metric.name), std::string::npos) << metric.name << " is typed again";
+  }
+  const std::string top = ReadFile(sources / "summary.js").value();
+  std::vector<std::string> metrics = QuotedIn(top, "kNumbers");
+  EXPECT_EQ(metrics.size(), 3U);
+  const std::vector<std::string> plotted =
+      QuotedIn(ReadFile(sources / "plots.js").value(), "kFromCsv");
+  EXPECT_GT(plotted.size(), 3U);
+  metrics.insert(metrics.end(), plotted.begin(), plotted.end());
+  for (const std::string& name : metrics) EXPECT_NE(FindMetric(name), nullptr) << name;
+  const std::vector<std::string> heroes = QuotedIn(top, "kHeroes");
+  EXPECT_GT(heroes.size(), 1U);
+  for (const std::string& name : heroes) EXPECT_TRUE(MethodFromName(name)) << name;
 }
 
 // Key frames go, one at a time, and with them their bytes, until the page is small enough.

@@ -13,6 +13,7 @@ import unittest
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
 import page_compare  # noqa: E402
+import page_prose  # noqa: E402
 import page_text  # noqa: E402
 import pages  # noqa: E402
 
@@ -310,6 +311,63 @@ class Compare(unittest.TestCase):
         differences, equal = page_compare.compare(said, said.replace('"1"', '"2"').replace("0.5", "0.6"), judge, ".json")
         self.assertEqual([(d.judged, d.row) for d in differences], [(False, "method.version"), (True, "entries.mini.scores.kept")])
         self.assertEqual(equal, 2)
+
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+NO_PAGES = {"build", "out", "node_modules", "shared"}  # and what begins with a dot
+
+
+def pages_below(folder):
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.name.startswith(".") and path.name not in NO_PAGES:
+            yield from pages_below(path)
+        elif path.suffix == ".md":
+            yield path
+
+
+class Prose(unittest.TestCase):
+    WORDS = "some words " * 15  # 165 characters
+
+    def test_no_page_has_prose_that_is_too_wide(self):
+        paths = list(pages_below(ROOT))
+        self.assertGreater(len(paths), 30)
+        for path in paths:
+            self.assertEqual(page_prose.too_wide(path.read_text()), [], f"{path.relative_to(ROOT)}: lines above {page_prose.WIDTH}")
+
+    def test_what_is_too_wide(self):
+        words, word = self.WORDS, "x" * 130
+        for text, lines in [
+            (f"{words}\n", [1]), (f"A page.\n{words}\n\n{words}", [2, 4]), (f"- {words}\n  {words}", [1, 2]),
+            (f"Of\n    {words}", [2]), ("é" * 60 + " " + "é" * 60, [1]), ("é" * 60 + " " + "é" * 59, []),
+            (f"| a | b |\n|---|---|\n| {words} | 1 |", []), (f"```\n{words}\n```\n", []), (f"\n    {words}", []),
+            (f"## [{words}](a.md)", []), (f"![{words}](a.png)", []), (f"<!-- {words} -->", []), (word, []), (f"- {words}", [1]),
+        ]:
+            with self.subTest(text):
+                self.assertEqual(page_prose.too_wide(text), lines)
+                self.assertEqual(page_prose.too_wide(page_prose.wrapped(text)), [])
+                if not lines:
+                    self.assertEqual(page_prose.wrapped(text), text)
+
+    def test_a_paragraph_keeps_its_words_and_its_indent(self):
+        text = f"# A page\n\nShort.\n\n1. {self.WORDS}\n   end\n2. short\n"
+        wrapped = page_prose.wrapped(text)
+        self.assertEqual(wrapped.split(), text.split())
+        self.assertEqual([line[:3] for line in wrapped.splitlines()[4:]], ["1. ", "   ", "2. "])
+
+    def test_a_line_does_not_begin_with_a_mark(self):
+        for mark in ("-", "1.", "#"):
+            lines = page_prose.wrapped("x" * 117 + f" a {mark} b").splitlines()
+            self.assertEqual(lines, ["x" * 117, f"a {mark} b"])
+
+    def test_a_generated_page_is_wrapped_and_its_breaks_are_not_judged(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, kind in [("a.md", None), ("a.txt", "text")]:
+                path = pathlib.Path(folder) / name
+                path.write_text(self.WORDS)
+                text = page_text.text_of(path, kind)
+                self.assertEqual(page_prose.too_wide(text), [])
+                differences, _ = page_compare.compare(text, self.WORDS, page_compare.Judge())
+                self.assertEqual(differences, [])
 
 
 class Texts(unittest.TestCase):

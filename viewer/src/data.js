@@ -1,5 +1,6 @@
 // What the command put into the page: figures and settings as JSON, meshes and images as base64.
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
+import { learnMetrics } from './measures.js';
 
 function bytesOf(base64) {
   const text = atob(base64.trim());
@@ -98,6 +99,7 @@ function rowsOf(report, run) {
 // `runs` lists every map of every report.
 export function loadData() {
   const data = JSON.parse(document.getElementById('report-data').textContent);
+  learnMetrics(data.metrics);
   const reports = data.reports.map((report, r) => {
     const element = document.getElementById(`report-bytes-${r}`);
     const recording = report.record && element

@@ -1,82 +1,48 @@
-// The columns of frames.csv that the page knows: what to call them and how to show them. Unknown
-// columns are shown by their names.
+// What the columns of frames.csv are called and how they are shown. All of it is the program's table of metrics
+// (`tsdfpp metric list --json`), which the page's data has. Unknown columns are shown by their names.
 
-const percent = { scale: 100, unit: '%', decimals: 1, better: 1 };
+const kDirections = { higher: 1, lower: -1 };
+const kErrorEnd = '_se';  // of the column with a metric's standard error
 
-const standardError = (of) => ({
-  scale: 1, unit: 'cm²', decimals: 1, better: 0, title: `${of}, standard error`, about: 'Of the sampling of the map alone',
-});
+// By column. `better` is 1 or -1; a standard error has none.
+const measures = new Map();
 
-export const kMeasures = {
-  table_preservation_behind_other: {
-    ...percent, title: 'Hidden table kept',
-    about: 'Share of the table that was seen, is hidden behind a moving object now, and is within one voxel of the map once the objects are taken out',
-  },
-  table_retention_behind_other: {
-    ...percent, title: 'Hidden table retained',
-    about: 'The same, over what the map had of it when it was last visible',
-  },
-  table_hole_area_cm2: {
-    scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Hole',
-    about: 'Area of hidden table that the map no longer has',
-  },
-  visible_completion: {
-    ...percent, title: 'Visible surface mapped',
-    about: 'Share of all surface that is visible now and that the visible scene has',
-  },
-  table_visible_completion: {
-    ...percent, title: 'Visible table mapped', about: 'The same of the table',
-  },
-  movers_completion: {
-    ...percent, title: 'Moving objects mapped',
-    about: 'Mean share of what was seen of each moving object and is still in the map',
-  },
-  ghost_area_cm2: {
-    scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Ghosts',
-    about: 'Area of surface in the map where there is nothing, in space that was seen to be free',
-  },
-  ghost_area_cm2_se: standardError('Ghosts'),
-  revealed_ghost_area_cm2: {
-    scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Ghosts after the removal',
-    about: 'Area of surface where there is nothing, once the moving objects are taken out, in space that was seen to be free or held one of them',
-  },
-  revealed_ghost_area_cm2_se: standardError('Ghosts after the removal'),
-  revealed_unseen_area_cm2: {
-    scale: 1, unit: 'cm²', decimals: 0, better: -1, title: 'Surface in unseen space after the removal',
-    about: 'Area of surface where there is nothing, once the moving objects are taken out, in space that nobody has seen to be free',
-  },
-  revealed_unseen_area_cm2_se: standardError('Surface in unseen space after the removal'),
-  sanity_all: {
-    ...percent, title: 'Pixels as seen',
-    about: 'Share of mapped pixels where the map, seen from the camera, has the right depth and object',
-  },
-  sanity_least: {
-    ...percent, title: 'Pixels as seen, worst object', about: 'The same of the worst object',
-  },
-  seam_share: {
-    ...percent, decimals: 2, better: -1, title: 'Seams',
-    about: 'Share of the background pixels beside objects where the map, seen from the camera, shows nothing, or only what lies behind',
-  },
-  seam_area_cm2: {
-    scale: 1, unit: 'cm²', decimals: 1, better: -1, title: 'Ring',
-    about: 'Area of background that is missing beside objects, in the visible scene',
-  },
-  bulge_share: {
-    ...percent, decimals: 2, better: -1, title: 'Bulges',
-    about: 'Share of the background pixels beside objects where the map, seen from the camera, shows something in front of it',
-  },
-  table_preservation_any_label: {
-    ...percent, title: 'Hidden table kept, any label',
-    about: 'As hidden table kept, whatever object the surface is said to belong to',
-  },
-  table_label_purity: {
-    ...percent, title: 'Label purity',
-    about: 'Share of the surface labelled background that is background',
-  },
-};
+function sentence(words) {
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}
+
+// Shares and ratios have no unit; they are shown in %, to the same digit.
+function measureOfMetric({ words, unit, better, decimals, definition }) {
+  const share = unit === '';
+  return {
+    title: sentence(words), about: sentence(definition), better: kDirections[better],
+    scale: share ? 100 : 1, unit: share ? '%' : unit, decimals: share ? Math.max(0, decimals - 2) : decimals,
+  };
+}
+
+function errorOf({ title, unit, scale, decimals }) {
+  return { title: `${title}, standard error`, about: 'Of the sampling of the map alone', unit, scale, decimals: decimals + 1 };
+}
+
+export function learnMetrics(metrics) {
+  for (const metric of metrics) {
+    const measure = measureOfMetric(metric);
+    measures.set(metric.name, measure);
+    measures.set(metric.name + kErrorEnd, errorOf(measure));
+  }
+}
+
+export function isKnown(column) {
+  return measures.has(column);
+}
+
+// Those of which more or less is better, in the table's order.
+export function metricColumns() {
+  return [...measures.keys()].filter((column) => measures.get(column).better);
+}
 
 export function measureOf(column) {
-  return kMeasures[column] ?? { title: column, unit: '', scale: 1, decimals: 3, better: 0, about: '' };
+  return measures.get(column) ?? { title: column, unit: '', scale: 1, decimals: 3, about: '' };
 }
 
 export function valueOf(row, column) {

@@ -1,7 +1,7 @@
 // Plots over the frames, with the images of the chosen frame beside them.
 import uPlot from 'uplot';
 import { el, themeColour } from './dom.js';
-import { colourOfRun, dashOfRun, kMeasures, measureOf, shortLabel, valueOf } from './measures.js';
+import { colourOfRun, dashOfRun, isKnown, measureOf, shortLabel, valueOf } from './measures.js';
 import { nearestFrame } from './state.js';
 
 const kFromCsv = ['table_preservation_behind_other', 'table_hole_area_cm2', 'movers_completion',
@@ -42,9 +42,9 @@ function chartsOf(data) {
   const has = (column) => data.runs.some((run) => run.rows.some((row) => typeof row[column] === 'number'));
   const known = kFromCsv.filter(has);
   // Columns that the page does not know are still plotted.
-  const skipped = new Set(['frame', 'method', 'profile', 'poses', 'mesh_s', 'evaluate_s', ...Object.keys(kMeasures)]);
+  const skipped = new Set(['frame', 'method', 'profile', 'poses', 'mesh_s', 'evaluate_s']);
   const unknown = [...new Set(data.reports.flatMap((report) => report.csv.columns))]
-    .filter((column) => !skipped.has(column) && has(column));
+    .filter((column) => !skipped.has(column) && !isKnown(column) && has(column));
   const charts = [...known, ...unknown].map((column) => {
     const measure = measureOf(column);
     return { title: measure.title, unit: measure.unit, decimals: measure.decimals, about: measure.about,

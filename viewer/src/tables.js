@@ -1,6 +1,6 @@
 // Tables that sort by a click on a title and leave as CSV.
 import { download, el } from './dom.js';
-import { kMeasures, measureOf, shortLabel, textOf, valueOf } from './measures.js';
+import { measureOf, metricColumns, shortLabel, textOf, valueOf } from './measures.js';
 import { measured } from './data.js';
 import { examinedFrame, examinedRow } from './summary.js';
 
@@ -106,12 +106,11 @@ function tracksTable(data) {
 // A row a map that both reports have: the first, the second, and the difference.
 function comparedTable(data) {
   if (data.reports.length < 2) return null;
-  const columns = Object.keys(kMeasures).filter((column) => kMeasures[column].better !== 0);
   const rows = [];
   for (const a of data.runs.filter((run) => run.report === 0)) {
     const b = data.runs.find((run) => run.report === 1 && run.folder === a.folder);
     if (!b) continue;
-    for (const column of columns) {
+    for (const column of metricColumns()) {
       const [x, y] = [a, b].map((run) => valueOf(examinedRow(data, run), column));
       if (x === null && y === null) continue;
       const measure = measureOf(column);

@@ -84,6 +84,25 @@ function makeRuns() {
   edit('run.json', (note) => note.files.forEach((file) => { file.bytes = null; }));
   command('report', bad);
   command('report', run, '--compare', plain, '--out', join(folder, 'both.html'));
+  makeMore(run);
+}
+
+// A run with more of everything in its frames.csv, compared with the run.
+function makeMore(run) {
+  const more = join(folder, 'more');
+  cpSync(run, more, { recursive: true });
+  const [head, ...lines] = readFileSync(join(run, 'frames.csv'), 'utf8').trim().split('\n');
+  const isMeasured = head.split(',').map((column) => !['frame', 'method', 'profile', 'poses'].includes(column));
+  const raised = lines.map((line) => line.split(',').map((cell, i) => (cell && isMeasured[i] ? Number(cell) + 1 : cell)).join(','));
+  writeFileSync(join(more, 'frames.csv'), [head, ...raised].join('\n') + '\n');
+  const summary = JSON.parse(readFileSync(join(more, 'summary.json'), 'utf8'));
+  // The page takes this one column from the summary.
+  summary.runs.forEach((each) => { each.examined.objects[0].hole_area_cm2 += 1; });
+  writeFileSync(join(more, 'summary.json'), JSON.stringify(summary));
+  const note = JSON.parse(readFileSync(join(more, 'run.json'), 'utf8'));
+  note.files.forEach((file) => { file.bytes = null; });
+  writeFileSync(join(more, 'run.json'), JSON.stringify(note));
+  command('report', run, '--compare', more, '--out', join(folder, 'other.html'));
 }
 
 const tests = [];
@@ -346,6 +365,31 @@ test('two comparisons stand beside each other', async (browser) => {
   assert.equal(await page.locator('[data-table="figures"] tbody tr').count(), 4);
   const words = await page.locator('[data-table="compared"] tbody tr td:last-child').allTextContents();
   assert.ok(words.length > 10 && words.every((word) => word === 'same'));
+  return page;
+});
+
+test('a metric has the unit, the digits and the direction of its row', async (browser) => {
+  const page = await open(browser, join(folder, 'other.html'));
+  const heads = await page.locator('[data-table="figures"] thead button').allTextContents();
+  const rows = await page.locator('[data-table="compared"] tbody tr').evaluateAll(
+    (all) => all.map((row) => [...row.children].map((cell) => cell.textContent)));
+  let compared = 0;
+  for (const { words, unit, better, decimals } of JSON.parse(execFileSync(tsdfpp, ['metric', 'list', '--json'], { encoding: 'utf8' }))) {
+    const title = words[0].toUpperCase() + words.slice(1);
+    const shown = unit || '%';
+    for (const [, , a, b, change, so] of rows.filter((row) => row[1] === title)) {
+      assert.ok(heads.includes(`${title} ${shown}`), `${title} ${shown} is not among ${heads}`);
+      for (const value of [a, b].filter((each) => each !== '–')) {
+        assert.ok(value.endsWith(` ${shown}`), `${title}: ${value}`);
+        assert.equal((value.split(' ')[0].split('.')[1] ?? '').length, unit ? decimals : decimals - 2, `${title}: ${value}`);
+      }
+      if (b === '–') continue;
+      assert.ok(Number(change) > 0, `${title}: ${change}`);
+      assert.equal(so, better === 'higher' ? 'better' : 'worse', title);
+      ++compared;
+    }
+  }
+  assert.ok(compared > 10, `${compared} of ${rows.length} rows`);
   return page;
 });
 
