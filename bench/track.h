@@ -13,8 +13,7 @@ struct TrackBenchOptions {
   std::vector<std::string> only;  // names of some of them; empty for all
   std::vector<std::string> depths = {"exact", "noise"};
   // Trackers, each with a method: "track tsdf++/anchored", and "known", which has no map.
-  std::vector<std::string> runs = {"known", "track tsdf++/anchored", "track tsdf++",
-                                   "icp tsdf++/anchored", "icp tsdf++"};
+  std::vector<std::string> runs = {"known", "track tsdf++/anchored", "track tsdf++"};
   std::string settings;  // a file of mapper/track/sdf_track_config.h; empty for the defaults
   int until = 100000;    // the last frame
   std::string out;
