@@ -72,8 +72,8 @@ class MapRepresentation {
 
   virtual MapMemory Memory() const = 0;
 
-  // What only some maps can do; nullptr from the others. A caller that needs one tells its user in a
-  // sentence that the map lacks it. Programs ask for the first two (mapper/voxel_inspection.h,
+  // What only some maps can do; nullptr from the others. A caller that needs one tells its user in
+  // a sentence that the map lacks it. Programs ask for the first two (mapper/voxel_inspection.h,
   // mapper/map_editing.h); for the others SaveMap(), CheckReach() and SceneMesher do.
   virtual const VoxelInspection* inspection() const { return nullptr; }
   virtual MapEditing* editing() { return nullptr; }
