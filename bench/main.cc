@@ -145,7 +145,8 @@ void AddSegment(CLI::App& app, Chosen& chosen) {
 
 void AddTrack(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<TrackBenchOptions>();
-  CLI::App* command = app.add_subcommand("track", "What docs/tracking.md shows, as CSV");
+  CLI::App* command =
+      app.add_subcommand("track", "How well objects are tracked, scene by scene, as CSV");
   command->add_option("--out", options->out, "Output folder")->required();
   command->add_option("--scenes", options->scenes, "Folder of scenes")->capture_default_str();
   command->add_option("--only", options->only, "Names of some of them; default: all")

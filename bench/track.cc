@@ -13,6 +13,7 @@
 #include "core/folders.h"
 #include "core/toml_reader.h"
 #include "metrics/statistics.h"
+#include "metrics/surface_samples.h"
 #include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 
@@ -23,8 +24,8 @@ namespace fs = std::filesystem;
 
 // Objects that move less are not judged: what stands still is easy.
 constexpr double kLeastMoved_m = 0.05;
-// Turns of shapes are judged where the terms on the true surface know of each at least this share;
-// a ball has none, a box seen on two sides some 0.05.
+// Turns are judged where the terms on the true surface know of each at least this share, which a
+// ball's do not.
 constexpr double kFixedTurn = 0.01;
 constexpr std::size_t kPoints = 500;  // of a true surface, for ADD and ADD-S, which is quadratic
 
@@ -113,10 +114,12 @@ double MedianMs(const TrackRun& run) {
 }
 
 std::vector<Eigen::Vector3f> SomePoints(const TriangleMesh& mesh) {
+  const SampleConfig config;
+  const SampleSet samples = SampleMesh(mesh, config.fine_per_cm2, config.seed);
   std::vector<Eigen::Vector3f> points;
-  const std::size_t count = std::min(kPoints, mesh.vertices.size());
+  const std::size_t count = std::min(kPoints, samples.size());
   for (std::size_t i = 0; i < count; ++i) {
-    points.push_back(mesh.vertices[i * mesh.vertices.size() / count]);
+    points.push_back(samples.points[i * samples.size() / count]);
   }
   return points;
 }
@@ -264,6 +267,18 @@ Expected<void> WriteByScene(const std::vector<Row>& rows, const Plan& plan, cons
   return table.Write(out, name);
 }
 
+Expected<void> WriteTimes(const std::vector<Row>& rows, const fs::path& out) {
+  FigureTable table({"scene", "depth", "run", "ms an object and frame"});
+  const Row* before = nullptr;  // rows of a run follow each other
+  for (const Row& row : rows) {
+    const bool is_same = before != nullptr && before->scene == row.scene &&
+                         before->depth == row.depth && before->run == row.run;
+    if (!is_same) table.Add({row.scene, row.depth, row.run, Cell(row.ms, 2)});
+    before = &row;
+  }
+  return table.Write(out, "times");
+}
+
 Expected<void> WriteTables(const std::vector<Row>& rows, const Plan& plan, const fs::path& out) {
   TSDFPP_RETURN_IF_ERROR(WriteObjects(rows, out));
   TSDFPP_RETURN_IF_ERROR(WriteByScene(rows, plan, out, "shifts", 2, [](const Row& row) {
@@ -274,8 +289,7 @@ Expected<void> WriteTables(const std::vector<Row>& rows, const Plan& plan, const
     return row.turn_share < kFixedTurn ? std::nullopt
                                        : row.scores.trajectory.rotation_rmse_deg.value;
   }));
-  return WriteByScene(rows, plan, out, "times", 2,
-                      [](const Row& row) { return std::optional(row.ms); });
+  return WriteTimes(rows, out);
 }
 
 }  // namespace

@@ -19,7 +19,9 @@ class MapRun : public TrackRun {
   Expected<void> Process(const Frame& frame) override {
     TSDFPP_ASSIGN(const StepTimes times, pipeline_.Process(frame));
     int tracked = 0;
-    for (const auto& [id, span] : log().objects()) tracked += span.tracked + span.frozen;
+    for (const auto& [id, span] : log().objects()) {
+      tracked += span.tracked + span.stayed + span.frozen;
+    }
     AddCost(1e3 * times.track_s, tracked - std::exchange(tracked_, tracked));
     return {};
   }
@@ -46,11 +48,10 @@ class KnownRun : public TrackRun {
 
   Expected<void> Process(const Frame& frame) override {
     // An object that is new is at its true pose, which the tracker takes for one of before.
-    ObjectPoses before = frame.T_WO;
-    for (const auto& [id, T_WO] : T_WO_) before[id] = T_WO;
-    before_ = before;
+    before_ = frame.T_WO;
+    for (const auto& [id, T_WO] : T_WO_) before_[id] = T_WO;
     const double began_ms = WallMilliseconds();
-    TrackedPoses after = tracker_.Track(frame, frame.mask, *no_map_, before);
+    TrackedPoses after = tracker_.Track(frame, frame.mask, *no_map_, before_);
     int tracked = 0;
     for (auto& [id, status] : after.seen) {
       if (T_WO_.contains(id)) {

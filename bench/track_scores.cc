@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "metrics/object_pose.h"
+#include "metrics/statistics.h"
 
 namespace tsdfpp {
 namespace {
@@ -21,21 +22,12 @@ Trajectory Shown(const Trajectory& poses, const std::set<int>& frames) {
   return shown;
 }
 
-// Their mean, and the share of those that are at most a length.
-struct Errors {
-  std::vector<double> errors_m;
-
-  Measured Mean() const {
-    double sum = 0;
-    for (const double error : errors_m) sum += error;
-    return Measured::Of(sum / static_cast<double>(errors_m.size()));
-  }
-  double Within(double length_m) const {
-    const auto within =
-        std::ranges::count_if(errors_m, [&](double error) { return error <= length_m; });
-    return static_cast<double>(within) / static_cast<double>(errors_m.size());
-  }
-};
+// The share of them that are at most a length.
+Measured Within(const std::vector<double>& errors_m, double length_m) {
+  const auto within =
+      std::ranges::count_if(errors_m, [&](double error) { return error <= length_m; });
+  return Measured::Of(static_cast<double>(within) / static_cast<double>(errors_m.size()));
+}
 
 }  // namespace
 
@@ -50,8 +42,8 @@ TrackScores ScoreTracked(const TrackedObject& object) {
   const Pose C = Eigen::Translation3d(middle_O) * Pose::Identity();
   Trajectory of_estimate;
   Trajectory of_truth;
-  Errors add;
-  Errors add_s;
+  std::vector<double> add_m;
+  std::vector<double> add_s_m;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     of_estimate[pairs.frames[i]] = pairs.estimate[i] * C;
     of_truth[pairs.frames[i]] = pairs.truth[i] * C;
@@ -59,16 +51,16 @@ TrackScores ScoreTracked(const TrackedObject& object) {
     scores.farthest_m = std::max(scores.farthest_m, scores.end_m);
     scores.moved_m =
         std::max(scores.moved_m, (pairs.truth[i] * middle_O - pairs.truth[0] * middle_O).norm());
-    add.errors_m.push_back(*AddError_m(object.points_O, pairs.estimate[i], pairs.truth[i]).value);
-    add_s.errors_m.push_back(
+    add_m.push_back(*AddError_m(object.points_O, pairs.estimate[i], pairs.truth[i]).value);
+    add_s_m.push_back(
         *AddSymmetricError_m(object.points_O, pairs.estimate[i], pairs.truth[i]).value);
   }
   scores.trajectory =
       ScoreObjectTrajectory(of_estimate, of_truth, Pose::Identity(), Pose::Identity());
-  scores.add_m = add.Mean();
-  scores.add_s_m = add_s.Mean();
-  scores.within_5mm = Measured::Of(add_s.Within(0.005));
-  scores.within_2cm = Measured::Of(add_s.Within(0.02));
+  scores.add_m = Measured::Of(MeanOf(add_m));
+  scores.add_s_m = Measured::Of(MeanOf(add_s_m));
+  scores.within_5mm = Within(add_s_m, 0.005);
+  scores.within_2cm = Within(add_s_m, 0.02);
   return scores;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 
 namespace tsdfpp {
 namespace {
@@ -210,20 +211,13 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
 
 void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end,
                             NormalEquations& sums) const {
-  const Eigen::Vector3d camera_L = T_LC.translation();
   const double farthest_m = kFarthest_hubers * huber_m_;
   for (std::size_t k = begin; k < end; ++k) {
     const std::size_t i = k * stride_;
     const Eigen::Vector3d p_C = points_[i].p_C.cast<double>();
     const Eigen::Vector3d y = T_LC * p_C;
     const SurfaceSample at = SampleAt(T_LC, i);
-    Kept kept;
-    if (!kept_.empty()) {
-      kept = kept_[i];
-    } else if (at.has_slope) {
-      kept.per_slope = 1 / at.slope;
-      kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
-    }
+    const Kept& kept = kept_[i];
     if (!(kept.per_slope > 0)) {
       sums.cost += huber_m_ * huber_m_ / 2;
       continue;
@@ -246,6 +240,7 @@ void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end
 }
 
 NormalEquations DistanceTerm::Sums(const Pose& T_LC) const {
+  if (kept_.size() != points_.size()) std::abort();  // KeepAt() comes first
   const std::size_t count = Taken();
   const std::size_t chunks = (count + kPointsPerTask - 1) / kPointsPerTask;
   constexpr std::size_t kChunksAtOnce = 32;

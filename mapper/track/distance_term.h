@@ -77,7 +77,8 @@ class DistanceTerm {
   // The terms' sums over the points y = T p, with weights of at most 1 and so in units of a point:
   // of the least deviation that the config's noise knows. A point without a distance costs as much
   // as one at the Huber width: a side that the model lacks is no reason to be elsewhere. One that
-  // had a distance where it was kept costs as much as it did there. In parallel, in fixed chunks.
+  // had a distance where it was kept costs as much as it did there. KeepAt() must have been called.
+  // In parallel, in fixed chunks.
   NormalEquations Sums(const Pose& T_LC) const;
 
   DistanceCounts Count(const Pose& T_LC) const;

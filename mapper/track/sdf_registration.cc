@@ -55,6 +55,8 @@ DistanceTerm TermOf(const SdfRegistration& task, const MotionFrame& frame,
   return {*task.model, task.points, frame, task.voxel_m, task.camera, config, stride};
 }
 
+// Passes of the coarse search from one seed: what is kept of the points holds near where it was
+// kept.
 constexpr int kCoarsePasses = 2;
 
 // From every seed, with a share of the points: the pose of least cost, in the result.
@@ -91,7 +93,7 @@ struct FineFit {
   LeastSquaresResult found;
 };
 
-// Passes of the fine search: what is kept of the points holds near where it was kept.
+// Of the fine search.
 constexpr int kFinePasses = 3;
 
 // All points, with as narrow a Huber function as the residuals ask for.

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/metrics/test_scenes.h"
+#include "tests/reference/sdf_registration_reference.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -19,20 +22,10 @@ constexpr double kSingle_m = 1e-7;
 const Eigen::AlignedBox3d kBox{Eigen::Vector3d(-0.053, -0.041, -0.017),
                                Eigen::Vector3d(0.062, 0.048, 0.071)};
 
-TriangleMesh BoxMesh() {
-  TriangleMesh mesh;
-  for (int i = 0; i < 8; ++i) {
-    const auto corner = static_cast<Eigen::AlignedBox3d::CornerType>(i);
-    mesh.vertices.push_back(kBox.corner(corner).cast<float>());
-  }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
+TriangleMesh BoxMesh() { return testing::Box(kBox.min().cast<float>(), kBox.max().cast<float>()); }
 
 double DistanceToBox(const Eigen::Vector3d& p) {
-  const Eigen::Vector3d beyond = (kBox.min() - p).cwiseMax(p - kBox.max());
-  return beyond.cwiseMax(0).norm() + std::min(beyond.maxCoeff(), 0.0);
+  return reference::BoxDistance(kBox.sizes() / 2)(p - kBox.center());
 }
 
 TEST(KnownModels, DistancesOfABoxAreExact) {

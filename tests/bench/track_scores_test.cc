@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 
 namespace tsdfpp {
 namespace {
 
-constexpr double kRounding = 1e-6;  // metres: points are in single precision
+constexpr double kRounding = 1e-6;      // metres: points are in single precision
+constexpr double kRounding_deg = 1e-4;  // of angles from matrices
 constexpr double kDegrees = std::numbers::pi / 180;
 
 Pose At(double x, double turn_rad = 0) {
@@ -58,7 +60,7 @@ TEST(TrackScores, TurnsThatTheShapeHidesAreSeenByAddAlone) {
   object.T_WO_estimate = {{1, At(0.01)}, {2, At(0.02, 90 * kDegrees)}};
   const TrackScores scores = ScoreTracked(object);
   EXPECT_EQ(scores.frames, 2U);
-  EXPECT_NEAR(*scores.trajectory.rotation_rmse_deg.value, 90 / std::numbers::sqrt2, 1e-4);
+  EXPECT_NEAR(*scores.trajectory.rotation_rmse_deg.value, 90 / std::numbers::sqrt2, kRounding_deg);
   EXPECT_NEAR(scores.farthest_m, 0, kRounding);
   EXPECT_NEAR(*scores.add_m.value, 0.1 * std::numbers::sqrt2 / 2, kRounding);
   EXPECT_NEAR(*scores.add_s_m.value, 0, kRounding);

@@ -268,6 +268,7 @@ TEST(DistanceTerm, HasTheDerivativesOfItsCost) {
   const MotionFrame frame{{0.01, 0.02, -0.01}, 0.07};
   SdfTrackConfig config;
   DistanceTerm term(model, points, frame, kVoxel_m, reference::SmallCamera(), config);
+  term.KeepAt(TrueLC());
   for (const double huber_m : {1.0, 0.001}) {
     SCOPED_TRACE(huber_m);
     term.SetHuber(huber_m);
