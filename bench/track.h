@@ -21,10 +21,10 @@ struct TrackBenchOptions {
 
 // Renders each scene once, and gives its true masks, and depth that is exact or has the noise of
 // nguyen2012, to each run. `known` registers to the distances of the true surfaces, beginning at
-// the true poses. Writes objects.csv, a row for each object that moves at least 5 cm and run; of
-// these, a row a scene and depth, shifts.csv (ATE, millimetres) and turns.csv (rotation, degrees);
-// and times.csv, a row a run: milliseconds an object and frame, medians. Errors: kUsage for an
-// unknown scene, depth or run, or wrong settings; else those of the scenes and the renderer.
+// the true poses. Writes objects.csv, a row for each run and object of which a point moves at least
+// 5 cm; of these, a row a scene and depth, shifts.csv (ATE, millimetres) and turns.csv (rotation,
+// degrees); and times.csv, a row a run: milliseconds an object and frame, medians. Errors: kUsage
+// for an unknown scene, depth or run, or wrong settings; else those of the scenes and the renderer.
 Expected<void> RunTrackBench(const TrackBenchOptions& options);
 
 }  // namespace tsdfpp

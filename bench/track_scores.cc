@@ -49,8 +49,10 @@ TrackScores ScoreTracked(const TrackedObject& object) {
     of_truth[pairs.frames[i]] = pairs.truth[i] * C;
     scores.end_m = (pairs.estimate[i] * middle_O - pairs.truth[i] * middle_O).norm();
     scores.farthest_m = std::max(scores.farthest_m, scores.end_m);
-    scores.moved_m =
-        std::max(scores.moved_m, (pairs.truth[i] * middle_O - pairs.truth[0] * middle_O).norm());
+    for (const Eigen::Vector3f& p_O : object.points_O) {
+      const Eigen::Vector3d p = p_O.cast<double>();
+      scores.moved_m = std::max(scores.moved_m, (pairs.truth[i] * p - pairs.truth[0] * p).norm());
+    }
     add_m.push_back(*AddError_m(object.points_O, pairs.estimate[i], pairs.truth[i]).value);
     add_s_m.push_back(
         *AddSymmetricError_m(object.points_O, pairs.estimate[i], pairs.truth[i]).value);

@@ -18,7 +18,7 @@ struct TrackedObject {
 };
 
 struct TrackScores {
-  double moved_m = 0;      // the farthest that the middle of its points comes from where it began
+  double moved_m = 0;      // the farthest that one of its points comes from where it began
   std::size_t frames = 0;  // that show it and have an estimate
   ObjectTrajectoryScores trajectory;  // anchored at the first of them
   double farthest_m = 0;              // the largest shift among them

@@ -3,7 +3,8 @@
 
 Usage: plot_experiment.py FOLDER PICTURES
 FOLDER holds results.json and results.csv. PICTURES gets experiment-NAME.svg and .png.
-Every line has a colour, a marker and a dash of its own (scripts/method_rows.py). Bands and bars are the experiment's confidence intervals.
+Every line has a colour, a marker and a dash of its own (scripts/method_rows.py). Bands and bars are the experiment's
+confidence intervals.
 """
 import csv
 import json

@@ -54,6 +54,14 @@ TEST(TrackScores, ShiftsCountWhereTheObjectIsShown) {
   EXPECT_NEAR(*scores.within_2cm.value, 2.0 / 3, kRounding);
 }
 
+// What only turns has moved, too.
+TEST(TrackScores, TurningIsMoving) {
+  TrackedObject object = Driving();
+  object.T_WO_truth = {{1, At(0)}, {2, At(0, 180 * kDegrees)}};
+  object.T_WO_estimate = object.T_WO_truth;
+  EXPECT_NEAR(ScoreTracked(object).moved_m, 0.2, kRounding);
+}
+
 // A quarter turn brings the four points onto each other: ADD-S sees nothing, ADD the way of each.
 TEST(TrackScores, TurnsThatTheShapeHidesAreSeenByAddAlone) {
   TrackedObject object = Driving();
@@ -62,6 +70,8 @@ TEST(TrackScores, TurnsThatTheShapeHidesAreSeenByAddAlone) {
   EXPECT_EQ(scores.frames, 2U);
   EXPECT_NEAR(*scores.trajectory.rotation_rmse_deg.value, 90 / std::numbers::sqrt2, kRounding_deg);
   EXPECT_NEAR(scores.farthest_m, 0, kRounding);
+  // A point a tenth of a metre from the middle goes 1 cm on, as the middle does.
+  EXPECT_NEAR(scores.moved_m, 0.01, kRounding);
   EXPECT_NEAR(*scores.add_m.value, 0.1 * std::numbers::sqrt2 / 2, kRounding);
   EXPECT_NEAR(*scores.add_s_m.value, 0, kRounding);
 }
