@@ -1,8 +1,9 @@
 #!/usr/bin/python3
-"""Compares the speed of this program with that of an older commit: is the new one slower?
+"""Compares this program with that of an older commit: is the new one slower, and are its maps the same?
 
     python3 scripts/old_against_new.py OLD [--new build/release] [--pairs 11] [--only fusion,...]
         [--methods tsdf,...] [--out FOLDER]
+    python3 scripts/old_against_new.py OLD --only maps [--until 64] [--methods tsdf,...] [--out FOLDER]
 
 OLD is a revision, which is built in a copy of its own below out/old (a quarter of an hour on two cores), or a build folder.
 Both programs do the same work at the same time, but only one of them runs: each in turn for TURN_S, some ten frames, while
@@ -12,8 +13,12 @@ pair. Printed are, for each measure, the median over the pairs of new over old, 
 
 Measures: fusion (milliseconds a frame of fusion and pose updates in `map`, medians, by method), rays and meshes (milliseconds
 of `tsdfpp_bench rays` and `mesh`, by method), generation (processor seconds of `generate`).
+
+`--only maps` measures no time: both programs map the sequence up to frame --until, and every mesh (each object's, and the
+visible scene's) is compared byte by byte. Exits with 1 where one differs.
 """
 import argparse
+import hashlib
 import json
 import os
 import pathlib
@@ -165,6 +170,31 @@ class Work:
         yield command, figures
 
 
+def digests(folder):
+    """{file: SHA-256} of the meshes of a run."""
+    files = sorted((folder / "mesh").iterdir())
+    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def compare_maps(builds, work, until):
+    """The table of methods, and those of which a mesh differs."""
+    lines, different = ["| method | meshes | vertices and triangles as before, byte by byte |", "|---|---|---|"], []
+    for method in work.methods:
+        runs = []
+        for index, build in enumerate(builds):
+            out = work.folder / f"map{index}"
+            subprocess.run([build / "tsdfpp", "map", work.sequence, "--method", method, "--until", str(until), "--out", out],
+                           check=True, stdout=subprocess.DEVNULL)
+            runs.append(digests(out))
+            shutil.rmtree(out)
+        old, new = runs
+        same = [name for name in old if new.get(name) == old[name]]
+        lines.append(f"| {method} | {len(old)} | {len(same)} |")
+        if len(same) < len(old) or len(new) != len(old):
+            different.append(method)
+    return "\n".join(lines), different
+
+
 def built(old):
     """The build folder that `old` is, or that of the revision, built where it is not yet."""
     if pathlib.Path(old).is_dir():
@@ -193,6 +223,16 @@ def bounds(ratios):
     return statistics.median(ratios), medians[100], medians[3899]
 
 
+def write(table, out, name):
+    """Prints the table and, where asked for, leaves it in a folder."""
+    print(table)
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+        part = out / f"{name}.part"
+        part.write_text(table + "\n", encoding="utf-8")
+        part.replace(out / name)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("old")
@@ -201,12 +241,13 @@ def main():
     parser.add_argument("--pairs", type=int, default=11)
     parser.add_argument("--only", default="fusion,rays,meshes,generation")
     parser.add_argument("--methods", default=",".join(METHODS), help=f"of fusion; rays and meshes are of {', '.join(METHODS)}")
+    parser.add_argument("--until", type=int, default=64, help="the last frame of maps")
     parser.add_argument("--scene", default="scenes/toycar3.toml")
     options = parser.parse_args()
-    measures = options.only.split(",")
+    measures = [] if options.only == "maps" else options.only.split(",")
     unknown = [name for name in measures if name not in ("fusion", "rays", "meshes", "generation")]
     if unknown:
-        parser.error(f"--only: expected some of fusion, rays, meshes, generation, found '{unknown[0]}'")
+        parser.error(f"--only: expected maps or some of fusion, rays, meshes, generation, found '{unknown[0]}'")
     methods = options.methods.split(",")
     known = [row["name"] for row in method_rows(options.new / "tsdfpp")]
     unknown = [name for name in methods if name not in known]
@@ -219,6 +260,15 @@ def main():
         for program in ("tsdfpp", "tsdfpp_bench"):
             if not (build / program).is_file():
                 parser.error(f"{build / program}: expected a program, found none")
+    if not measures:
+        with tempfile.TemporaryDirectory() as folder:
+            work = Work(options.scene, pathlib.Path(folder), methods)
+            work.prepare(options.new)
+            table, different = compare_maps(builds, work, options.until)
+        write(table, options.out, "maps.md")
+        if different:
+            print(f"other meshes than before: {', '.join(different)}")
+        return 1 if different else 0
     ratios = {}
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
@@ -242,13 +292,7 @@ def main():
         lines.append(f"| {name} | {len(ratios[name])} | {median:.3f} | {low:.3f} to {high:.3f} |")
         if high > LIMIT:
             slower.append(name)
-    table = "\n".join(lines)
-    print(table)
-    if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)
-        part = options.out / "turns.md.part"
-        part.write_text(table + "\n", encoding="utf-8")
-        part.replace(options.out / "turns.md")
+    write("\n".join(lines), options.out, "turns.md")
     if slower:
         print(f"upper bound above {LIMIT}: {', '.join(slower)}")
         return 1
