@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "bench/camera.h"
 #include "bench/figures.h"
 #include "bench/mesh.h"
 #include "bench/rays.h"
@@ -163,6 +164,25 @@ void AddTrack(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunTrackBench(*options); }; });
 }
 
+void AddCamera(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<CameraBenchOptions>();
+  CLI::App* command =
+      app.add_subcommand("camera", "How well the camera is found by the background, as CSV");
+  command->add_option("--out", options->out, "Output folder")->required();
+  command->add_option("--scenes", options->scenes, "Scene files")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--recording", options->recording, "Folder of a sequence, or ''")
+      ->capture_default_str();
+  command->add_option("--method", options->method, "The map")->capture_default_str();
+  command->add_option("--voxels", options->voxels_m, "Voxel sizes, metres")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--track-config", options->settings, "Settings of the tracker, TOML");
+  AddCount(command, "--until", options->until, "The last frame", 1, 100000);
+  command->callback([=, &chosen] { chosen = [=] { return RunCameraBench(*options); }; });
+}
+
 void AddReleased(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<ReleasedOptions>();
   CLI::App* command = app.add_subcommand("released", "What docs/released.md shows, as CSV");
@@ -215,6 +235,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddReleased(app, chosen);
   tsdfpp::AddSegment(app, chosen);
   tsdfpp::AddTrack(app, chosen);
+  tsdfpp::AddCamera(app, chosen);
   tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {

@@ -24,6 +24,7 @@ struct CompareArguments {
   std::string methods =
       "tsdf/static,tsdf,tsdf/guarded,tsdf++/literal,tsdf++,tsdf++/anchored,volumes";
   std::string profiles = "paper,close";
+  std::string camera = "gt";
   std::string poses;
   std::string associate;
   std::vector<std::string> adapters;
@@ -113,6 +114,7 @@ Expected<void> ReadPoses(const std::string& names, CompareConfig& config) {
     TSDFPP_ASSIGN(const PoseSource poses, PoseSourceFromName(name));
     for (const Method method : config.methods) {
       TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
+      TSDFPP_RETURN_IF_ERROR(CheckCamera(method, config.camera));
     }
     config.poses.push_back(poses);
   }
@@ -155,6 +157,9 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
       config.record ? " --record" : "");
   if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
   if (!options.removed.empty()) command += " --removed " + options.removed;
+  if (config.camera != CameraSource::kGiven) {
+    command += fmt::format(" --camera {}", CameraSourceName(config.camera));
+  }
   if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   return command;
@@ -198,6 +203,7 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
     TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
   }
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
+  TSDFPP_ASSIGN(config.camera, CameraSourceFromName(options.camera));
   const std::string pose_names = PoseNames(options, config, *opened.source);
   TSDFPP_RETURN_IF_ERROR(ReadPoses(pose_names, config));
   TSDFPP_RETURN_IF_ERROR(CheckLists(options, pose_names, config));
@@ -231,6 +237,11 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own and matched to the truth's by overlap, each once); by "
                  "default given unless ids are drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
+  app.add_option("--camera", options->camera,
+                 "Camera poses of our maps: gt (given), refine (given and then corrected by the "
+                 "map's background), track (the first one given, the others found by it)")
+      ->check(OneOf({"gt", "refine", "track"}))
+      ->capture_default_str();
   app.add_option(
          "--poses", options->poses,
          std::string("Object poses: gt (given), icp or track (tracked, docs/tracking.md); ") +

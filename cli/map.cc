@@ -28,6 +28,7 @@ struct MapArguments {
   std::string method = "tsdf++/anchored";
   std::string segmentation;
   std::string associate;
+  std::string camera = "gt";
   std::string poses;
   std::string track = "auto";
   std::string track_config;
@@ -84,6 +85,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   if (!options.poses.empty()) {
     TSDFPP_ASSIGN(wishes.poses, PoseSourceFromName(options.poses));
   }
+  TSDFPP_ASSIGN(wishes.camera, CameraSourceFromName(options.camera));
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -193,7 +195,8 @@ Expected<MappedFrames> MapFrames(const MapStart& start) {
     TSDFPP_ASSIGN(const Frame frame, ReadToMap(start, index));
     TSDFPP_ASSIGN(const StepTimes step, start.pipeline->Process(frame));
     mapped.times.Add(step);
-    mapped.T_WC = frame.T_WC;
+    const auto& located = start.pipeline->camera_log().T_WC;
+    mapped.T_WC = located.empty() ? frame.T_WC : located.rbegin()->second;
     bar.Show(index - start.first + 1, start.frames());
   }
   return mapped;
@@ -289,6 +292,11 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own; poses are then tracked); by default given unless ids are "
                  "drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
+  app.add_option("--camera", options->camera,
+                 "Camera poses: gt (given), refine (given and then corrected by the map's "
+                 "background), track (the first one given, the others found by it)")
+      ->check(OneOf({"gt", "refine", "track"}))
+      ->capture_default_str();
   app.add_option("--poses", options->poses,
                  std::string("Object poses: gt (given), icp (tracked as in the paper), track "
                              "(tracked by signed distances, docs/tracking.md); ") +
@@ -300,7 +308,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
       ->check(OneOf({"auto", "classified", "all"}))
       ->capture_default_str();
   app.add_option("--track-config", options->track_config,
-                 "Settings of --poses track, a TOML file (docs/tracking.md)")
+                 "Settings of --poses track and --camera, a TOML file (docs/tracking.md)")
       ->check(NotEmpty("a file"));
   app.add_option("--profile", options->profile,
                  "Truncation: paper (10 voxels in front, 10 behind) or close (10, 3)")

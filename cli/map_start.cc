@@ -72,12 +72,13 @@ Expected<void> ChoosePoses(MapStart& start, const MapWishes& wishes) {
 // What is tracked, and how.
 Expected<void> ChooseTracking(MapStart& start, const TrackWishes& wishes) {
   const PoseSource poses = start.config.poses;
+  const bool camera_is_given = start.config.camera == CameraSource::kGiven;
   if (poses == PoseSource::kGiven && wishes.tracked != TrackChoice::kAuto) {
     return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
                       TrackChoiceName(wishes.tracked));
   }
-  if (poses != PoseSource::kTrack && wishes.config) {
-    return UsageError("--track-config needs --poses track");
+  if (poses != PoseSource::kTrack && camera_is_given && wishes.config) {
+    return UsageError("--track-config needs --poses track, or --camera refine or track");
   }
   start.config.tracked = wishes.tracked;
   if (wishes.config) start.config.track = *wishes.config;
@@ -109,6 +110,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
   TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
   TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
+  start.config.camera = wishes.camera;
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   TSDFPP_RETURN_IF_ERROR(start.config.Validate());
   start.first = start.info.first_index;
@@ -143,6 +145,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   if (poses) start.config.poses = *poses;
   const auto fits = poses ? start.config.Validate() : tl::unexpected(poses.error());
   if (!fits) return DataError("{}: its run cannot go on: {}", file, fits.error().message);
+  start.config.camera = wishes.camera;
+  TSDFPP_RETURN_IF_ERROR(CheckCamera(start.config.method, wishes.camera));
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   const bool votes = start.by_votes();
   start.info.name = run.sequence;
@@ -170,6 +174,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   } else if (wishes.track.tracked != TrackChoice::kAuto || wishes.track.config) {
     return UsageError("{} needs a sequence to map",
                       wishes.track.config ? "--track-config" : "--track");
+  } else if (wishes.camera != CameraSource::kGiven) {
+    return UsageError("--camera {} needs a sequence to map", CameraSourceName(wishes.camera));
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(

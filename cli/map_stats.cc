@@ -35,6 +35,7 @@ nlohmann::json StatsOf(const MapStart& start, const RunTimes& times,
   const PipelineConfig& config = start.config;
   nlohmann::json stats{
       {"method", MethodName(config.method)},
+      {"camera", CameraSourceName(config.camera)},
       {"poses", PoseSourceName(config.poses)},
       {"segmentation", SegmentationName(config.segmentation)},
       {"associate", AssociationModeName(config.associate)},
@@ -50,6 +51,11 @@ nlohmann::json StatsOf(const MapStart& start, const RunTimes& times,
       {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
   };
   if (config.poses != PoseSource::kGiven) stats["tracking"] = TrackingJson(start);
+  if (config.camera != CameraSource::kGiven) {
+    const CameraLog& log = start.pipeline->camera_log();
+    stats["camera_frames"] = {
+        {"located", log.located}, {"carried_on", log.carried_on}, {"lost", log.lost}};
+  }
   if (!start.mask_remark.empty()) stats["remarks"] = {start.mask_remark};
   for (const std::string& remark : start.pipeline->Remarks()) stats["remarks"].push_back(remark);
   return stats;

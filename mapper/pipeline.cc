@@ -9,6 +9,7 @@
 #include "mapper/associate/given_ids.h"
 #include "mapper/associate/voxel_votes.h"
 #include "mapper/map_reach.h"
+#include "mapper/track/camera_tracker.h"
 #include "mapper/track/frozen_pixels.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/pcl_icp.h"
@@ -76,6 +77,7 @@ Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(icp.Validate());
   TSDFPP_RETURN_IF_ERROR(track.Validate());
   TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
+  TSDFPP_RETURN_IF_ERROR(CheckCamera(method, camera));
   if (associate == AssociationMode::kVotes && !InfoOf(method).has_voxels) {
     return UsageError(
         "association by votes asks a map for its voxels, which method '{}' has not, expected given "
@@ -103,6 +105,7 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
                    const std::vector<ObjectInfo>& born)
     : config_(config),
       segmenter_(MakeSegmenter(config.segmentation, objects)),
+      camera_(std::make_unique<CameraTracker>(config.camera, config.track)),
       associator_(MakeAssociator(config, born, trajectories)),
       tracker_(MakeTracker(config)),
       map_(std::move(map)),
@@ -115,14 +118,34 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
   }
 }
 
-Expected<StepTimes> Pipeline::Process(const Frame& frame) {
+Pipeline::~Pipeline() = default;
+Pipeline::Pipeline(Pipeline&&) noexcept = default;
+Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
+
+const CameraLog& Pipeline::camera_log() const { return camera_->log(); }
+
+Expected<StepTimes> Pipeline::Process(const Frame& given) {
   StepTimes times;
   StopWatch watch;
-  TSDFPP_ASSIGN(const Segments segments, segmenter_->Segment(frame));
-  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
+  TSDFPP_ASSIGN(const Segments segments, segmenter_->Segment(given));
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(given, segments.ids));
   times.segment_s = watch.Lap();
-  const AssociatedObjects association = associator_->Associate(frame, segments, *map_);
+  const std::optional<Frame> frame = camera_->Locate(given, segments.ids, *map_);
+  times.locate_s = watch.Lap();
+  if (!frame) return times;
+  const AssociatedObjects association = associator_->Associate(*frame, segments, *map_);
   times.associate_s = watch.Lap();
+  TSDFPP_ASSIGN(TrackedFrame tracked, Track(*frame, association));
+  times.track_s = watch.Lap();
+  UpdatePoses(frame->index, std::move(tracked.T_WO));
+  times.update_poses_s = watch.Lap();
+  Fuse(*frame, tracked.labels);
+  times.fuse_s = watch.Lap();
+  return times;
+}
+
+Expected<Pipeline::TrackedFrame> Pipeline::Track(const Frame& frame,
+                                                 const AssociatedObjects& association) {
   TrackedObjects chosen = tracked_;
   for (const auto& [id, name] : association.classes) chosen.Learn(id, name);
   TrackedPoses tracked = tracker_->Track(frame, chosen.Select(association.labels), *map_, T_WO_);
@@ -130,16 +153,8 @@ Expected<StepTimes> Pipeline::Process(const Frame& frame) {
   TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, tracked.T_WO));
   associator_->Accept();
   tracked_ = std::move(chosen);
-  times.track_s = watch.Lap();
   if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);
-  UpdatePoses(frame.index, std::move(tracked.T_WO));
-  times.update_poses_s = watch.Lap();
-  map_->Fuse(frame, labels);
-  times.fuse_s = watch.Lap();
-  CountWhileEmpty(frame, labels);
-  labels_ = labels;
-  farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
-  return times;
+  return TrackedFrame{std::move(tracked.T_WO), labels};
 }
 
 void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
@@ -148,6 +163,13 @@ void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
     map_->SetObjectPose(id, pose);
     trajectories_[id][frame] = pose;
   }
+}
+
+void Pipeline::Fuse(const Frame& frame, const cv::Mat& labels) {
+  map_->Fuse(frame, labels);
+  CountWhileEmpty(frame, labels);
+  labels_ = labels;
+  farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
 }
 
 void Pipeline::CountWhileEmpty(const Frame& frame, const cv::Mat& labels) {
@@ -175,6 +197,15 @@ std::vector<std::string> Pipeline::Remarks() const {
         seen == 0 ? fmt::format("no frame shows an object {}", which)
                   : fmt::format("frames show {} objects {}, of which none could be registered",
                                 seen, which)));
+  }
+  const CameraLog& camera = camera_->log();
+  if (camera.lost > 0 || camera.carried_on > 0) {
+    remarks.push_back(fmt::format(
+        "the camera was not found in {} of {} frames, which are {} (--camera {})",
+        camera.lost + camera.carried_on, camera.lost + camera.carried_on + camera.located,
+        config_.camera == CameraSource::kTrack ? "not mapped"
+                                               : "mapped by its given motion since the last",
+        CameraSourceName(config_.camera)));
   }
   for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;

@@ -1,6 +1,7 @@
 // The mapping pipeline, a frame at a time (paper section III): segment, associate, track, update
 // poses, fuse. Each verb but the last two, which are the map's own, is an object behind an
-// interface with one function that does it; PipelineConfig says which.
+// interface with one function that does it; PipelineConfig says which. Where camera poses are not
+// given (the paper's are), the camera is located between the first two.
 #pragma once
 
 #include <map>
@@ -13,6 +14,7 @@
 #include "mapper/frame_counts.h"
 #include "mapper/map_representation.h"
 #include "mapper/segment/segmenter.h"
+#include "mapper/track/camera_source.h"
 #include "mapper/track/icp_registration.h"
 #include "mapper/track/sdf_track_config.h"
 #include "mapper/track/track_log.h"
@@ -21,6 +23,8 @@
 
 namespace tsdfpp {
 
+class CameraTracker;
+
 // All that a pipeline is told.
 struct PipelineConfig {
   Method method = Method::kTsdfpp;
@@ -28,10 +32,11 @@ struct PipelineConfig {
   Segmentation segmentation = Segmentation::kGiven;
   AssociationMode associate = AssociationMode::kGiven;
   VoteConfig votes{};
+  CameraSource camera = CameraSource::kGiven;
   PoseSource poses = PoseSource::kGiven;
   TrackChoice tracked = TrackChoice::kAuto;  // which objects, where poses are not given
   IcpConfig icp{};
-  SdfTrackConfig track{};
+  SdfTrackConfig track{};  // of the camera, too
 
   // Errors: kUsage where a part is wrong, or given poses, which are those of given ids, are to go
   // with association by votes.
@@ -41,11 +46,14 @@ struct PipelineConfig {
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
   double segment_s = 0;       // paper III-B; 0 with given masks
+  double locate_s = 0;        // the camera; 0 with given poses of it
   double associate_s = 0;     // paper III-C: votes; 0 with given ids
   double track_s = 0;         // paper III-D: objects' meshes, ICP; 0 with given poses
   double update_poses_s = 0;  // paper III-E
   double fuse_s = 0;          // paper III-F
-  double Total_s() const { return segment_s + associate_s + track_s + update_poses_s + fuse_s; }
+  double Total_s() const {
+    return segment_s + locate_s + associate_s + track_s + update_poses_s + fuse_s;
+  }
 };
 
 // The name of an object that nobody named: "background", or "object" and its id.
@@ -63,10 +71,13 @@ class Pipeline {
            std::unique_ptr<MapRepresentation> map,
            std::map<InstanceId, std::map<int, Pose>> trajectories,
            const std::vector<ObjectInfo>& born = {});
+  ~Pipeline();
+  Pipeline(Pipeline&&) noexcept;
+  Pipeline& operator=(Pipeline&&) noexcept;
 
-  // Maps one frame. Errors: kData, a sentence that begins with the frame's number, where it is no
-  // frame (its mask is missing, say) or something lies beyond the map's range (mapper/map_reach.h);
-  // the map is then as it was.
+  // Maps one frame; not where its camera is lost. Errors: kData, a sentence that begins with the
+  // frame's number, where it is no frame (its mask is missing, say) or something lies beyond the
+  // map's range (mapper/map_reach.h); the map is then as it was.
   Expected<StepTimes> Process(const Frame& frame);
 
   const MapRepresentation& map() const { return *map_; }
@@ -93,17 +104,29 @@ class Pipeline {
   // What was tracked, and when; empty with given poses.
   const TrackLog& track_log() const { return track_log_; }
 
+  // Where the camera was; empty with given poses of it.
+  const CameraLog& camera_log() const;
+
   // Which objects are tracked where poses are not given.
   const TrackedObjects& tracked() const { return tracked_; }
 
  private:
+  // Where the objects are after a frame, and which of its pixels may be fused into which of them.
+  struct TrackedFrame {
+    ObjectPoses T_WO;
+    cv::Mat labels;
+  };
+  // Nothing of the frame counts before the map is known to take it. Errors: those of CheckReach.
+  Expected<TrackedFrame> Track(const Frame& frame, const AssociatedObjects& association);
   // Moves the objects to where they are after the frame, and writes it down.
   void UpdatePoses(int frame, ObjectPoses T_WO);
+  void Fuse(const Frame& frame, const cv::Mat& labels);
   // Looks at the pixels only while the map is empty.
   void CountWhileEmpty(const Frame& frame, const cv::Mat& labels);
 
   PipelineConfig config_;
   std::unique_ptr<Segmenter> segmenter_;
+  std::unique_ptr<CameraTracker> camera_;
   std::unique_ptr<Associator> associator_;
   std::unique_ptr<Tracker> tracker_;
   std::unique_ptr<MapRepresentation> map_;

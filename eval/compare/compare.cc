@@ -68,6 +68,7 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
         PipelineConfig pipeline{.method = method,
                                 .map = config.map,
                                 .associate = AssociationOf(config, info),
+                                .camera = config.camera,
                                 .poses = poses,
                                 .icp = config.icp};
         TSDFPP_RETURN_IF_ERROR(pipeline.map.SetProfile(profile));
@@ -227,7 +228,7 @@ class FrameWalk {
       }
       const Frame& frame = frames->given;
       const Frame& true_frame = frames->true_frame ? *frames->true_frame : frame;
-      camera_[index] = true_frame.T_WC;
+      result_.camera[index] = true_frame.T_WC;
       if (recorder_) recorder_->SeeFrame(true_frame);
       MapFrame(frame, true_frame.mask);
       if (IsEvaluated(result_, index)) EvaluateAdapters(frame);
@@ -240,7 +241,7 @@ class FrameWalk {
   // Scores the adapters' trajectories and writes figures and recording.
   Expected<void> Finish() {
     for (const auto& run : result_.adapters) {
-      ScoreAdapterTrajectories(*run, names_, *result_.truth, camera_);
+      ScoreAdapterTrajectories(*run, names_, *result_.truth, result_.camera);
     }
     // Figures and the recording are of all frames that were planned, or not at all.
     if (result_.stopped) return {};
@@ -348,7 +349,6 @@ class FrameWalk {
   PictureMaker pictures_;
   std::optional<ReportRecorder> recorder_;
   std::vector<ObjectInfo> names_;
-  Trajectory camera_;
 };
 
 }  // namespace

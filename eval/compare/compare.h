@@ -20,6 +20,7 @@ struct CompareConfig {
   std::vector<std::string> profiles{"paper", "close"};
   // Nothing: votes, unless the masks' ids are the truth's.
   std::optional<AssociationMode> associate;
+  CameraSource camera = CameraSource::kGiven;
   std::vector<PoseSource> poses{PoseSource::kGiven};
   MapConfig map;  // truncation is the profile's
   IcpConfig icp;
@@ -83,6 +84,7 @@ struct CompareResult {
   std::optional<int> reveal_frame;
   std::set<InstanceId> movers;
   std::unique_ptr<SceneTruth> truth;              // as at the last frame
+  Trajectory camera;                              // true, by frame
   std::vector<std::unique_ptr<CompareRun>> runs;  // that were finished
   std::vector<FailedRun> failed;
   // Why the frames ended before `last_frame` of the plan; results are those until then.

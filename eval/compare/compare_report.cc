@@ -1,6 +1,7 @@
 #include "eval/compare/compare_report.h"
 
 #include <algorithm>
+#include <numbers>
 #include <thread>
 
 #include "core/files.h"
@@ -57,6 +58,24 @@ nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& 
   return differences;
 }
 
+// Where the camera was found, beside where it was; nothing is aligned.
+nlohmann::json CameraJson(const CompareResult& result, const CompareRun& run) {
+  nlohmann::json camera{{"source", CameraSourceName(run.config.camera)}};
+  if (run.config.camera == CameraSource::kGiven) return camera;
+  const CameraLog& log = run.pipeline.camera_log();
+  camera["located"] = log.located;
+  camera["carried_on"] = log.carried_on;
+  camera["lost"] = log.lost;
+  const PosePairs pairs = PairByFrame(log.T_WC, result.camera);
+  if (const auto errors = SummariseErrors(TranslationErrors_m(pairs))) {
+    camera["translation_rmse_m"] = errors->rmse;
+  }
+  if (const auto errors = SummariseErrors(RotationErrors_rad(pairs))) {
+    camera["rotation_rmse_deg"] = errors->rmse * 180 / std::numbers::pi;
+  }
+  return camera;
+}
+
 nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run) {
   nlohmann::json trajectories;
   for (const InstanceId id : result.movers) {
@@ -84,6 +103,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"folder", run.FolderName()},
           {"method", MethodName(run.config.method)},
           {"profile", run.profile},
+          {"camera", CameraJson(result, run)},
           {"poses", PoseSourceName(run.config.poses)},
           {"associate", AssociationModeName(run.config.associate)},
           {"settings",

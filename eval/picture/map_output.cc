@@ -23,10 +23,19 @@ nlohmann::json Spread(std::vector<double> seconds) {
   return {{"median_ms", quantile(0.5)}, {"p99_ms", quantile(0.99)}, {"worst_ms", quantile(1.0)}};
 }
 
+std::string TextOf(const std::map<int, Pose>& trajectory, std::string_view frames) {
+  std::string text = fmt::format("# frame tx ty tz qx qy qz qw ({}, metres)\n", frames);
+  for (const auto& [frame, pose] : trajectory) {
+    text += fmt::format("{} {}\n", frame, PoseToText(pose));
+  }
+  return text;
+}
+
 }  // namespace
 
 void RunTimes::Add(const StepTimes& step) {
   segment_s.push_back(step.segment_s);
+  locate_s.push_back(step.locate_s);
   associate_s.push_back(step.associate_s);
   track_s.push_back(step.track_s);
   update_poses_s.push_back(step.update_poses_s);
@@ -34,9 +43,13 @@ void RunTimes::Add(const StepTimes& step) {
 }
 
 nlohmann::json RunTimes::ToJson() const {
-  return {{"segment", Spread(segment_s)}, {"associate", Spread(associate_s)},
-          {"track", Spread(track_s)},     {"update_poses", Spread(update_poses_s)},
-          {"fuse", Spread(fuse_s)},       {"mesh_scene", Spread(mesh_s)}};
+  return {{"segment", Spread(segment_s)},
+          {"locate", Spread(locate_s)},
+          {"associate", Spread(associate_s)},
+          {"track", Spread(track_s)},
+          {"update_poses", Spread(update_poses_s)},
+          {"fuse", Spread(fuse_s)},
+          {"mesh_scene", Spread(mesh_s)}};
 }
 
 Expected<MeshFormat> MeshFormatFromName(std::string_view name) {
@@ -65,11 +78,12 @@ Expected<void> WriteMap(const MapRepresentation& map, const Pipeline& pipeline,
     }
     const auto trajectory = pipeline.trajectories().find(object.id);
     if (trajectory == pipeline.trajectories().end()) continue;
-    std::string text = "# frame tx ty tz qx qy qz qw (T_world_object, metres)\n";
-    for (const auto& [frame, T_WO] : trajectory->second) {
-      text += fmt::format("{} {}\n", frame, PoseToText(T_WO));
-    }
-    TSDFPP_RETURN_IF_ERROR(WriteFile(out / "trajectories" / (FileStem(object) + ".txt"), text));
+    TSDFPP_RETURN_IF_ERROR(WriteFile(out / "trajectories" / (FileStem(object) + ".txt"),
+                                     TextOf(trajectory->second, "T_world_object")));
+  }
+  if (const auto& T_WC = pipeline.camera_log().T_WC; !T_WC.empty()) {
+    TSDFPP_RETURN_IF_ERROR(
+        WriteFile(out / "trajectories" / "camera.txt", TextOf(T_WC, "T_world_camera")));
   }
   if (!glb) return WritePly(out / "mesh" / "scene.ply", mesher.SceneMesh(map));
   const auto name_of = [&](InstanceId id) {

@@ -13,6 +13,7 @@ namespace tsdfpp {
 // Times of the steps over the frames of a run, for its statistics.
 struct RunTimes {
   std::vector<double> segment_s;
+  std::vector<double> locate_s;
   std::vector<double> associate_s;
   std::vector<double> track_s;
   std::vector<double> update_poses_s;
@@ -29,7 +30,8 @@ enum class MeshFormat { kPly, kGlb };
 // "ply" or "glb". Errors: kUsage.
 Expected<MeshFormat> MeshFormatFromName(std::string_view name);
 
-// mesh/<name>-<id>.ply for each object, mesh/scene.ply, trajectories/<name>-<id>.txt below `out`;
+// mesh/<name>-<id>.ply for each object, mesh/scene.ply, trajectories/<name>-<id>.txt and, where its
+// poses were not given, the camera's trajectories/camera.txt below `out`;
 // as .glb files (core/gltf.h), a node an object in the scene's, where that is the format.
 // `map` is the map after removals, `pipeline` the run that it comes from.
 // Errors: kEnvironment where the disk refuses.

@@ -109,6 +109,15 @@ class Neighbourhood {
   std::array<float, 3> fraction_{};
 };
 
+// Of sizes of errors; 0 of none.
+double RobustDeviation(std::vector<float> sizes) {
+  constexpr double kNormalMedian = 1.4826;
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return kNormalMedian * static_cast<double>(*middle);
+}
+
 }  // namespace
 
 SurfaceReader::SurfaceReader(const TsdfGrid& grid, double voxel_m)
@@ -178,8 +187,7 @@ double DistanceTerm::WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_
   const double least_variance = model_m * model_m + config_.axial_m * config_.axial_m;
   const Eigen::Vector3d n = at.normal_L().cast<double>();
   const double cosine = std::min(1.0, std::abs(n.dot(y - camera_L)) / p_C.norm());
-  const double off = p_C.z() - 0.4;
-  const double axial = (config_.axial_m + config_.axial_growth * off * off) * cosine;
+  const double axial = config_.Axial_m(p_C.z()) * cosine;
   const double lateral_squared =
       lateral_per_m_ * lateral_per_m_ * p_C.z() * p_C.z() * (1 - cosine * cosine);
   const double variance = model_m * model_m + axial * axial + lateral_squared;
@@ -268,29 +276,49 @@ NormalEquations DistanceTerm::Sums(const Pose& T_LC) const {
 }
 
 DistanceCounts DistanceTerm::Count(const Pose& T_LC) const {
+  constexpr double kNoise = 3;  // deviations
+  struct Found {
+    bool is_observed = false;
+    bool is_inlier = false;
+    float size_m = -1;  // below 0 where there is no distance
+  };
+  const double inlier_m = config_.inlier_voxels * voxel_m_;
+  std::vector<Found> found(Taken());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, found.size(), kPointsPerTask),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t k = range.begin(); k != range.end(); ++k) {
+          const std::size_t i = k * stride_;
+          const SurfaceSample at = SampleAt(T_LC, i);
+          found[k].is_observed = at.is_observed;
+          if (!at.has_slope) continue;
+          found[k].size_m = std::abs(at.distance_m());
+          const double noise_m = config_.Axial_m(points_[i].p_C.z());
+          found[k].is_inlier = found[k].size_m < inlier_m + kNoise * noise_m;
+        }
+      },
+      tbb::simple_partitioner());
   DistanceCounts counts;
-  const auto inlier_m = static_cast<float>(config_.inlier_voxels * voxel_m_);
-  for (std::size_t i = 0; i < points_.size(); i += stride_) {
-    const SurfaceSample at = SampleAt(T_LC, i);
+  std::vector<float> sizes;
+  sizes.reserve(found.size());
+  for (const Found& of : found) {
     ++counts.points;
-    counts.observed += at.is_observed ? 1 : 0;
-    counts.inliers += at.has_slope && std::abs(at.distance_m()) < inlier_m ? 1 : 0;
+    counts.observed += of.is_observed ? 1 : 0;
+    counts.inliers += of.is_inlier ? 1 : 0;
+    if (of.size_m < 0) continue;
+    sizes.push_back(of.size_m);
   }
+  counts.deviation_m = RobustDeviation(std::move(sizes));
   return counts;
 }
 
-double DistanceTerm::RobustDeviation_m(const Pose& T_LC, double at_least_m) const {
-  constexpr double kNormalMedian = 1.4826;
+double DistanceTerm::KeptDeviation_m() const {
   std::vector<float> sizes;
   sizes.reserve(Taken());
-  for (std::size_t i = 0; i < points_.size(); i += stride_) {
-    const SurfaceSample at = SampleAt(T_LC, i);
-    if (at.has_slope) sizes.push_back(std::abs(at.distance_m()));
+  for (std::size_t i = 0; i < kept_.size(); i += stride_) {
+    if (kept_[i].per_slope > 0) sizes.push_back(std::abs(kept_[i].distance_m));
   }
-  if (sizes.empty()) return at_least_m;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return std::max(at_least_m, kNormalMedian * static_cast<double>(*middle));
+  return RobustDeviation(std::move(sizes));
 }
 
 }  // namespace tsdfpp

@@ -56,6 +56,9 @@ struct DistanceCounts {
   int points = 0;
   int observed = 0;  // with eight observed voxels around them
   int inliers = 0;   // of these, nearer to the surface than inlier_voxels
+  // 1.4826 times the median of the absolute distances to the surface, metres; 0 where there are
+  // none.
+  double deviation_m = 0;
 };
 
 class DistanceTerm {
@@ -81,11 +84,11 @@ class DistanceTerm {
   // In parallel, in fixed chunks.
   NormalEquations Sums(const Pose& T_LC) const;
 
+  // In parallel.
   DistanceCounts Count(const Pose& T_LC) const;
 
-  // 1.4826 times the median of the absolute residuals, metres; `at_least_m` where there are none
-  // or it is smaller.
-  double RobustDeviation_m(const Pose& T_LC, double at_least_m) const;
+  // The deviation of DistanceCounts where the points were kept.
+  double KeptDeviation_m() const;
 
  private:
   std::size_t Taken() const { return (points_.size() + stride_ - 1) / stride_; }

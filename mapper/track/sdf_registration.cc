@@ -93,29 +93,41 @@ struct FineFit {
   LeastSquaresResult found;
 };
 
-// Of the fine search.
-constexpr int kFinePasses = 3;
+// Of the fine search: with a share of the points, and then with all of them, or with all alone.
+constexpr int kMiddlePasses = 2;
+constexpr int kLastPasses = 1;
+constexpr int kPassesOfAll = kMiddlePasses + kLastPasses;
 
-// All points, with as narrow a Huber function as the residuals ask for.
-FineFit RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
-                       const LeastSquaresOptions& options, DistanceTerm& fine,
-                       SdfRegistrationResult& result) {
+// With as narrow a Huber function as the residuals ask for.
+FineFit RunPasses(const SdfRegistration& task, const SdfTrackConfig& config,
+                  const LeastSquaresOptions& options, int passes, DistanceTerm& term,
+                  SdfRegistrationResult& result) {
   FineFit fit;
-  for (int pass = 0; pass < kFinePasses; ++pass) {
-    fine.KeepAt(result.T_LC);
+  for (int pass = 0; pass < passes; ++pass) {
+    term.KeepAt(result.T_LC);
     const double deviation_m =
-        fine.RobustDeviation_m(result.T_LC, kLeastDeviation_voxels * task.voxel_m);
-    fine.SetHuber(
+        std::max(term.KeptDeviation_m(), kLeastDeviation_voxels * task.voxel_m);
+    term.SetHuber(
         std::min(config.huber_voxels * task.voxel_m, config.huber_deviations * deviation_m));
     if (pass == 0) {
-      fit.prior = PriorFor(fine.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
+      fit.prior = PriorFor(term.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
     }
-    fit.found = MinimiseOverPose([&](const Pose& T) { return fine.Sums(T); }, result.T_LC,
+    fit.found = MinimiseOverPose([&](const Pose& T) { return term.Sums(T); }, result.T_LC,
                                  result.frame, fit.prior, options);
     result.iterations += fit.found.iterations;
     result.T_LC = fit.found.T;
   }
   return fit;
+}
+
+FineFit RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
+                       const LeastSquaresOptions& options, DistanceTerm& all,
+                       SdfRegistrationResult& result) {
+  const std::size_t stride = task.points.size() / static_cast<std::size_t>(config.middle_points);
+  if (stride < 2) return RunPasses(task, config, options, kPassesOfAll, all, result);
+  DistanceTerm some = TermOf(task, result.frame, config, stride);
+  RunPasses(task, config, options, kMiddlePasses, some, result);
+  return RunPasses(task, config, options, kLastPasses, all, result);
 }
 
 }  // namespace
@@ -154,12 +166,11 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   // Where no point has a distance there is nothing to be at rest on.
   result.converged = found.converged && found.at.H.trace() > 0;
   result.counts = fine.Count(found.T);
-  result.deviation_m = fine.RobustDeviation_m(found.T, 0);
   result.information = found.at.H;
   result.known = DirectionsOf(found.at.H);
   const Matrix6 all = found.at.H + prior.P + 1e-9 * Matrix6::Identity();
-  result.covariance =
-      result.deviation_m * result.deviation_m * all.ldlt().solve(Matrix6::Identity());
+  const double deviation_m = result.counts.deviation_m;
+  result.covariance = deviation_m * deviation_m * all.ldlt().solve(Matrix6::Identity());
   return result;
 }
 

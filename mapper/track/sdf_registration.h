@@ -45,14 +45,13 @@ struct SdfRegistrationResult {
   bool converged = false;
   int iterations = 0;  // of all passes
   DistanceCounts counts;
-  double deviation_m = 0;  // robust, of the points' distances to the surface
   // What the terms know, without the expectation: over the six lengths of `frame`, in points.
   MotionFrame frame;
   Matrix6 information = Matrix6::Zero();
   // Its weak and strong directions.
   KnownDirections known;
   // Of the six lengths, square metres, if the points' errors were independent of each other and of
-  // `deviation_m`; the expectation counts in it as if it were data.
+  // the deviation in `counts`; the expectation counts in it as if it were data.
   Matrix6 covariance = Matrix6::Zero();
 };
 

@@ -26,6 +26,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("huber_voxels", huber_voxels, 0.001, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_deviations", huber_deviations, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("coarse_points", coarse_points, 10, 1000000));
+  TSDFPP_RETURN_IF_ERROR(InRange("middle_points", middle_points, 10, 1000000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_iterations", max_iterations, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("settled_voxels", settled_voxels, 1e-6, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("weak_share", weak_share, 0, 0.1));
@@ -56,6 +57,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("huber_voxels", config.huber_voxels)
       .Get("huber_deviations", config.huber_deviations)
       .Get("coarse_points", config.coarse_points)
+      .Get("middle_points", config.middle_points)
       .Get("max_iterations", config.max_iterations)
       .Get("settled_voxels", config.settled_voxels)
       .Get("weak_share", config.weak_share)
@@ -87,6 +89,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"huber_voxels", huber_voxels},
                      {"huber_deviations", huber_deviations},
                      {"coarse_points", coarse_points},
+                     {"middle_points", middle_points},
                      {"max_iterations", max_iterations},
                      {"settled_voxels", settled_voxels},
                      {"weak_share", weak_share},

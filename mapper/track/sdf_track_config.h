@@ -10,10 +10,11 @@ namespace tsdfpp {
 
 struct SdfTrackConfig {
   // The segment.
-  int mask_erosion_px = 1;     // taken off its outline, where depth is mixed
-  double max_step_voxels = 2;  // of depth to a pixel beside; more is an edge, which is left out
-  int max_points = 5000;       // more are thinned evenly
-  int min_points = 30;         // with fewer an object is neither begun nor tracked
+  int mask_erosion_px = 1;  // taken off its outline, where depth is mixed
+  // Of depth to a pixel beside, and three axial deviations; more is an edge, which is left out.
+  double max_step_voxels = 2;
+  int max_points = 5000;  // more are thinned evenly
+  int min_points = 30;    // with fewer an object is neither begun nor tracked
 
   // By what points are weighted, standard deviations: axial + axial_growth (z - 0.4)^2 along the
   // optical axis (metres, z in metres), `lateral_px` across it, as Nguyen, Izadi and Lovell 2012
@@ -23,13 +24,15 @@ struct SdfTrackConfig {
   double axial_m = 0;
   double axial_growth = 0;  // per metre
   double lateral_px = 0;
+  double Axial_m(double z_m) const { return axial_m + axial_growth * (z_m - 0.4) * (z_m - 0.4); }
   double model_voxels = 0.1;
 
   // Point to signed distance.
   bool curved = true;       // distances without their sag between voxels (SurfaceReader::SagAt)
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
-  int coarse_points = 400;        // of the first pass
+  int coarse_points = 400;        // of the first passes
+  int middle_points = 750;        // of those between; the last has all
   int max_iterations = 15;        // of each pass
   double settled_voxels = 0.002;  // settled: an iteration moves no point by more than this
 
@@ -44,9 +47,11 @@ struct SdfTrackConfig {
   int keyframe_points = 1500;
 
   // Gates; an object that fails one is frozen for the frame.
-  double inlier_voxels = 1;         // a point nearer than this to the model's surface is an inlier
-  double min_inlier_share = 0.6;    // of the points at which the model is observed
-  double min_observed_share = 0.3;  // of all points
+  // A point nearer than this to the model's surface is an inlier, and one nearer than three of its
+  // axial deviations besides.
+  double inlier_voxels = 1;
+  double min_inlier_share = 0.6;       // of the points at which the model is observed
+  double min_observed_share = 0.3;     // of all points
   double max_translation_voxels = 10;  // of the segment's centre, for each frame since the last
   double max_rotation_rad = 0.35;      // for each frame since the last
 

@@ -6,6 +6,8 @@
 namespace tsdfpp {
 namespace {
 
+constexpr double kNoise = 3;  // deviations of depth that are no step
+
 // Whether depth goes on without a step from a pixel to the four beside it.
 bool IsInside(const cv::Mat& depth, int v, int u, float max_step_m) {
   const float z = depth.at<float>(v, u);
@@ -75,11 +77,12 @@ std::map<InstanceId, std::vector<int>> PixelsByLabel(const cv::Mat& labels, int 
 std::vector<SegmentPoint> SegmentPointsOf(const Frame& frame, const std::vector<int>& pixels,
                                           double voxel_m, const SdfTrackConfig& config) {
   const int cols = frame.depth.cols;
-  const auto max_step_m = static_cast<float>(config.max_step_voxels * voxel_m);
   std::vector<cv::Point2i> inside;
   inside.reserve(pixels.size());
   for (const int pixel : pixels) {
     const cv::Point2i at(pixel % cols, pixel / cols);
+    const double noise_m = config.Axial_m(frame.depth.at<float>(at.y, at.x));
+    const auto max_step_m = static_cast<float>(config.max_step_voxels * voxel_m + kNoise * noise_m);
     if (IsInside(frame.depth, at.y, at.x, max_step_m)) inside.push_back(at);
   }
   const std::size_t count = std::min(inside.size(), static_cast<std::size_t>(config.max_points));

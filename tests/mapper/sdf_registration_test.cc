@@ -151,7 +151,8 @@ TEST(SdfRegistration, IsAsGoodAsTheNoiseBetweenRidges) {
     const auto found = RegisterToDistances(TaskFrom(model, points, kMotion), {});
     ASSERT_TRUE(found.converged) << run;
     const Vector6 off = found.frame.LengthsOf(found.T_LC * TrueLC().inverse());
-    squares.push_back(off.dot(found.information * off) / (found.deviation_m * found.deviation_m));
+    squares.push_back(off.dot(found.information * off) /
+                      (found.counts.deviation_m * found.counts.deviation_m));
   }
   std::ranges::sort(squares);
   EXPECT_LT(squares[kRuns / 2], kMostSquares);

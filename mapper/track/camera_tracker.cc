@@ -1,0 +1,87 @@
+#include "mapper/track/camera_tracker.h"
+
+#include <algorithm>
+
+namespace tsdfpp {
+namespace {
+
+// The background, as the tracker sees it: an object like any other.
+constexpr InstanceId kRoom = 1;
+
+// A room is deeper than an object, and its far side noisy: without a model of the sensor's noise,
+// what Nguyen, Izadi and Lovell 2012 measured of Kinect.
+constexpr double kAxial_m = 0.0012;
+constexpr double kAxialGrowth = 0.0019;
+constexpr double kLateral_px = 0.8;
+// What the edges of a table say of shifts along it is little, but it is known better than how a
+// hand goes on.
+constexpr double kWeakShare = 1e-4;
+// A camera that turns takes what is far off along by decimetres from frame to frame: a hand's fast
+// turn, every fourth frame of it, needs this much.
+constexpr double kHuber_voxels = 5;
+constexpr double kMaxTranslation_voxels = 60;
+constexpr int kMaxIterations = 40;
+constexpr int kCoarsePoints = 1500;
+// Over a room's radius, several times an object's.
+constexpr double kSettled_voxels = 0.02;
+
+SdfTrackConfig OfRoom(SdfTrackConfig config) {
+  config.rest_voxels = 0;
+  config.settled_voxels = std::max(config.settled_voxels, kSettled_voxels);
+  config.huber_voxels = std::max(config.huber_voxels, kHuber_voxels);
+  config.max_translation_voxels = std::max(config.max_translation_voxels, kMaxTranslation_voxels);
+  config.max_iterations = std::max(config.max_iterations, kMaxIterations);
+  config.coarse_points = std::max(config.coarse_points, kCoarsePoints);
+  config.weak_share = std::min(config.weak_share, kWeakShare);
+  if (config.axial_m == 0 && config.axial_growth == 0 && config.lateral_px == 0) {
+    config.axial_m = kAxial_m;
+    config.axial_growth = kAxialGrowth;
+    config.lateral_px = kLateral_px;
+  }
+  return config;
+}
+
+// kRoom where the segments say kBackground, else kNoInstance.
+cv::Mat RoomOf(const cv::Mat& segments) {
+  cv::Mat room(segments.size(), CV_16UC1, cv::Scalar(kNoInstance));
+  room.setTo(kRoom, segments == static_cast<double>(kBackground));
+  return room;
+}
+
+}  // namespace
+
+CameraTracker::CameraTracker(CameraSource source, const SdfTrackConfig& config)
+    : source_(source),
+      tracker_(OfRoom(config),
+               [this](const MapRepresentation& map, InstanceId) -> std::optional<ObjectModel> {
+                 auto model = ModelOf(map, kBackground);
+                 if (model) model->T_WL = T_WB_;
+                 return model;
+               }) {}
+
+std::optional<Frame> CameraTracker::Locate(const Frame& frame, const cv::Mat& segments,
+                                           const MapRepresentation& map) {
+  if (source_ == CameraSource::kGiven) return frame;
+  const bool begins = !ModelOf(map, kBackground);
+  if (begins || !T_WC_first_) T_WC_first_ = frame.T_WC;
+  Frame assumed = frame;
+  if (source_ == CameraSource::kTrack) assumed.T_WC = *T_WC_first_;
+  ObjectPoses before;
+  if (!begins) before[kRoom] = T_WB_;
+  const TrackedPoses after = tracker_.Track(assumed, RoomOf(segments), map, before);
+  const auto status = after.seen.find(kRoom);
+  if (status != after.seen.end() && status->second == TrackStatus::kTracked) {
+    T_WB_ = after.T_WO.at(kRoom);
+    ++log_.located;
+  } else if (!begins && source_ == CameraSource::kTrack) {
+    ++log_.lost;
+    return std::nullopt;
+  } else if (!begins) {
+    ++log_.carried_on;
+  }
+  assumed.T_WC = T_WB_.inverse() * assumed.T_WC;
+  log_.T_WC[frame.index] = assumed.T_WC;
+  return assumed;
+}
+
+}  // namespace tsdfpp
