@@ -33,8 +33,7 @@ std::size_t BlocksNeeded(const MapRepresentation& map, Method method) {
     }
     return BlocksOf(observed);
   }
-  // `volumes` stores no lists.
-  std::size_t blocks = method == Method::kVolumes ? 0 : BlocksOf(VoxelsOf(map).ListedVoxels());
+  std::size_t blocks = KeepsLists(method) ? BlocksOf(VoxelsOf(map).ListedVoxels()) : 0;
   for (const InstanceId id : ToyIds()) blocks += BlocksOf(VoxelsOf(map).ObservedVoxels(id));
   return blocks;
 }

@@ -247,7 +247,7 @@ TEST_P(LatticeEdge, WhatIsOutOfRangeInTheObjectsLatticeIsRefused) {
   Frame frame = DyadicFrame(7);
   const double range_m = LatticeRange(kDyadicVoxel_m).reach_m;
   frame.T_WO.at(kBall).translation().x() = range_m - 1;
-  const bool own_lattice = GetParam() == Method::kTsdfppAnchored || GetParam() == Method::kVolumes;
+  const bool own_lattice = MovesLattices(GetParam());
   ASSERT_TRUE(Check(*map, frame).has_value());
   // Born at one end of the range, now at the other: seen in the middle it is a range from its
   // birth.

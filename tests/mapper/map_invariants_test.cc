@@ -49,7 +49,7 @@ TSDFPP_FOR_EVERY_VOXEL_METHOD(Invariants);
 
 std::vector<Method> MethodsWithLists() {
   std::vector<Method> methods = VoxelMethods();
-  std::erase(methods, Method::kVolumes);
+  std::erase_if(methods, [](Method method) { return !KeepsLists(method); });
   return methods;
 }
 

@@ -46,9 +46,7 @@ std::string MethodTestName(const ::testing::TestParamInfo<Method>& info) {
       [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '_');
   return name;
 }
-INSTANTIATE_TEST_SUITE_P(Methods, ObjectMeshTest,
-                         ::testing::Values(Method::kTsdfpp, Method::kTsdfppAnchored,
-                                           Method::kTsdfppLiteral, Method::kVolumes),
+INSTANTIATE_TEST_SUITE_P(Methods, ObjectMeshTest, ::testing::ValuesIn(LayeredMethods()),
                          MethodTestName);
 INSTANTIATE_TEST_SUITE_P(Methods, EveryMesh, ::testing::ValuesIn(VoxelMethods()), MethodTestName);
 

@@ -20,11 +20,6 @@ using reference::Scene;
 
 constexpr InstanceId kNew = 7;
 
-// Whether values stay in the object's own frame.
-bool IsAnchored(Method method) {
-  return method == Method::kTsdfppAnchored || method == Method::kVolumes;
-}
-
 class MapObjects : public EveryMethodTest {};
 TSDFPP_FOR_EVERY_VOXEL_METHOD(MapObjects);
 
@@ -100,7 +95,7 @@ TEST_P(MapObjects, AnObjectThatIsAddedHasTheVolumeThatItWasGiven) {
   const auto map = DrivenMap(GetParam(), ToyConfig(), 2);
   const TsdfGrid volume = CopyVolume(*map, kBrick);
   const Pose T_WL = map->ObjectLattice(kBrick);
-  EXPECT_EQ(SameNumbers(T_WL, Pose::Identity()), !IsAnchored(GetParam()));
+  EXPECT_EQ(SameNumbers(T_WL, Pose::Identity()), !MovesLattices(GetParam()));
   const auto before = map->Clone();
   map->Remove(kBrick);
   const Pose T_WO = DriveFrame(1).T_WO.at(kBrick);
@@ -115,7 +110,7 @@ TEST_P(MapObjects, AnObjectThatIsAddedHasTheVolumeThatItWasGiven) {
   EXPECT_GT(compared, 150U);
   EXPECT_TRUE(
       SameVoxels(VoxelsOf(*map).ObservedVoxels(kNew), VoxelsOf(*before).ObservedVoxels(kBrick)));
-  if (IsAnchored(GetParam())) {
+  if (MovesLattices(GetParam())) {
     // The product of the poses is rounded.
     EXPECT_LT((map->ObjectLattice(kNew).matrix() - T_WL.matrix()).cwiseAbs().maxCoeff(), 1e-14);
   } else if (!IsOneField(GetParam())) {

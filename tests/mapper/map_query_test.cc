@@ -21,10 +21,7 @@ TSDFPP_FOR_EVERY_VOXEL_METHOD(Query);
 
 // Those with a volume an object.
 class LayeredQuery : public EveryMethodTest {};
-INSTANTIATE_TEST_SUITE_P(Methods, LayeredQuery,
-                         ::testing::Values(Method::kTsdfpp, Method::kTsdfppLiteral,
-                                           Method::kTsdfppAnchored, Method::kVolumes),
-                         [](const auto& tested) { return MethodTestName(tested.param); });
+TSDFPP_FOR_METHODS(LayeredQuery, LayeredMethods());
 
 // A camera above the plane z = height that looks straight down.
 Pose FromAbove(double height_m) {

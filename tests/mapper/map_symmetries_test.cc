@@ -17,10 +17,6 @@ namespace {
 
 using reference::MakePose;
 
-bool KeepsLattices(Method method) {
-  return method == Method::kTsdfppAnchored || method == Method::kVolumes;
-}
-
 class MapSymmetries : public EveryMethodTest {};
 TSDFPP_FOR_EVERY_VOXEL_METHOD(MapSymmetries);
 
@@ -175,7 +171,7 @@ TEST_P(MapSymmetries, APoseThatComesBackLeavesTheSameBytes) {
   EXPECT_FALSE(MapToBytes(*map).value() == file);
   for (const InstanceId id : {kBrick, kTray}) map->SetObjectPose(id, last.T_WO.at(id));
   // Where values move, each move loses some; where poses move nothing, none does.
-  const bool same = KeepsLattices(GetParam()) || GetParam() == Method::kTsdfStatic;
+  const bool same = MovesLattices(GetParam()) || GetParam() == Method::kTsdfStatic;
   EXPECT_EQ(MapToBytes(*map).value() == file, same);
   EXPECT_EQ(SnapshotOf(*map, ToyIds()) == seen, same);
 }
@@ -213,7 +209,7 @@ TEST_P(MapSymmetries, FramesInAnotherOrderAreTheSameMean) {
     const Difference difference =
         DifferenceOf(*maps[0], *maps[k], Eigen::Vector3i::Zero(), kOrderBound_voxels);
     EXPECT_GT(difference.voxels, 5000U);
-    if (GetParam() == Method::kTsdfpp || KeepsLattices(GetParam())) {
+    if (GetParam() == Method::kTsdfpp || MovesLattices(GetParam())) {
       EXPECT_EQ(difference.other, 0U) << k;
     } else {
       EXPECT_LT(difference.share(), kVoteShare) << k;

@@ -20,6 +20,22 @@ inline std::vector<Method> VoxelMethods() {
   return methods;
 }
 
+// Those whose maps have a volume an object.
+inline std::vector<Method> LayeredMethods() {
+  std::vector<Method> methods = VoxelMethods();
+  std::erase_if(methods, IsOneField);
+  return methods;
+}
+
+// Whether values stay in the object's own lattice, and that moves.
+inline bool MovesLattices(Method method) {
+  const MethodInfo& info = InfoOf(method);
+  return info.has_voxels && !info.one_field && !info.moves_values;
+}
+
+// Whether the map keeps an index; `volumes` asks each volume. The row does not say.
+inline bool KeepsLists(Method method) { return method != Method::kVolumes; }
+
 inline std::string MethodTestName(Method method) {
   std::string name(MethodName(method));
   for (char& c : name) {
