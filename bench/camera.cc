@@ -71,7 +71,10 @@ std::vector<CameraRun> RunsOf(const Stretch& stretch, const CameraPlan& plan) {
     config.segmentation = stretch.segmentation;
     config.camera = source;
     config.track = plan.settings;
-    runs.push_back({given, source, std::make_unique<Pipeline>(config, stretch.info.objects), {}});
+    CameraRun& run = runs.emplace_back();
+    run.given = given;
+    run.source = source;
+    run.pipeline = std::make_unique<Pipeline>(config, stretch.info.objects);
   };
   for (const Given given : {Given::kTrue, Given::kDrift, Given::kJitter}) {
     add(given, CameraSource::kRefine);

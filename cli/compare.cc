@@ -157,8 +157,8 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
       config.record ? " --record" : "");
   if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
   if (!options.removed.empty()) command += " --removed " + options.removed;
-  if (config.camera != CameraSource::kGiven) {
-    command += fmt::format(" --camera {}", CameraSourceName(config.camera));
+  if (options.camera != CameraSourceName(CameraSource::kGiven)) {
+    command += " --camera " + options.camera;
   }
   if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;

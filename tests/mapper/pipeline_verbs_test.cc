@@ -104,6 +104,7 @@ const std::map<std::string, std::string>& AllowedReaders() {
       {"mapper/store/volume_store.cc volume.T_WO", "the map's own pose of an object"},
       {"mapper/volume/object_volume.h volume.T_WO", "the map's own pose of an object"},
       {"mapper/pipeline.cc tracked.T_WO", "what the tracker answered"},
+      {"mapper/track/camera_tracker.cc after.T_WO", "the tracker's answer"},
       {"mapper/track/given_poses.cc after.T_WO", "the tracker's answer"},
       {"mapper/track/pcl_icp.cc after.T_WO", "the tracker's answer"},
       {"mapper/track/sdf_tracker.cc after.T_WO", "the tracker's answer"},
