@@ -4,9 +4,8 @@
 // There are three, one a rule. What is read is the same in all; the paper's verbs (Deactivate and
 // Activate of III-E, Vote of III-F) have a form of their own in each, since each rule votes at
 // another time and needs other things of the volumes:
-// - VotingIndex (`tsdf++`): a frame's votes are counted when it has been fused, block by block,
-// with
-//   what the objects cover then: Update().
+// - VotingIndex (`tsdf++`): a frame's votes are counted once it has been fused, block by block,
+//   with what the objects cover then: Update().
 // - DistanceIndex (`tsdf++/anchored`): nobody votes. Deactivate(), Activate() and NoteFusion() say
 //   where lists are out of date; Refresh() makes those again.
 // - PairIndex (`tsdf++/literal`): voxels vote before the frame is fused, since only who is active
