@@ -65,6 +65,7 @@ TEST_P(Freeing, OnlyBlocksThatHoldSomethingAreKept) {
 TEST_P(Freeing, AStaticSceneDoesNotGrow) {
   const auto map = MakeMap(GetParam(), ToyConfig());
   std::vector<Frame> frames;
+  frames.reserve(40);
   for (int i = 0; i < 40; ++i) frames.push_back(RenderToys(TableWithToys(), 0.157 * i, i));
   MapMemory settled;
   for (int i = 0; i < 1000; ++i) {

@@ -225,7 +225,8 @@ TEST_P(ObjectMeshTest, OfABallSeenFromAllAroundIsClosedAndFacesOut) {
   scene.shapes.push_back(reference::Sphere(kBall, {30, 30, 200}, centre, kRadius_m));
   const auto map = MakeMap(GetParam(), ToyConfig());
   for (int side = 0; side < 27; ++side) {
-    const Eigen::Vector3d direction(side % 3 - 1, side / 3 % 3 - 1, side / 9 - 1);
+    const Eigen::Vector3d direction =
+        Eigen::Vector3i(side % 3 - 1, side / 3 % 3 - 1, side / 9 - 1).cast<double>();
     const int parts = static_cast<int>(direction.cwiseAbs().sum());
     if (parts != 1 && parts != 3) continue;
     const Eigen::Vector3d eye =
