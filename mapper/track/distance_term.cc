@@ -276,7 +276,6 @@ NormalEquations DistanceTerm::Sums(const Pose& T_LC) const {
 }
 
 DistanceCounts DistanceTerm::Count(const Pose& T_LC) const {
-  constexpr double kNoise = 3;  // deviations
   struct Found {
     bool is_observed = false;
     bool is_inlier = false;
@@ -294,7 +293,7 @@ DistanceCounts DistanceTerm::Count(const Pose& T_LC) const {
           if (!at.has_slope) continue;
           found[k].size_m = std::abs(at.distance_m());
           const double noise_m = config_.Axial_m(points_[i].p_C.z());
-          found[k].is_inlier = found[k].size_m < inlier_m + kNoise * noise_m;
+          found[k].is_inlier = found[k].size_m < inlier_m + kNoiseDeviations * noise_m;
         }
       },
       tbb::simple_partitioner());

@@ -6,8 +6,6 @@
 namespace tsdfpp {
 namespace {
 
-constexpr double kNoise = 3;  // deviations of depth that are no step
-
 // Whether depth goes on without a step from a pixel to the four beside it.
 bool IsInside(const cv::Mat& depth, int v, int u, float max_step_m) {
   const float z = depth.at<float>(v, u);
@@ -82,7 +80,8 @@ std::vector<SegmentPoint> SegmentPointsOf(const Frame& frame, const std::vector<
   for (const int pixel : pixels) {
     const cv::Point2i at(pixel % cols, pixel / cols);
     const double noise_m = config.Axial_m(frame.depth.at<float>(at.y, at.x));
-    const auto max_step_m = static_cast<float>(config.max_step_voxels * voxel_m + kNoise * noise_m);
+    const auto max_step_m =
+        static_cast<float>(config.max_step_voxels * voxel_m + kNoiseDeviations * noise_m);
     if (IsInside(frame.depth, at.y, at.x, max_step_m)) inside.push_back(at);
   }
   const std::size_t count = std::min(inside.size(), static_cast<std::size_t>(config.max_points));

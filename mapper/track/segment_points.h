@@ -17,6 +17,9 @@ namespace tsdfpp {
 // grows with the image, whatever the number of labels.
 std::map<InstanceId, std::vector<int>> PixelsByLabel(const cv::Mat& labels, int erosion_px);
 
+// Axial deviations (SdfTrackConfig::Axial_m) that are neither a step of depth nor an outlier.
+inline constexpr double kNoiseDeviations = 3;
+
 struct SegmentPoint {
   Eigen::Vector3f p_C = Eigen::Vector3f::Zero();  // metres
   cv::Point2i pixel;
@@ -24,8 +27,8 @@ struct SegmentPoint {
 
 // The points of a segment's pixels (PixelsByLabel() with `mask_erosion_px`) that have valid depth,
 // unless one of the four beside has no valid depth or one that differs by more than
-// `max_step_voxels` (pixels beyond the image are not looked at). Of more than `max_points`, those
-// at even steps in row order.
+// `max_step_voxels` and kNoiseDeviations (pixels beyond the image are not looked at). Of more than
+// `max_points`, those at even steps in row order.
 std::vector<SegmentPoint> SegmentPointsOf(const Frame& frame, const std::vector<int>& pixels,
                                           double voxel_m, const SdfTrackConfig& config);
 
