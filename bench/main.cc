@@ -156,7 +156,10 @@ void AddTrack(CLI::App& app, Chosen& chosen) {
       ->delimiter(',')
       ->check(CLI::IsMember({"exact", "noise"}))
       ->capture_default_str();
-  command->add_option("--runs", options->runs, "known, or a tracker and a method: 'icp tsdf++'")
+  command
+      ->add_option("--runs", options->runs,
+                   "known, or a tracker, a method and, if it is to be said, what becomes of pixels "
+                   "that bleed: 'track tsdf++ keep'")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--track-config", options->settings, "Settings of track and known, TOML");

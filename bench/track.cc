@@ -34,6 +34,7 @@ struct RunPlan {
   bool is_known = false;
   PoseSource poses = PoseSource::kTrack;
   Method method = Method::kTsdfppAnchored;
+  BleedingPixels bleeding = BleedingPixels::kAuto;
 };
 
 Expected<RunPlan> PlanOf(const std::string& name) {
@@ -45,8 +46,12 @@ Expected<RunPlan> PlanOf(const std::string& name) {
         name);
   }
   RunPlan plan{name};
+  const std::size_t end = name.find(' ', space + 1);
+  if (end != std::string::npos) {
+    TSDFPP_ASSIGN(plan.bleeding, BleedingPixelsFromName(name.substr(end + 1)));
+  }
   TSDFPP_ASSIGN(plan.poses, PoseSourceFromName(name.substr(0, space)));
-  TSDFPP_ASSIGN(plan.method, MethodFromName(name.substr(space + 1)));
+  TSDFPP_ASSIGN(plan.method, MethodFromName(name.substr(space + 1, end - space - 1)));
   TSDFPP_RETURN_IF_ERROR(CheckPoses(plan.method, plan.poses));
   return plan;
 }
@@ -171,9 +176,12 @@ Expected<std::vector<Row>> RunScene(const fs::path& file, const Plan& plan) {
   for (const std::string& depth : plan.depths) {
     Stage& stage = stages.emplace_back(Stage{depth});
     for (const RunPlan& run : plan.runs) {
-      stage.runs.push_back(run.is_known
-                               ? MakeKnownRun(known, voxel_m, plan.settings)
-                               : MakeMapRun(info.objects, run.method, run.poses, plan.settings));
+      stage.runs.push_back(run.is_known ? MakeKnownRun(known, voxel_m, plan.settings)
+                                        : MakeMapRun(info.objects, {.method = run.method,
+                                                                    .bleeding = run.bleeding,
+                                                                    .poses = run.poses,
+                                                                    .tracked = TrackChoice::kAll,
+                                                                    .track = plan.settings}));
     }
   }
   std::map<InstanceId, Trajectory> truth;

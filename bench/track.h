@@ -12,7 +12,8 @@ struct TrackBenchOptions {
   std::string scenes = "scenes";  // a folder of scenes
   std::vector<std::string> only;  // names of some of them; empty for all
   std::vector<std::string> depths = {"exact", "noise"};
-  // Trackers, each with a method: "track tsdf++/anchored", and "known", which has no map.
+  // Trackers, each with a method: "track tsdf++/anchored", which "track tsdf++/anchored keep" has
+  // map pixels that bleed like others (BleedingPixels); and "known", which has no map.
   std::vector<std::string> runs = {"known", "track tsdf++/anchored", "track tsdf++"};
   std::string settings;  // a file of mapper/track/sdf_track_config.h; empty for the defaults
   int until = 100000;    // the last frame

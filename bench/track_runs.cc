@@ -4,6 +4,7 @@
 
 #include "bench/clocks.h"
 #include "bench/known_models.h"
+#include "mapper/segment/bleeding.h"
 
 namespace tsdfpp {
 namespace {
@@ -38,9 +39,9 @@ class MapRun : public TrackRun {
 class KnownRun : public TrackRun {
  public:
   KnownRun(const KnownModels& models, double voxel_m, const SdfTrackConfig& settings)
-      : tracker_(settings, [this, &models](const MapRepresentation&, InstanceId id) {
-          return ModelAt(models, id);
-        }) {
+      : tracker_(settings, [this, &models](const MapRepresentation&,
+                                           InstanceId id) { return ModelAt(models, id); }),
+        bleeding_step_m_(static_cast<float>(kBleedingStep_voxels * voxel_m)) {
     MapConfig config;
     config.voxel_m = voxel_m;
     no_map_ = MakeMap(Method::kVolumes, config);
@@ -51,7 +52,8 @@ class KnownRun : public TrackRun {
     before_ = frame.T_WO;
     for (const auto& [id, T_WO] : T_WO_) before_[id] = T_WO;
     const double began_ms = WallMilliseconds();
-    TrackedPoses after = tracker_.Track(frame, frame.mask, *no_map_, before_);
+    const cv::Mat labels = WithoutBleeding(frame.depth, frame.mask, bleeding_step_m_);
+    TrackedPoses after = tracker_.Track(frame, labels, *no_map_, before_);
     int tracked = 0;
     for (auto& [id, status] : after.seen) {
       if (T_WO_.contains(id)) {
@@ -80,6 +82,7 @@ class KnownRun : public TrackRun {
   }
 
   SdfTracker tracker_;
+  float bleeding_step_m_;
   std::unique_ptr<MapRepresentation> no_map_;
   ObjectPoses before_;  // the frame, of all objects
   ObjectPoses T_WO_;    // after it, of those that have begun
@@ -89,13 +92,8 @@ class KnownRun : public TrackRun {
 
 }  // namespace
 
-std::unique_ptr<TrackRun> MakeMapRun(const std::vector<ObjectInfo>& objects, Method method,
-                                     PoseSource poses, const SdfTrackConfig& settings) {
-  PipelineConfig config;
-  config.method = method;
-  config.poses = poses;
-  config.tracked = TrackChoice::kAll;
-  config.track = settings;
+std::unique_ptr<TrackRun> MakeMapRun(const std::vector<ObjectInfo>& objects,
+                                     const PipelineConfig& config) {
   return std::make_unique<MapRun>(config, objects);
 }
 

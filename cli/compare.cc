@@ -25,6 +25,7 @@ struct CompareArguments {
       "tsdf/static,tsdf,tsdf/guarded,tsdf++/literal,tsdf++,tsdf++/anchored,volumes";
   std::string profiles = "paper,close";
   std::string camera = "gt";
+  std::string bleeding = "auto";
   std::string poses;
   std::string associate;
   std::vector<std::string> adapters;
@@ -160,6 +161,9 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
   if (options.camera != CameraSourceName(CameraSource::kGiven)) {
     command += " --camera " + options.camera;
   }
+  if (options.bleeding != BleedingPixelsName(BleedingPixels::kAuto)) {
+    command += " --bleeding " + options.bleeding;
+  }
   if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   return command;
@@ -204,6 +208,7 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   }
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
   TSDFPP_ASSIGN(config.camera, CameraSourceFromName(options.camera));
+  TSDFPP_ASSIGN(config.bleeding, BleedingPixelsFromName(options.bleeding));
   const std::string pose_names = PoseNames(options, config, *opened.source);
   TSDFPP_RETURN_IF_ERROR(ReadPoses(pose_names, config));
   TSDFPP_RETURN_IF_ERROR(CheckLists(options, pose_names, config));
@@ -237,6 +242,12 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own and matched to the truth's by overlap, each once); by "
                  "default given unless ids are drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
+  app.add_option("--bleeding", options->bleeding,
+                 "For our maps, pixels beside an outline with the depth of its other side: keep "
+                 "(mapped like others), wait (left out of the frame), auto (wait where objects or "
+                 "the camera are tracked by signed distances)")
+      ->check(OneOf({"auto", "keep", "wait"}))
+      ->capture_default_str();
   app.add_option("--camera", options->camera,
                  "Camera poses of our maps: gt (given), refine (given and then corrected by the "
                  "map's background), track (the first one given, the others found by it)")

@@ -29,6 +29,7 @@ struct MapArguments {
   std::string segmentation;
   std::string associate;
   std::string camera = "gt";
+  std::string bleeding = "auto";
   std::string poses;
   std::string track = "auto";
   std::string track_config;
@@ -86,6 +87,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
     TSDFPP_ASSIGN(wishes.poses, PoseSourceFromName(options.poses));
   }
   TSDFPP_ASSIGN(wishes.camera, CameraSourceFromName(options.camera));
+  TSDFPP_ASSIGN(wishes.bleeding, BleedingPixelsFromName(options.bleeding));
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -292,6 +294,12 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own; poses are then tracked); by default given unless ids are "
                  "drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
+  app.add_option("--bleeding", options->bleeding,
+                 "Pixels beside an outline with the depth of its other side: keep (mapped like "
+                 "others), wait (left out of the frame), auto (wait where objects or the camera "
+                 "are tracked by signed distances)")
+      ->check(OneOf({"auto", "keep", "wait"}))
+      ->capture_default_str();
   app.add_option("--camera", options->camera,
                  "Camera poses: gt (given), refine (given and then corrected by the map's "
                  "background), track (the first one given, the others found by it)")

@@ -111,6 +111,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
   TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
   start.config.camera = wishes.camera;
+  start.config.bleeding = wishes.bleeding;
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   TSDFPP_RETURN_IF_ERROR(start.config.Validate());
   start.first = start.info.first_index;
@@ -146,6 +147,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   const auto fits = poses ? start.config.Validate() : tl::unexpected(poses.error());
   if (!fits) return DataError("{}: its run cannot go on: {}", file, fits.error().message);
   start.config.camera = wishes.camera;
+  start.config.bleeding = wishes.bleeding;
   TSDFPP_RETURN_IF_ERROR(CheckCamera(start.config.method, wishes.camera));
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   const bool votes = start.by_votes();
@@ -176,6 +178,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
                       wishes.track.config ? "--track-config" : "--track");
   } else if (wishes.camera != CameraSource::kGiven) {
     return UsageError("--camera {} needs a sequence to map", CameraSourceName(wishes.camera));
+  } else if (wishes.bleeding != BleedingPixels::kAuto) {
+    return UsageError("--bleeding {} needs a sequence to map", BleedingPixelsName(wishes.bleeding));
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(

@@ -22,6 +22,7 @@ struct MapWishes {
   std::optional<Segmentation> segmentation;
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
+  BleedingPixels bleeding = BleedingPixels::kAuto;
   std::optional<PoseSource> poses;
   TrackWishes track;
 };
@@ -54,7 +55,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
                             const MapWishes& wishes, int until);
 
 // With the map in `file`; goes on after its last frame where `source` names a sequence. Of `wishes`
-// only segmentation, camera and tracking are looked at, as the file has the rest.
+// only segmentation, bleeding, camera and tracking are looked at, as the file has the rest.
 // Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than the map's,
 // or nothing is left to map; kData where what the file says does not go together.
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,

@@ -11,7 +11,8 @@
 namespace tsdfpp {
 
 // What is being handled, as an error; to be called within catch (...). Memory and files are the
-// environment's (kEnvironment), everything else a fault of the program (kInternal).
+// environment's (kEnvironment), and so is what a library throws where address space is limited and
+// used up; everything else is a fault of the program (kInternal).
 Error ErrorOfException();
 
 // What `function` returns, an Expected, or the error of what it throws.
@@ -29,7 +30,8 @@ void PrintError(std::string_view program, std::string_view message);
 
 // The whole of a main(): opens what is closed of stdin, stdout and stderr, so that no file gets
 // their numbers, takes the limits from the environment (core/limits.h), runs `body`, which returns
-// the exit code, and turns what is thrown into a sentence and its exit code.
-int GuardedMain(std::string_view program, const std::function<int()>& body);
+// the exit code, and turns what is thrown into a sentence and its exit code. `program` is a
+// literal. What cannot be caught is said too (core/last_words.h).
+int GuardedMain(const char* program, const std::function<int()>& body);
 
 }  // namespace tsdfpp

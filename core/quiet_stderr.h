@@ -2,12 +2,13 @@
 #pragma once
 
 #include <mutex>
+#include <string>
 
 namespace tsdfpp {
 
-// OpenCV and the codecs below it print their own words about a damaged image to stderr, and offer
-// no hook. While this lives, what the process prints there is dropped; a second one waits for the
-// first.
+// OpenCV and the codecs below it print their own words about a damaged image, or a lack of memory,
+// to stderr, and offer no hook. While this lives, what the process prints there is kept from it; a
+// second one waits for the first.
 class QuietStderr {
  public:
   QuietStderr();
@@ -15,9 +16,13 @@ class QuietStderr {
   QuietStderr(const QuietStderr&) = delete;
   QuietStderr& operator=(const QuietStderr&) = delete;
 
+  // What was printed so far; nothing where the machine refused to keep it.
+  std::string Words() const;
+
  private:
   std::lock_guard<std::mutex> lock_;  // two at once would restore each other's silence
   int saved_;
+  int words_;  // where they go
 };
 
 }  // namespace tsdfpp

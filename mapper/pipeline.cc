@@ -71,6 +71,11 @@ std::unique_ptr<Associator> MakeAssociator(
 
 }  // namespace
 
+bool PipelineConfig::BleedingWaits() const {
+  if (bleeding != BleedingPixels::kAuto) return bleeding == BleedingPixels::kWait;
+  return poses == PoseSource::kTrack || camera != CameraSource::kGiven;
+}
+
 Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(map.Validate());
   TSDFPP_RETURN_IF_ERROR(votes.Validate());
@@ -127,8 +132,7 @@ const CameraLog& Pipeline::camera_log() const { return camera_->log(); }
 Expected<StepTimes> Pipeline::Process(const Frame& given) {
   StepTimes times;
   StopWatch watch;
-  TSDFPP_ASSIGN(const Segments segments, segmenter_->Segment(given));
-  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(given, segments.ids));
+  TSDFPP_ASSIGN(const Segments segments, Segment(given));
   times.segment_s = watch.Lap();
   const std::optional<Frame> frame = camera_->Locate(given, segments.ids, *map_);
   times.locate_s = watch.Lap();
@@ -142,6 +146,16 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   Fuse(*frame, tracked.labels);
   times.fuse_s = watch.Lap();
   return times;
+}
+
+Expected<Segments> Pipeline::Segment(const Frame& frame) {
+  TSDFPP_ASSIGN(Segments segments, segmenter_->Segment(frame));
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
+  if (config_.BleedingWaits()) {
+    const double step_m = kBleedingStep_voxels * config_.map.voxel_m;
+    segments.ids = WithoutBleeding(frame.depth, segments.ids, static_cast<float>(step_m));
+  }
+  return segments;
 }
 
 Expected<Pipeline::TrackedFrame> Pipeline::Track(const Frame& frame,

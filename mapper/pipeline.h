@@ -13,6 +13,7 @@
 #include "mapper/associate/vote_config.h"
 #include "mapper/frame_counts.h"
 #include "mapper/map_representation.h"
+#include "mapper/segment/bleeding.h"
 #include "mapper/segment/segmenter.h"
 #include "mapper/track/camera_source.h"
 #include "mapper/track/icp_registration.h"
@@ -30,6 +31,7 @@ struct PipelineConfig {
   Method method = Method::kTsdfpp;
   MapConfig map{};
   Segmentation segmentation = Segmentation::kGiven;
+  BleedingPixels bleeding = BleedingPixels::kAuto;
   AssociationMode associate = AssociationMode::kGiven;
   VoteConfig votes{};
   CameraSource camera = CameraSource::kGiven;
@@ -38,6 +40,9 @@ struct PipelineConfig {
   IcpConfig icp{};
   SdfTrackConfig track{};  // of the camera, too
 
+  // Whether pixels that bleed wait, as `bleeding` says or, where it is kAuto, the tracking.
+  bool BleedingWaits() const;
+
   // Errors: kUsage where a part is wrong, or given poses, which are those of given ids, are to go
   // with association by votes.
   Expected<void> Validate() const;
@@ -45,7 +50,7 @@ struct PipelineConfig {
 
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
-  double segment_s = 0;       // paper III-B; 0 with given masks
+  double segment_s = 0;       // paper III-B; with given masks that of pixels that bleed, or 0
   double locate_s = 0;        // the camera; 0 with given poses of it
   double associate_s = 0;     // paper III-C: votes; 0 with given ids
   double track_s = 0;         // paper III-D: objects' meshes, ICP; 0 with given poses
@@ -116,6 +121,8 @@ class Pipeline {
     ObjectPoses T_WO;
     cv::Mat labels;
   };
+  // Errors: the segmenter's, and those of CheckFrameForm.
+  Expected<Segments> Segment(const Frame& frame);
   // Nothing of the frame counts before the map is known to take it. Errors: those of CheckReach.
   Expected<TrackedFrame> Track(const Frame& frame, const AssociatedObjects& association);
   // Moves the objects to where they are after the frame, and writes it down.

@@ -67,6 +67,7 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
       for (const Method method : config.methods) {
         PipelineConfig pipeline{.method = method,
                                 .map = config.map,
+                                .bleeding = config.bleeding,
                                 .associate = AssociationOf(config, info),
                                 .camera = config.camera,
                                 .poses = poses,

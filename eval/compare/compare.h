@@ -21,6 +21,7 @@ struct CompareConfig {
   // Nothing: votes, unless the masks' ids are the truth's.
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
+  BleedingPixels bleeding = BleedingPixels::kAuto;
   std::vector<PoseSource> poses{PoseSource::kGiven};
   MapConfig map;  // truncation is the profile's
   IcpConfig icp;

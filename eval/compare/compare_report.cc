@@ -104,6 +104,8 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"method", MethodName(run.config.method)},
           {"profile", run.profile},
           {"camera", CameraJson(result, run)},
+          {"bleeding", BleedingPixelsName(run.config.BleedingWaits() ? BleedingPixels::kWait
+                                                                     : BleedingPixels::kKeep)},
           {"poses", PoseSourceName(run.config.poses)},
           {"associate", AssociationModeName(run.config.associate)},
           {"settings",

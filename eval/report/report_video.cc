@@ -220,15 +220,22 @@ class FilmFile {
   }
 
   void Show(const cv::Mat& page) {
+    const QuietStderr quiet;
     writer_.write(page);
     ++frames_;
+    Hear(quiet);
   }
 
   int frames() const { return frames_; }
 
   // Errors: kEnvironment, the film is not whole or cannot be written.
   Expected<void> Finish() {
-    writer_.release();
+    {
+      const QuietStderr quiet;
+      writer_.release();
+      Hear(quiet);
+    }
+    if (!complaint_.empty()) return Cannot("its encoder says '" + complaint_ + "'");
     TSDFPP_ASSIGN(const std::string bytes, memory_.Read());
     if (!IsWholeVideo(bytes)) {
       return Cannot(fmt::format("the video is cut off after {} bytes", bytes.size()));
@@ -237,6 +244,11 @@ class FilmFile {
   }
 
  private:
+  // The encoder goes on after an error, with another film, and OpenCV says nothing of it.
+  void Hear(const QuietStderr& quiet) {
+    const std::string words = quiet.Words();
+    if (complaint_.empty() && words.find("[error]") != std::string::npos) complaint_ = words;
+  }
   tl::unexpected<Error> Cannot(const std::string& why) const {
     return EnvironmentError("cannot write '{}': {}", file_.string(), why);
   }
@@ -245,6 +257,7 @@ class FilmFile {
   MemoryFile memory_;
   Temporary link_;
   cv::VideoWriter writer_;
+  std::string complaint_;
   int frames_ = 0;
 };
 

@@ -14,6 +14,7 @@
 #include <cstring>
 
 #include "core/guard.h"
+#include "core/last_words.h"
 #include "core/one_line.h"
 
 namespace tsdfpp {
@@ -29,6 +30,7 @@ constexpr const char* kError = "error ";  // followed by the kind, a blank and t
   std::signal(SIGTERM, SIG_DFL);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
+  SpeakAs(nullptr);
   Channel channel(descriptor);
   // What is thrown must not unwind the parent's frames, of which this process has a copy.
   const Expected<void> result = Guarded([&] { return body(channel); });
@@ -145,6 +147,9 @@ Expected<void> Workers::Reap(Child& child) {
   if (WIFSIGNALED(status)) {
     return EnvironmentError("a worker process was ended by signal {} ({})", WTERMSIG(status),
                             strsignal(WTERMSIG(status)));
+  }
+  if (WEXITSTATUS(status) == static_cast<int>(ErrorKind::kEnvironment)) {
+    return EnvironmentError("a worker process is out of memory");
   }
   return EnvironmentError("a worker process ended with exit code {}", WEXITSTATUS(status));
 }

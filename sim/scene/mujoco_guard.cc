@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <mutex>
 
+#include "core/address_space.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -24,7 +26,8 @@ thread_local Guard guard;
     std::snprintf(guard.message, sizeof(guard.message), "%s", message);
     std::longjmp(guard.back, 1);
   }
-  std::fprintf(stderr, "MuJoCo error: %s\n", message);
+  // Without memory the last words are said elsewhere (core/last_words.h).
+  if (!IsOutOfAddressSpace()) std::fprintf(stderr, "MuJoCo error: %s\n", message);
   std::abort();
 }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -110,6 +111,7 @@ TEST(Guard, MessagesAreOneLineOfText) {
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
 }
 
+[[maybe_unused]] void ThrowForMemory() { throw std::bad_alloc(); }
 void ThrowLate() { throw std::runtime_error("late"); }
 
 TEST(GuardDeathTest, WhatNobodyCanCatchIsSaidBeforeTheEnd) {
@@ -121,6 +123,49 @@ TEST(GuardDeathTest, WhatNobodyCanCatchIsSaidBeforeTheEnd) {
                           }),
               testing::KilledBySignal(SIGABRT), "program: internal error: late");
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+// Leaves the process no more address space than it has.
+void LeaveNoMemory() {
+  const rlimit none{1, RLIM_INFINITY};
+  setrlimit(RLIMIT_AS, &none);
+}
+
+int RunWithoutMemory(const std::function<void()>& fail) {
+  return GuardedMain("program", [&] {
+    LeaveNoMemory();
+    fail();
+    return 0;
+  });
+}
+
+constexpr const char* kNoMemory = "^program: out of memory: [^\n]*\n$";
+
+TEST(GuardDeathTest, WantOfMemoryThatNobodyCanCatchIsSaid) {
+  EXPECT_EXIT(GuardedMain("program",
+                          [] {
+                            const auto end = []() noexcept { ThrowForMemory(); };
+                            end();
+                            return 0;
+                          }),
+              testing::ExitedWithCode(3), kNoMemory);
+  EXPECT_EXIT(RunWithoutMemory([] { raise(SIGSEGV); }), testing::ExitedWithCode(3), kNoMemory);
+  EXPECT_EXIT(RunWithoutMemory([] { std::abort(); }), testing::ExitedWithCode(3), kNoMemory);
+  // A library's own words for it are caught; the test's process has no memory left to end well.
+  EXPECT_EXIT(_exit(RunWithoutMemory([] { throw std::runtime_error("pthread_create failed"); })),
+              testing::ExitedWithCode(3), kNoMemory);
+}
+
+// With memory to be had a crash is a crash.
+TEST(GuardDeathTest, OtherSignalsAreWhatTheyWere) {
+  EXPECT_EXIT(GuardedMain("program", [] { return raise(SIGSEGV); }),
+              testing::KilledBySignal(SIGSEGV), "^$");
+  EXPECT_EXIT(GuardedMain("program", []() -> int { std::abort(); }),
+              testing::KilledBySignal(SIGABRT), "^$");
+}
+
+#endif
 
 }  // namespace
 }  // namespace tsdfpp
