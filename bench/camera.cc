@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 
 #include "bench/figure_runs.h"
 #include "core/toml_reader.h"
@@ -100,11 +99,10 @@ Expected<void> Feed(const Stretch& stretch, const Frame& frame, std::vector<Came
 
 // Millimetres and degrees, RMSE over the frames.
 std::string OffBy(const Trajectory& estimate, const Trajectory& truth) {
-  const PosePairs pairs = PairByFrame(estimate, truth);
-  const auto shifts = SummariseErrors(TranslationErrors_m(pairs));
-  const auto turns = SummariseErrors(RotationErrors_rad(pairs));
-  if (!shifts || !turns) return "-";
-  return fmt::format("{:.1f} / {:.2f}", 1e3 * shifts->rmse, turns->rmse * 180 / std::numbers::pi);
+  const auto errors = PoseErrorsOf(PairByFrame(estimate, truth));
+  if (!errors) return "-";
+  return fmt::format("{:.1f} / {:.2f}", 1e3 * errors->translation_m.rmse,
+                     errors->rotation_deg.rmse);
 }
 
 void Judge(const Stretch& stretch, const std::vector<CameraRun>& runs, const Trajectory& truth,

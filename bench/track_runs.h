@@ -38,10 +38,6 @@ class TrackRun {
 // A pipeline with given masks and ids.
 std::unique_ptr<TrackRun> MakeMapRun(const std::vector<ObjectInfo>& objects,
                                      const PipelineConfig& config);
-of all objects of the scene,
-    classified or not .std::unique_ptr<TrackRun> MakeMapRun(const std::vector<ObjectInfo>&objects,
-                                                            Method method, PoseSource poses,
-                                                            const SdfTrackConfig&settings);
 
 // True surfaces by object, as signed distances on the lattice of the object's own frame.
 using KnownModels = std::map<InstanceId, TsdfGrid>;

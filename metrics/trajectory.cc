@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "core/units.h"
@@ -88,6 +89,15 @@ std::vector<double> RotationErrors_rad(const PosePairs& pairs) {
 
 double RotationAngle_rad(const Eigen::Matrix3d& R) {
   return std::abs(Eigen::AngleAxisd(Eigen::Quaterniond(R).normalized()).angle());
+}
+
+std::optional<PoseErrors> PoseErrorsOf(const PosePairs& pairs) {
+  std::vector<double> degrees = RotationErrors_rad(pairs);
+  for (double& angle : degrees) angle *= 180 / std::numbers::pi;
+  const auto translation_m = SummariseErrors(TranslationErrors_m(pairs));
+  const auto rotation_deg = SummariseErrors(degrees);
+  if (!translation_m || !rotation_deg) return std::nullopt;
+  return PoseErrors{*translation_m, *rotation_deg};
 }
 
 std::vector<double> FullErrors(const PosePairs& pairs) {

@@ -44,6 +44,13 @@ std::vector<double> TranslationErrors_m(const PosePairs& pairs);
 double RotationAngle_rad(const Eigen::Matrix3d& R);
 std::vector<double> RotationErrors_rad(const PosePairs& pairs);
 
+// Both of them summarised; nothing where there are no pairs.
+struct PoseErrors {
+  ErrorSummary translation_m;
+  ErrorSummary rotation_deg;
+};
+std::optional<PoseErrors> PoseErrorsOf(const PosePairs& pairs);
+
 // The whole pose error a pair, evo's "full transformation": |T_gt^-1 T_est - I|, the Frobenius norm
 // of a 4x4 matrix, which mixes metres and rotation and so has no unit.
 std::vector<double> FullErrors(const PosePairs& pairs);

@@ -1,7 +1,6 @@
 #include "eval/compare/compare_report.h"
 
 #include <algorithm>
-#include <numbers>
 #include <thread>
 
 #include "core/files.h"
@@ -66,12 +65,9 @@ nlohmann::json CameraJson(const CompareResult& result, const CompareRun& run) {
   camera["located"] = log.located;
   camera["carried_on"] = log.carried_on;
   camera["lost"] = log.lost;
-  const PosePairs pairs = PairByFrame(log.T_WC, result.camera);
-  if (const auto errors = SummariseErrors(TranslationErrors_m(pairs))) {
-    camera["translation_rmse_m"] = errors->rmse;
-  }
-  if (const auto errors = SummariseErrors(RotationErrors_rad(pairs))) {
-    camera["rotation_rmse_deg"] = errors->rmse * 180 / std::numbers::pi;
+  if (const auto errors = PoseErrorsOf(PairByFrame(log.T_WC, result.camera))) {
+    camera["translation_rmse_m"] = errors->translation_m.rmse;
+    camera["rotation_rmse_deg"] = errors->rotation_deg.rmse;
   }
   return camera;
 }

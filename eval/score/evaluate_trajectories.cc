@@ -76,10 +76,10 @@ Expected<PosePairs> PairsOf(const fs::path& file, const Trajectory& estimate,
 Expected<void> ScoreCamera(const fs::path& file, const Trajectory& estimate,
                            const Trajectory& camera, TrajectoryEvaluation& out) {
   TSDFPP_ASSIGN(const PosePairs pairs, PairsOf(file, estimate, camera));
-  out.camera_m = SummariseErrors(TranslationErrors_m(pairs));
-  std::vector<double> degrees = RotationErrors_rad(pairs);
-  for (double& angle : degrees) angle *= 180 / M_PI;
-  out.camera_deg = SummariseErrors(degrees);
+  if (const auto errors = PoseErrorsOf(pairs)) {
+    out.camera_m = errors->translation_m;
+    out.camera_deg = errors->rotation_deg;
+  }
   return {};
 }
 

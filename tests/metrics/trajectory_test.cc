@@ -121,6 +121,11 @@ TEST(Trajectory, ErrorsOfAKnownOffset) {
   const PosePairs pairs = {{0}, {estimate}, {truth}};
   EXPECT_NEAR(TranslationErrors_m(pairs)[0], 0.05, 1e-12);
   EXPECT_NEAR(RotationErrors_rad(pairs)[0], 0.3, 1e-12);
+  const auto both = PoseErrorsOf(pairs);
+  ASSERT_TRUE(both);
+  EXPECT_NEAR(both->translation_m.rmse, 0.05, 1e-12);
+  EXPECT_NEAR(both->rotation_deg.rmse, 0.3 * 180 / std::numbers::pi, 1e-9);
+  EXPECT_FALSE(PoseErrorsOf({}));
   // |R - I| of a turn by a is 2 sqrt(2) sin(a / 2).
   EXPECT_NEAR(FullErrors(pairs)[0], std::hypot(0.05, 2 * std::sqrt(2) * std::sin(0.15)), 1e-12);
 }
