@@ -5,6 +5,7 @@
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/address_space.h"
 #include "core/files.h"
 #include "core/quiet_stderr.h"
 
@@ -54,6 +55,9 @@ Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, 
     } catch (const std::exception&) {  // OpenCV's, and what its codecs throw
       image.release();
     }
+  }
+  if (image.empty() && IsOutOfAddressSpace()) {
+    return EnvironmentError("{}: out of memory, so it cannot be decoded", where);
   }
   if (image.empty()) return DataError("{}: cannot be decoded as an image", where);
   // Callers rely on what was checked of the header.

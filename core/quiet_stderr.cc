@@ -9,8 +9,8 @@
 namespace tsdfpp {
 namespace {
 
-std::mutex& StderrMutex() {
-  static std::mutex mutex;
+std::recursive_mutex& StderrMutex() {
+  static std::recursive_mutex mutex;
   return mutex;
 }
 

@@ -7,8 +7,8 @@
 namespace tsdfpp {
 
 // OpenCV and the codecs below it print their own words about a damaged image, or a lack of memory,
-// to stderr, and offer no hook. While this lives, what the process prints there is kept from it; a
-// second one waits for the first.
+// to stderr, and offer no hook. While this lives, what the process prints there is kept from it. A
+// second one waits for another thread's; of one thread the last ends first.
 class QuietStderr {
  public:
   QuietStderr();
@@ -20,7 +20,7 @@ class QuietStderr {
   std::string Words() const;
 
  private:
-  std::lock_guard<std::mutex> lock_;  // two at once would restore each other's silence
+  std::lock_guard<std::recursive_mutex> lock_;  // two at once would restore each other's silence
   int saved_;
   int words_;  // where they go
 };

@@ -10,6 +10,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <optional>
 
 #include "core/decode_image.h"
 #include "core/files.h"
@@ -210,7 +211,7 @@ class FilmFile {
     std::error_code failure;
     std::filesystem::create_symlink(memory_.path(), link_.path, failure);
     if (failure) return Cannot(failure.message());
-    const QuietStderr quiet;  // the encoder prints what it chose
+    quiet_.emplace();  // the encoder prints what it chose, and its threads what they lack
     writer_.open(link_.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
                  kRate_hz, size);
     if (writer_.isOpened()) return {};
@@ -220,22 +221,21 @@ class FilmFile {
   }
 
   void Show(const cv::Mat& page) {
-    const QuietStderr quiet;
     writer_.write(page);
     ++frames_;
-    Hear(quiet);
   }
 
   int frames() const { return frames_; }
 
   // Errors: kEnvironment, the film is not whole or cannot be written.
   Expected<void> Finish() {
-    {
-      const QuietStderr quiet;
-      writer_.release();
-      Hear(quiet);
+    writer_.release();
+    // The encoder goes on after an error, with another film, and OpenCV says nothing of it.
+    const std::string words = quiet_ ? quiet_->Words() : "";
+    quiet_.reset();
+    if (words.find("[error]") != std::string::npos) {
+      return Cannot("its encoder says '" + words + "'");
     }
-    if (!complaint_.empty()) return Cannot("its encoder says '" + complaint_ + "'");
     TSDFPP_ASSIGN(const std::string bytes, memory_.Read());
     if (!IsWholeVideo(bytes)) {
       return Cannot(fmt::format("the video is cut off after {} bytes", bytes.size()));
@@ -244,11 +244,6 @@ class FilmFile {
   }
 
  private:
-  // The encoder goes on after an error, with another film, and OpenCV says nothing of it.
-  void Hear(const QuietStderr& quiet) {
-    const std::string words = quiet.Words();
-    if (complaint_.empty() && words.find("[error]") != std::string::npos) complaint_ = words;
-  }
   tl::unexpected<Error> Cannot(const std::string& why) const {
     return EnvironmentError("cannot write '{}': {}", file_.string(), why);
   }
@@ -256,8 +251,8 @@ class FilmFile {
   std::filesystem::path file_;
   MemoryFile memory_;
   Temporary link_;
+  std::optional<QuietStderr> quiet_;  // outlives the encoder's threads
   cv::VideoWriter writer_;
-  std::string complaint_;
   int frames_ = 0;
 };
 
