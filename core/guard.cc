@@ -1,5 +1,6 @@
 #include "core/guard.h"
 
+#include <atomic>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -36,6 +37,13 @@ Error ErrorOfException() {
     return {ErrorKind::kInternal, "internal error"};
   }
 }
+
+namespace {
+std::atomic<int> stderr_descriptor = 2;
+}  // namespace
+
+int StderrDescriptor() { return stderr_descriptor; }
+void SetStderrDescriptor(int descriptor) { stderr_descriptor = descriptor; }
 
 void PrintError(std::string_view program, std::string_view message) {
   std::fprintf(stderr, "%s: %s\n", std::string(program).c_str(), OneLine(message).c_str());

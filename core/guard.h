@@ -25,6 +25,10 @@ std::invoke_result_t<const Function&> Guarded(const Function& function) {
   }
 }
 
+// Where stderr leads, also while a QuietStderr (core/quiet_stderr.h) keeps others' words from it.
+int StderrDescriptor();
+void SetStderrDescriptor(int descriptor);
+
 // "<program>: <message>" on stderr: one line without control bytes, under 500 bytes.
 void PrintError(std::string_view program, std::string_view message);
 

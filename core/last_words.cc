@@ -32,7 +32,7 @@ std::atomic<const char*> program_name = "tsdfpp";
 
 void WriteAll(std::string_view text) {
   while (!text.empty()) {
-    const ssize_t count = write(STDERR_FILENO, text.data(), text.size());
+    const ssize_t count = write(StderrDescriptor(), text.data(), text.size());
     if (count <= 0) return;
     text.remove_prefix(static_cast<std::size_t>(count));
   }

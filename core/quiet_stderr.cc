@@ -6,6 +6,8 @@
 
 #include <array>
 
+#include "core/guard.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -24,12 +26,17 @@ int OpenPlace() {
 
 QuietStderr::QuietStderr()
     : lock_(StderrMutex()), saved_(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 0)), words_(OpenPlace()) {
-  if (saved_ >= 0 && words_ >= 0) dup2(words_, STDERR_FILENO);
+  if (saved_ < 0 || words_ < 0) return;
+  dup2(words_, STDERR_FILENO);
+  // Of several the first one knows where it led.
+  before_ = StderrDescriptor();
+  if (before_ == STDERR_FILENO) SetStderrDescriptor(saved_);
 }
 
 QuietStderr::~QuietStderr() {
   if (saved_ >= 0) {
     dup2(saved_, STDERR_FILENO);
+    SetStderrDescriptor(before_);
     close(saved_);
   }
   if (words_ >= 0) close(words_);

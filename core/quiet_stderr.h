@@ -22,7 +22,8 @@ class QuietStderr {
  private:
   std::lock_guard<std::recursive_mutex> lock_;  // two at once would restore each other's silence
   int saved_;
-  int words_;  // where they go
+  int words_;       // where they go
+  int before_ = 2;  // StderrDescriptor()
 };
 
 }  // namespace tsdfpp

@@ -16,6 +16,7 @@
 #include <stdexcept>
 
 #include "core/limits.h"
+#include "core/quiet_stderr.h"
 
 namespace tsdfpp {
 namespace {
@@ -151,6 +152,16 @@ TEST(GuardDeathTest, WantOfMemoryThatNobodyCanCatchIsSaid) {
                           }),
               testing::ExitedWithCode(3), kNoMemory);
   EXPECT_EXIT(RunWithoutMemory([] { raise(SIGSEGV); }), testing::ExitedWithCode(3), kNoMemory);
+  // Within what keeps a library's words from stderr.
+  EXPECT_EXIT(GuardedMain("program",
+                          [] {
+                            const QuietStderr outer;
+                            const QuietStderr inner;
+                            std::fputs("of a library", stderr);
+                            LeaveNoMemory();
+                            return raise(SIGSEGV);
+                          }),
+              testing::ExitedWithCode(3), kNoMemory);
   EXPECT_EXIT(RunWithoutMemory([] { std::abort(); }), testing::ExitedWithCode(3), kNoMemory);
   // A library's own words for it are caught; the test's process has no memory left to end well.
   EXPECT_EXIT(_exit(RunWithoutMemory([] { throw std::runtime_error("pthread_create failed"); })),
