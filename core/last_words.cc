@@ -85,8 +85,8 @@ void BeforeAll(int /*argc*/, char** /*argv*/, char** /*environment*/) { HandleLa
 }  // namespace
 
 void HandleLastWords() {
-  if (kSanitized) return;
   std::set_terminate(OnTerminate);
+  if (kSanitized) return;
   stack_t stack{};
   stack.ss_sp = signal_stack.data();
   stack.ss_size = signal_stack.size();

@@ -1,23 +1,15 @@
 #include "eval/report/report_video.h"
 
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstring>
 #include <limits>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
-#include <optional>
 
 #include "core/decode_image.h"
 #include "core/files.h"
 #include "core/json_text.h"
 #include "core/plain_name.h"
-#include "core/quiet_stderr.h"
 #include "eval/compare/report_record.h"
+#include "eval/report/film_file.h"
 #include "eval/report/recording.h"
 #include "eval/run/compare_names.h"
 #include "eval/run/run_folder.h"
@@ -47,15 +39,6 @@ struct Panel {
 void Write(cv::Mat& image, const std::string& text, cv::Point at, double size, int thickness = 1) {
   cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, size, kInk, thickness, cv::LINE_AA);
 }
-
-// A file that goes away unless it was renamed.
-struct Temporary {
-  std::filesystem::path path;
-  ~Temporary() {
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-  }
-};
 
 class Film {
  public:
@@ -111,150 +94,6 @@ cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
   cv::addWeighted(from, 1 - share, to, share, 0, mixed);
   return mixed;
 }
-
-}  // namespace
-
-// An MP4 file is a row of boxes, each a length and four letters. One that was cut has none called
-// "moov", which is written last, or one that is longer than what is there.
-bool IsWholeVideo(std::string_view bytes) {
-  constexpr std::size_t kHead = 8;
-  bool has_index = false;
-  while (!bytes.empty()) {
-    if (bytes.size() < kHead) return false;
-    const auto number = [&](std::size_t from, std::size_t count) {
-      std::uint64_t value = 0;
-      for (std::size_t i = from; i < from + count; ++i) {
-        value = value << 8U | static_cast<unsigned char>(bytes[i]);
-      }
-      return value;
-    };
-    std::uint64_t length = number(0, 4);
-    // 1: the length is in eight bytes behind; 0, to the end of the file, is what was never filled
-    // in.
-    if (length == 1 && bytes.size() >= 2 * kHead) length = number(kHead, kHead);
-    if (length < kHead || length > bytes.size()) return false;
-    has_index = has_index || bytes.substr(4, 4) == "moov";
-    bytes.remove_prefix(length);
-  }
-  return has_index;
-}
-
-namespace {
-
-// A file in memory that a library can open by a name: it says nothing where it could not write.
-class MemoryFile {
- public:
-  MemoryFile()
-      : descriptor_(memfd_create("tsdfpp-film", MFD_CLOEXEC)),
-        failure_(descriptor_ < 0 ? errno : 0) {}
-  ~MemoryFile() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  bool is_open() const { return descriptor_ >= 0; }
-  int failure() const { return failure_; }  // as errno
-  Expected<std::string> Read() const {
-    std::string bytes;
-    std::array<char, 65536> block{};
-    while (true) {
-      const ssize_t count =
-          pread(descriptor_, block.data(), block.size(), static_cast<off_t>(bytes.size()));
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) return EnvironmentError("a film cannot be read ({})", std::strerror(errno));
-      if (count == 0) return bytes;
-      bytes.append(block.data(), static_cast<std::size_t>(count));
-    }
-  }
-  std::string path() const { return fmt::format("/proc/{}/fd/{}", getpid(), descriptor_); }
-
- private:
-  int descriptor_;
-  int failure_;
-};
-
-std::string HiddenName(const std::filesystem::path& file) {
-  return fmt::format(".{}.", file.filename().string());
-}
-
-// Links to the memory of processes that were killed.
-void RemoveDeadLinks(const std::filesystem::path& file) {
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  std::vector<std::filesystem::path> dead;
-  std::error_code failure;
-  for (std::filesystem::directory_iterator entry(folder, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    const std::string name = entry->path().filename().string();
-    std::error_code unknown;
-    if (name.starts_with(HiddenName(file)) && name.ends_with(".mp4") &&
-        std::filesystem::is_symlink(entry->symlink_status(unknown)) &&
-        !std::filesystem::exists(entry->path(), unknown)) {
-      dead.push_back(entry->path());
-    }
-  }
-  for (const std::filesystem::path& link : dead) std::filesystem::remove(link, failure);
-}
-
-// The film while it is written. OpenCV does not say whether what it wrote got anywhere, so it
-// writes to memory. It knows the format by the name's end, so a link there has one.
-class FilmFile {
- public:
-  explicit FilmFile(const std::filesystem::path& file)
-      : file_(file),
-        link_{file.parent_path() / fmt::format("{}{}.mp4", HiddenName(file), getpid())} {}
-
-  // Errors: kEnvironment, the folder refuses or there is no encoder.
-  Expected<void> Open(cv::Size size) {
-    if (file_.has_parent_path()) TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(file_.parent_path()));
-    if (!memory_.is_open()) return Cannot(std::strerror(memory_.failure()));
-    RemoveDeadLinks(file_);
-    std::error_code failure;
-    std::filesystem::create_symlink(memory_.path(), link_.path, failure);
-    if (failure) return Cannot(failure.message());
-    quiet_.emplace();  // the encoder prints what it chose, and its threads what they lack
-    writer_.open(link_.path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
-                 kRate_hz, size);
-    if (writer_.isOpened()) return {};
-    return EnvironmentError(
-        "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",
-        file_.string());
-  }
-
-  void Show(const cv::Mat& page) {
-    writer_.write(page);
-    ++frames_;
-  }
-
-  int frames() const { return frames_; }
-
-  // Errors: kEnvironment, the film is not whole or cannot be written.
-  Expected<void> Finish() {
-    writer_.release();
-    // The encoder goes on after an error, with another film, and OpenCV says nothing of it.
-    const std::string words = quiet_ ? quiet_->Words() : "";
-    quiet_.reset();
-    if (words.find("[error]") != std::string::npos) {
-      return Cannot("its encoder says '" + words + "'");
-    }
-    TSDFPP_ASSIGN(const std::string bytes, memory_.Read());
-    if (!IsWholeVideo(bytes)) {
-      return Cannot(fmt::format("the video is cut off after {} bytes", bytes.size()));
-    }
-    return WriteFile(file_, bytes);
-  }
-
- private:
-  tl::unexpected<Error> Cannot(const std::string& why) const {
-    return EnvironmentError("cannot write '{}': {}", file_.string(), why);
-  }
-
-  std::filesystem::path file_;
-  MemoryFile memory_;
-  Temporary link_;
-  std::optional<QuietStderr> quiet_;  // outlives the encoder's threads
-  cv::VideoWriter writer_;
-  int frames_ = 0;
-};
 
 // Errors: kData, saying what to do, where the recording is of another run than the summary.
 Expected<void> CheckRecordedRun(const std::filesystem::path& run) {
@@ -393,7 +232,7 @@ Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
   const Film film(footage.panels,
                   {kCellWidth, std::max(1, kCellWidth * first[0].rows / first[0].cols)});
   FilmFile out(file);
-  TSDFPP_RETURN_IF_ERROR(out.Open(film.size()));
+  TSDFPP_RETURN_IF_ERROR(out.Open(film.size(), kRate_hz));
   TSDFPP_ASSIGN(const LastPage grown, ShowGrowth(footage, film, out));
   TSDFPP_RETURN_IF_ERROR(ShowRemoval(footage, film, grown, out));
   TSDFPP_RETURN_IF_ERROR(out.Finish());

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string_view>
 
 #include "core/error.h"
 
@@ -21,8 +20,5 @@ struct ReportVideo {
 // kEnvironment where OpenCV has no H.264 encoder or the disk refuses: then no file is there.
 Expected<ReportVideo> WriteReportVideo(const std::filesystem::path& run,
                                        const std::filesystem::path& file);
-
-// Whether the bytes are an MP4 file from its beginning to its end, with its index.
-bool IsWholeVideo(std::string_view bytes);
 
 }  // namespace tsdfpp

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
-#include <opencv2/imgproc.hpp>
 
 #include "core/types.h"
 
@@ -59,6 +58,27 @@ bool Bleeds(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_m
   return std::abs(of_own - of_others) > step_m && std::abs(z - of_others) < std::abs(z - of_own);
 }
 
+// 255 at all pixels whose windows have more than one id, and at some beside them; most have one.
+cv::Mat NearOutlines(const cv::Mat& ids) {
+  cv::Mat near(ids.size(), CV_8UC1, cv::Scalar(0));
+  for (int v = 0; v < ids.rows; ++v) {
+    const auto* row = ids.ptr<InstanceId>(v);
+    const auto* below = ids.ptr<InstanceId>(std::min(v + 1, ids.rows - 1));
+    for (int u = 0; u < ids.cols; ++u) {
+      const bool differs = row[u] != below[u] || (u + 1 < ids.cols && row[u] != row[u + 1]);
+      if (!differs) continue;
+      const int left = std::max(0, u - kBleedingReach_px);
+      const int right = std::min(ids.cols - 1, u + kBleedingReach_px);
+      for (int y = std::max(0, v - kBleedingReach_px);
+           y <= std::min(ids.rows - 1, v + kBleedingReach_px); ++y) {
+        auto* to = near.ptr<std::uint8_t>(y);
+        std::fill(to + left, to + right + 1, std::uint8_t{255});
+      }
+    }
+  }
+  return near;
+}
+
 }  // namespace
 
 Expected<BleedingPixels> BleedingPixelsFromName(std::string_view name) {
@@ -81,24 +101,19 @@ std::string_view BleedingPixelsName(BleedingPixels bleeding) {
 }
 
 cv::Mat WithoutBleeding(const cv::Mat& depth, const cv::Mat& ids, float step_m) {
-  // Where a window has more than one id; most have not.
-  const cv::Mat window = cv::Mat::ones(kSide, kSide, CV_8U);
-  cv::Mat least;
-  cv::Mat most;
-  cv::erode(ids, least, window);
-  cv::dilate(ids, most, window);
-  cv::Mat bleeds(ids.size(), CV_8UC1);
+  const cv::Mat near = NearOutlines(ids);
+  cv::Mat bleeds(ids.size(), CV_8UC1, cv::Scalar(0));
   std::atomic<bool> any = false;
   tbb::parallel_for(
       tbb::blocked_range<int>(0, ids.rows, kRowsPerTask),
       [&](const tbb::blocked_range<int>& range) {
         for (int v = range.begin(); v != range.end(); ++v) {
-          const auto* low = least.ptr<InstanceId>(v);
-          const auto* high = most.ptr<InstanceId>(v);
+          const auto* is_near = near.ptr<std::uint8_t>(v);
           auto* row = bleeds.ptr<std::uint8_t>(v);
           for (int u = 0; u < ids.cols; ++u) {
-            row[u] = low[u] != high[u] && Bleeds(depth, ids, v, u, step_m) ? 255 : 0;
-            if (row[u] != 0) any.store(true, std::memory_order_relaxed);
+            if (is_near[u] == 0 || !Bleeds(depth, ids, v, u, step_m)) continue;
+            row[u] = 255;
+            any.store(true, std::memory_order_relaxed);
           }
         }
       },
