@@ -12,6 +12,7 @@
 #include "mapper/track/camera_tracker.h"
 #include "mapper/track/frozen_pixels.h"
 #include "mapper/track/given_poses.h"
+#include "mapper/track/lost_objects.h"
 #include "mapper/track/pcl_icp.h"
 #include "mapper/track/sdf_tracker.h"
 
@@ -117,6 +118,11 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
       trajectories_(std::move(trajectories)),
       objects_(config.associate == AssociationMode::kGiven ? objects : born),
       tracked_(config.tracked, objects_) {
+  // One field cannot do without the values that an object has in it.
+  if (config.poses == PoseSource::kTrack && map_->editing() != nullptr &&
+      !IsOneField(config.method)) {
+    lost_ = std::make_unique<LostObjects>(config.track);
+  }
   is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
@@ -137,13 +143,18 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   const std::optional<Frame> frame = camera_->Locate(given, segments.ids, *map_);
   times.locate_s = watch.Lap();
   if (!frame) return times;
-  const AssociatedObjects association = associator_->Associate(*frame, segments, *map_);
+  associator_->ExpectReturns(lost_ != nullptr && !lost_->empty());
+  AssociatedObjects association = associator_->Associate(*frame, segments, *map_);
   times.associate_s = watch.Lap();
-  TSDFPP_ASSIGN(TrackedFrame tracked, Track(*frame, association));
+  const std::vector<InstanceId> found = FindAgain(*frame, association);
+  Expected<TrackedFrame> tracked = Track(*frame, association);
+  Settle(found, tracked.has_value());
+  if (!tracked) return tl::unexpected(tracked.error());
+  TakeOutLost(*frame, *tracked);
   times.track_s = watch.Lap();
-  UpdatePoses(frame->index, std::move(tracked.T_WO));
+  UpdatePoses(frame->index, std::move(tracked->T_WO));
   times.update_poses_s = watch.Lap();
-  Fuse(*frame, tracked.labels);
+  Fuse(*frame, tracked->labels);
   times.fuse_s = watch.Lap();
   return times;
 }
@@ -168,7 +179,55 @@ Expected<Pipeline::TrackedFrame> Pipeline::Track(const Frame& frame,
   associator_->Accept();
   tracked_ = std::move(chosen);
   if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);
-  return TrackedFrame{std::move(tracked.T_WO), labels};
+  return TrackedFrame{std::move(tracked.T_WO), labels, std::move(tracked.seen)};
+}
+
+std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObjects& association) {
+  std::vector<InstanceId> found;
+  if (lost_ == nullptr || lost_->empty()) return found;
+  cv::Mat labels = association.labels.clone();
+  const auto put_back = [&](const std::optional<LostObjects::Found>& of) {
+    if (!of || !lost_->PutBack(of->id, of->T_WO, *map_)) return false;
+    T_WO_[of->id] = of->T_WO;
+    tracker_->Place(of->id, frame.index);
+    found.push_back(of->id);
+    return true;
+  };
+  for (const auto& [id, pixels] : PixelsByLabel(labels, config_.track.mask_erosion_px)) {
+    if (!lost_->Has(id) || put_back(lost_->Find(id, frame, pixels))) continue;
+    labels.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
+  }
+  for (const std::vector<int>& pixels : association.unclaimed) {
+    const auto of = lost_->FindAny(frame, pixels);
+    if (!of || std::ranges::count(found, of->id) > 0 || !put_back(of)) continue;
+    for (const int pixel : pixels) {
+      labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) = of->id;
+    }
+  }
+  association.labels = labels;
+  return found;
+}
+
+void Pipeline::Settle(const std::vector<InstanceId>& found, bool is_mapped) {
+  for (const InstanceId id : found) {
+    if (is_mapped) {
+      lost_->Forget(id);
+      track_log_.AddFound(id);
+    } else {
+      map_->Remove(id);
+      T_WO_.erase(id);
+    }
+  }
+}
+
+void Pipeline::TakeOutLost(const Frame& frame, TrackedFrame& tracked) {
+  if (lost_ == nullptr) return;
+  for (const InstanceId id : lost_->NotInPlace(frame, *map_, tracked.T_WO, tracked.seen)) {
+    lost_->Keep(id, *map_, tracked.T_WO.at(id));
+    map_->Remove(id);
+    tracked.T_WO.erase(id);
+    track_log_.AddLost(id);
+  }
 }
 
 void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {

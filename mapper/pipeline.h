@@ -25,6 +25,7 @@
 namespace tsdfpp {
 
 class CameraTracker;
+class LostObjects;
 
 // All that a pipeline is told.
 struct PipelineConfig {
@@ -120,11 +121,19 @@ class Pipeline {
   struct TrackedFrame {
     ObjectPoses T_WO;
     cv::Mat labels;
+    std::map<InstanceId, TrackStatus> seen;
   };
   // Errors: the segmenter's, and those of CheckFrameForm.
   Expected<Segments> Segment(const Frame& frame);
   // Nothing of the frame counts before the map is known to take it. Errors: those of CheckReach.
   Expected<TrackedFrame> Track(const Frame& frame, const AssociatedObjects& association);
+  // Puts lost objects whose segments are found into the map, and returns them; takes the labels off
+  // the segments of those that are not.
+  std::vector<InstanceId> FindAgain(const Frame& frame, AssociatedObjects& association);
+  // Those are found for good if the frame was mapped, and else lost again.
+  void Settle(const std::vector<InstanceId>& found, bool is_mapped);
+  // Takes those out of the map that the frame shows not to be in their place.
+  void TakeOutLost(const Frame& frame, TrackedFrame& tracked);
   // Moves the objects to where they are after the frame, and writes it down.
   void UpdatePoses(int frame, ObjectPoses T_WO);
   void Fuse(const Frame& frame, const cv::Mat& labels);
@@ -136,6 +145,7 @@ class Pipeline {
   std::unique_ptr<CameraTracker> camera_;
   std::unique_ptr<Associator> associator_;
   std::unique_ptr<Tracker> tracker_;
+  std::unique_ptr<LostObjects> lost_;  // nullptr where none can be
   std::unique_ptr<MapRepresentation> map_;
   ObjectPoses T_WO_;
   std::map<InstanceId, std::map<int, Pose>> trajectories_;

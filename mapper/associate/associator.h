@@ -19,6 +19,8 @@ struct AssociatedObjects {
   cv::Mat labels;
   // The semantic class of those objects for which a segment of the frame brought one.
   std::map<InstanceId, std::string> classes{};
+  // The pixels, with valid depth, of each segment that is none of the map's objects.
+  std::vector<std::vector<int>> unclaimed{};
 };
 
 class Associator {
@@ -29,6 +31,10 @@ class Associator {
   // (mapper/map_reach.h). Frames come in order.
   virtual AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                                       const MapRepresentation& map) = 0;
+
+  // Called before Associate(): whether objects are missing that may come back. A new segment may
+  // then be one of them, and is not to be a new object at once.
+  virtual void ExpectReturns(bool /*are_missing*/) {}
 
   // Called where the frame associated last was mapped; one that was refused leaves no trace.
   virtual void Accept() {}

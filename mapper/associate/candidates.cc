@@ -79,7 +79,8 @@ std::vector<Candidates::Pair> Candidates::PairsOf(std::size_t segment,
   return pairs;
 }
 
-std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W) {
+std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
+                                      int wait) {
   ++frame_;
   std::vector<CellOfCandidate> index;
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
@@ -113,12 +114,14 @@ std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vecto
       candidate = std::move(candidates_[*candidate_of[s]]);
     } else if (room > 0) {
       --room;
+      candidate.first = frame_;
     } else {
       continue;
     }
     candidate.seen.push_back(frame_);
     while (candidate.seen.front() <= frame_ - config_.confirm_window) candidate.seen.pop_front();
-    is_confirmed[s] = static_cast<int>(candidate.seen.size()) >= config_.confirm_frames;
+    is_confirmed[s] = static_cast<int>(candidate.seen.size()) >= config_.confirm_frames &&
+                      frame_ - candidate.first >= wait;
     if (is_confirmed[s]) continue;
     candidate.cells = CellsOf(segments_W[s]);
     left.push_back(std::move(candidate));

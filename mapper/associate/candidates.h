@@ -29,13 +29,16 @@ class Candidates {
   // no longer, and who cannot be any more is forgotten. A candidate is one segment of a frame at
   // most: pairs with the greatest overlap (that share times the share of the candidate's cells that
   // are near the segment's) are made first, and of a segment's only the kMostPairs greatest are
-  // looked at. While there are kMostCandidates, no segment becomes a further one.
-  std::vector<bool> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W);
+  // looked at. While there are kMostCandidates, no segment becomes a further one. None is confirmed
+  // in the first `wait` frames after that in which it was first there.
+  std::vector<bool> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
+                            int wait = 0);
 
   std::size_t size() const { return candidates_.size(); }
 
  private:
   struct Candidate {
+    int first = 0;              // the frame that it was first there
     std::deque<int> seen;       // frames, within the window
     std::vector<Index3> cells;  // of the points that it showed last, sorted
   };

@@ -19,6 +19,7 @@ struct VoteConfig {
   int min_points = 50;      // of a segment that may become a new object
   int confirm_frames = 3;   // it becomes one where it was there in so many frames ...
   int confirm_window = 5;   // ... of so many
+  int return_frames = 15;   // while objects are missing, not before it was there for so long
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

@@ -161,7 +161,8 @@ void VoxelVotes::GiveBirth(std::vector<Segment>& segments, double voxel_m) {
     points_W.push_back(segment.points_W);
   }
   if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
-  const std::vector<bool> is_confirmed = next_.candidates->Confirm(points_W);
+  const std::vector<bool> is_confirmed =
+      next_.candidates->Confirm(points_W, are_missing_ ? config_.return_frames : 0);
   for (std::size_t i = 0; i < unclaimed.size(); ++i) {
     if (!is_confirmed[i]) continue;
     if (next_.next_id >= kNoInstance) {
@@ -224,6 +225,9 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
     const auto* from = segments.ids.ptr<InstanceId>(v);
     auto* to = association.labels.ptr<InstanceId>(v);
     for (int u = 0; u < segments.ids.cols; ++u) to[u] = label_of[from[u]];
+  }
+  for (Segment& segment : found) {
+    if (!segment.object) association.unclaimed.push_back(std::move(segment.pixels));
   }
   for (const Segment& segment : found) {
     if (segment.shared_with.empty()) continue;

@@ -33,12 +33,16 @@ class VoxelVotes : public Associator {
   //     segment, the mask has merged the two: each pixel is then the nearest one's of those, and
   //     nobody's beyond near_voxels.
   //  5. *Births.* What is left is held back (kNoInstance: not fused, so that nothing of a false
-  //     segment enters the map) until Candidates confirm it, and then a new object. Ids count up
+  //     segment enters the map) until Candidates confirm it, and then a new object; while objects
+  //     are missing not before return_frames frames, in which it may be found to be one of them
+  //     (mapper/track/lost_objects.h). Ids count up
   //     and are never used again; after the last one, kNoInstance - 1, nothing is born any more,
   //     and Remarks() says so.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
+
+  void ExpectReturns(bool are_missing) override { are_missing_ = are_missing; }
 
   void Accept() override { state_ = next_; }
 
@@ -82,6 +86,7 @@ class VoxelVotes : public Associator {
   };
 
   VoteConfig config_;
+  bool are_missing_ = false;
   State state_;  // after the frame accepted last
   State next_;   // after the frame associated last
 };

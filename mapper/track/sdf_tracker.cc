@@ -85,6 +85,13 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
   return after;
 }
 
+void SdfTracker::Place(InstanceId id, int frame) {
+  Memory& memory = memory_[id];
+  memory.frame = frame - 1;
+  memory.motion_L = Pose::Identity();
+  memory.centre_L.reset();
+}
+
 std::optional<Pose> SdfTracker::Register(const Frame& frame,
                                          const std::vector<SegmentPoint>& points,
                                          const ObjectModel& model, double voxel_m, const Pose& T_WO,
