@@ -14,6 +14,7 @@ find_library(TSDFPP_LIBDEFLATE deflate REQUIRED)
 function(tsdfpp_add_readers target)
   cmake_parse_arguments(ARG "WITHOUT_MAPS;STAND_IN" "" "" ${ARGN})
   set(core
+      address_space.cc
       data_folder.cc
       exr_header.cc
       files.cc
@@ -21,6 +22,7 @@ function(tsdfpp_add_readers target)
       gltf_document.cc
       gltf_reader.cc
       gltf_writer.cc
+      guard.cc
       image_header.cc
       json_text.cc
       limits.cc
