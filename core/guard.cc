@@ -46,7 +46,7 @@ int StderrDescriptor() { return stderr_descriptor; }
 void SetStderrDescriptor(int descriptor) { stderr_descriptor = descriptor; }
 
 void PrintError(std::string_view program, std::string_view message) {
-  std::fprintf(stderr, "%s: %s\n", std::string(program).c_str(), OneLine(message).c_str());
+  dprintf(StderrDescriptor(), "%s: %s\n", std::string(program).c_str(), OneLine(message).c_str());
 }
 
 }  // namespace tsdfpp

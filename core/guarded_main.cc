@@ -26,7 +26,7 @@ void FillClosedDescriptors() {
 int GuardedMain(const char* program, const std::function<int()>& body) {
   FillClosedDescriptors();
   SpeakAs(program);
-  HandleLastWords();
+  HandleLastWords();  // again: a library may have handlers of its own since
   // Their warnings would stand before our sentence.
   setenv("EGL_LOG_LEVEL", "fatal", 0);
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);

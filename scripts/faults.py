@@ -165,6 +165,9 @@ class Record:
             self.figures["lost"].append({"command": name, "fault": what, "what": outcome.lost})
 
     def write(self, out):
+        # The record is kept with the sources, where no folder of a machine belongs.
+        for one in self.figures["lost"]:
+            one["what"] = [text.replace(os.path.abspath(out), "OUT") for text in one["what"]]
         with open(os.path.join(out, "faults.json"), "w", encoding="utf-8") as file:
             json.dump(self.figures, file, indent=1)
             file.write("\n")

@@ -149,7 +149,7 @@ Expected<void> Workers::Reap(Child& child) {
                             strsignal(WTERMSIG(status)));
   }
   if (WEXITSTATUS(status) == static_cast<int>(ErrorKind::kEnvironment)) {
-    return EnvironmentError("a worker process is out of memory");
+    return EnvironmentError("a worker process ended for want of memory, or of a file");
   }
   return EnvironmentError("a worker process ended with exit code {}", WEXITSTATUS(status));
 }
