@@ -8,8 +8,8 @@
 
 #include "core/files.h"
 #include "eval/compare/compare.h"
-#include "eval/report/recording.h"
 #include "eval/report/film_file.h"
+#include "eval/report/recording.h"
 #include "eval/report/report_video.h"
 #include "eval/run/open_source.h"
 #include "tests/core/temp_folder.h"
