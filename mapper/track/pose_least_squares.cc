@@ -68,7 +68,8 @@ LeastSquaresResult MinimiseOverPose(const std::function<NormalEquations(const Po
     Pose T = frame.MotionOf(step) * result.T;
     // A rotation again after a product of many.
     T.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
-    const bool is_small = step.cwiseAbs().maxCoeff() < options.settled_m;
+    result.last_step_m = step.cwiseAbs().maxCoeff();
+    const bool is_small = result.last_step_m < options.settled_m;
     const NormalEquations there = terms(T);
     const NormalEquations with_prior = WithPrior(there, T, frame, prior);
     if (with_prior.cost <= here.cost) {

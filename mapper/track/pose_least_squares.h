@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 
 #include "core/types.h"
 
@@ -48,6 +49,7 @@ struct LeastSquaresResult {
   Pose T = Pose::Identity();
   NormalEquations at;  // of the terms alone, at T
   bool converged = false;
+  double last_step_m = std::numeric_limits<double>::infinity();  // the longest length of it
   int iterations = 0;
 };
 

@@ -13,6 +13,10 @@ namespace {
 constexpr double kLeastRadius_voxels = 1;
 // A deviation that is taken for real, voxels: exact data would else make outliers of every edge.
 constexpr double kLeastDeviation_voxels = 0.02;
+// A search that ran out of iterations is as good as settled where its steps are no longer than
+// this. While many points are outliers Huber's function makes steps short and of one length; an
+// object that was refused for it, step by step the same, was lost where it was pushed along.
+constexpr double kNearlySettled_voxels = 0.1;
 
 // About the segment's centroid, with the root of the mean squared distance from it as radius.
 MotionFrame FrameOf(const SdfRegistration& task) {
@@ -163,8 +167,10 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   RegisterCoarsely(task, config, options, result);
   DistanceTerm fine = TermOf(task, result.frame, config, 1);
   const auto [prior, found] = RegisterFinely(task, config, options, fine, result);
+  const bool is_settled =
+      found.converged || found.last_step_m < kNearlySettled_voxels * task.voxel_m;
   // Where no point has a distance there is nothing to be at rest on.
-  result.converged = found.converged && found.at.H.trace() > 0;
+  result.converged = is_settled && found.at.H.trace() > 0;
   result.counts = fine.Count(found.T);
   result.information = found.at.H;
   result.known = DirectionsOf(found.at.H);

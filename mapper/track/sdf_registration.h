@@ -42,6 +42,7 @@ KnownDirections DirectionsOf(const Matrix6& information);
 
 struct SdfRegistrationResult {
   Pose T_LC = Pose::Identity();
+  // The last pass settled, or its last step moved no point by more than a tenth of a voxel.
   bool converged = false;
   int iterations = 0;  // of all passes
   DistanceCounts counts;

@@ -85,6 +85,25 @@ TEST(SdfRegistration, FindsWhereABoxIs) {
   EXPECT_EQ(found.counts.inliers, found.counts.points);
 }
 
+// A search that is asked for more than it can settle to is a search all the same.
+TEST(SdfRegistration, IsSettledWhereItCreeps) {
+  const DistanceFunction box = reference::BoxDistance({0.08, 0.05, 0.06});
+  const TsdfGrid grid = GridOf(box);
+  const SurfaceReader model(grid, kVoxel_m);
+  const auto points = InCamera(reference::VisiblePoints(box, kEye, 120));
+  SdfTrackConfig config;
+  config.settled_voxels = 1e-6;
+  config.max_iterations = 2;
+  const auto found = RegisterToDistances(TaskFrom(model, points, kMotion), config);
+  EXPECT_TRUE(found.converged);
+  const Pose off = found.T_LC * TrueLC().inverse();
+  EXPECT_LT(off.translation().norm(), kEdges_voxels * kVoxel_m);
+  // One step a pass is too few from further off: the last still moves points.
+  config.max_iterations = 1;
+  const Pose far = MakePose(50 * kDegree, {0.3, -1, 0.5}, {0.02, -0.02, 0.01});
+  EXPECT_FALSE(RegisterToDistances(TaskFrom(model, points, far), config).converged);
+}
+
 // All but the turn about its axis, along which it stays where it was expected.
 TEST(SdfRegistration, FindsWhereATorusIsAsBruteForceDoes) {
   const DistanceFunction torus = reference::TorusDistance(0.06, 0.04);
