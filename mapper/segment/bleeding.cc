@@ -36,10 +36,17 @@ class Depths {
   std::size_t count_ = 0;
 };
 
-bool Bleeds(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_m) {
+// What a pixel says of the camera.
+enum class Verdict : std::uint8_t {
+  kNothing,
+  kHolds,  // beside a step in depth along an outline, with the depth of its own side ...
+  kBleeds  // ... or with that of the other
+};
+
+Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_m) {
   const InstanceId id = ids.at<InstanceId>(v, u);
   const float z = depth.at<float>(v, u);
-  if (id == kNoInstance || !IsValidDepth(z)) return false;
+  if (id == kNoInstance || !IsValidDepth(z)) return Verdict::kNothing;
   Depths own;
   Depths others;
   for (int y = std::max(0, v - kBleedingReach_px);
@@ -52,10 +59,11 @@ bool Bleeds(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_m
       (labels[x] == id ? own : others).Add(depths[x]);
     }
   }
-  if (own.empty() || others.empty()) return false;
+  if (own.empty() || others.empty()) return Verdict::kNothing;
   const float of_own = own.Median();
   const float of_others = others.Median();
-  return std::abs(of_own - of_others) > step_m && std::abs(z - of_others) < std::abs(z - of_own);
+  if (!(std::abs(of_own - of_others) > step_m)) return Verdict::kNothing;
+  return std::abs(z - of_others) < std::abs(z - of_own) ? Verdict::kBleeds : Verdict::kHolds;
 }
 
 // 255 at all pixels whose windows have more than one id, and at some beside them; most have one.
@@ -103,22 +111,29 @@ std::string_view BleedingPixelsName(BleedingPixels bleeding) {
 cv::Mat WithoutBleeding(const cv::Mat& depth, const cv::Mat& ids, float step_m) {
   const cv::Mat near = NearOutlines(ids);
   cv::Mat bleeds(ids.size(), CV_8UC1, cv::Scalar(0));
-  std::atomic<bool> any = false;
+  std::atomic<std::int64_t> beside_steps = 0;
+  std::atomic<std::int64_t> bleeding = 0;
   tbb::parallel_for(
       tbb::blocked_range<int>(0, ids.rows, kRowsPerTask),
       [&](const tbb::blocked_range<int>& range) {
+        std::array<std::int64_t, 3> counts{};
         for (int v = range.begin(); v != range.end(); ++v) {
           const auto* is_near = near.ptr<std::uint8_t>(v);
           auto* row = bleeds.ptr<std::uint8_t>(v);
           for (int u = 0; u < ids.cols; ++u) {
-            if (is_near[u] == 0 || !Bleeds(depth, ids, v, u, step_m)) continue;
-            row[u] = 255;
-            any.store(true, std::memory_order_relaxed);
+            if (is_near[u] == 0) continue;
+            const Verdict verdict = VerdictOf(depth, ids, v, u, step_m);
+            ++counts[static_cast<std::size_t>(verdict)];
+            if (verdict == Verdict::kBleeds) row[u] = 255;
           }
         }
+        const std::int64_t bleed = counts[static_cast<std::size_t>(Verdict::kBleeds)];
+        beside_steps += bleed + counts[static_cast<std::size_t>(Verdict::kHolds)];
+        bleeding += bleed;
       },
       tbb::simple_partitioner());
-  if (!any) return ids;
+  const auto least = kLeastBleedingShare * static_cast<double>(beside_steps);
+  if (bleeding == 0 || static_cast<double>(bleeding) < least) return ids;
   cv::Mat rest = ids.clone();
   rest.setTo(static_cast<double>(kNoInstance), bleeds);
   return rest;

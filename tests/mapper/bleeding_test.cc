@@ -25,10 +25,15 @@ float UpperMedian(std::vector<float> values) {
   return values[values.size() / 2];
 }
 
-// The rule, pixel by pixel.
-bool Bleeds(const cv::Mat& depth, const cv::Mat& ids, int v, int u) {
+// The rule, pixel by pixel: whether it lies beside a step, and whether it bleeds.
+struct Verdict {
+  bool is_beside_step = false;
+  bool bleeds = false;
+};
+
+Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u) {
   const InstanceId id = ids.at<InstanceId>(v, u);
-  if (id == kNoInstance || !IsValidDepth(depth.at<float>(v, u))) return false;
+  if (id == kNoInstance || !IsValidDepth(depth.at<float>(v, u))) return {};
   std::vector<float> own;
   std::vector<float> others;
   for (int y = 0; y < depth.rows; ++y) {
@@ -40,17 +45,33 @@ bool Bleeds(const cv::Mat& depth, const cv::Mat& ids, int v, int u) {
       (ids.at<InstanceId>(y, x) == id ? own : others).push_back(depth.at<float>(y, x));
     }
   }
-  if (own.empty() || others.empty()) return false;
+  if (own.empty() || others.empty()) return {};
   const float z = depth.at<float>(v, u);
-  return std::abs(UpperMedian(own) - UpperMedian(others)) > kStep_m &&
-         std::abs(z - UpperMedian(others)) < std::abs(z - UpperMedian(own));
+  if (std::abs(UpperMedian(own) - UpperMedian(others)) <= kStep_m) return {};
+  return {true, std::abs(z - UpperMedian(others)) < std::abs(z - UpperMedian(own))};
+}
+
+// Of the whole image: what waits.
+cv::Mat Waiting(const cv::Mat& depth, const cv::Mat& ids) {
+  cv::Mat waits(ids.size(), CV_8UC1, cv::Scalar(0));
+  int beside_steps = 0;
+  for (int v = 0; v < ids.rows; ++v) {
+    for (int u = 0; u < ids.cols; ++u) {
+      const Verdict verdict = VerdictOf(depth, ids, v, u);
+      beside_steps += verdict.is_beside_step ? 1 : 0;
+      waits.at<std::uint8_t>(v, u) = verdict.bleeds ? 255 : 0;
+    }
+  }
+  if (cv::countNonZero(waits) < kLeastBleedingShare * beside_steps) waits.setTo(0);
+  return waits;
 }
 
 TEST(Bleeding, IsTheRuleOfEachPixel) {
   std::minstd_rand dice(7);
   const auto below = [&](int end) { return static_cast<int>(dice() % static_cast<unsigned>(end)); };
   int bleeding = 0;
-  for (int trial = 0; trial < 150; ++trial) {
+  int taken_as_they_are = 0;
+  for (int trial = 0; trial < 300; ++trial) {
     const cv::Size size(1 + below(40), 1 + below(30));
     cv::Mat ids(size, CV_16UC1, cv::Scalar(kBackground));
     cv::Mat depth(size, CV_32FC1, cv::Scalar(kWall_m));
@@ -60,22 +81,27 @@ TEST(Bleeding, IsTheRuleOfEachPixel) {
       ids(inside) = i == 5 ? kNoInstance : 1 + i;
       depth(inside) = 1.0 + 0.015 * below(8);
     }
-    for (int i = 0; i < size.area() / 6; ++i) {
+    // In some frames next to nothing is off.
+    const int most_off = trial % 3 == 0 ? 3 : size.area() / 6;
+    for (int i = 0; i < most_off; ++i) {
       const float values[] = {0,       std::numeric_limits<float>::quiet_NaN(),       -1, kBox_m,
                               kWall_m, 1.0F + 0.001F * static_cast<float>(below(300))};
       depth.at<float>(below(size.height), below(size.width)) = values[below(6)];
     }
     const cv::Mat rest = WithoutBleeding(depth, ids, kStep_m);
+    const cv::Mat waiting = Waiting(depth, ids);
+    bleeding += cv::countNonZero(waiting);
+    taken_as_they_are += cv::countNonZero(waiting) == 0 ? 1 : 0;
     for (int v = 0; v < size.height; ++v) {
       for (int u = 0; u < size.width; ++u) {
-        const bool bleeds = Bleeds(depth, ids, v, u);
-        bleeding += bleeds ? 1 : 0;
-        const InstanceId expected = bleeds ? kNoInstance : ids.at<InstanceId>(v, u);
+        const bool waits = waiting.at<std::uint8_t>(v, u) != 0;
+        const InstanceId expected = waits ? kNoInstance : ids.at<InstanceId>(v, u);
         ASSERT_EQ(rest.at<InstanceId>(v, u), expected) << trial << ": " << v << ", " << u;
       }
     }
   }
   EXPECT_GT(bleeding, 500);
+  EXPECT_GT(taken_as_they_are, 5);
 }
 
 // A box before a wall.
@@ -98,7 +124,7 @@ TEST(Bleeding, TrueDepthStaysAsItIs) {
 // At the box's corners the median of the few pixels inside may be one of the shifted ones.
 constexpr double kMisjudged = 0.02;
 
-// A quarter of the pixels have the depth of up to two pixels off: those to which that makes a
+// A third of the pixels have the depth of up to two pixels off: those to which that makes a
 // difference are found, and no others.
 TEST(Bleeding, WhatWasShiftedIsFound) {
   const View view;
@@ -111,7 +137,7 @@ TEST(Bleeding, WhatWasShiftedIsFound) {
       for (int u = 2; u < shifted.cols - 2; ++u) {
         const int dv = static_cast<int>(dice() % 5) - 2;
         const int du = static_cast<int>(dice() % 5) - 2;
-        if (dice() % 4 == 0) shifted.at<float>(v, u) = view.depth.at<float>(v + dv, u + du);
+        if (dice() % 3 == 0) shifted.at<float>(v, u) = view.depth.at<float>(v + dv, u + du);
       }
     }
     const cv::Mat is_wrong = shifted != view.depth;
@@ -121,6 +147,15 @@ TEST(Bleeding, WhatWasShiftedIsFound) {
   }
   ASSERT_GT(wrong, 1000);
   EXPECT_LT(misjudged, kMisjudged * wrong);
+}
+
+// A pixel or two of the wrong depth are none of a camera that bleeds.
+TEST(Bleeding, OfAFewPixelsNoneWaits) {
+  View view;
+  view.depth.at<float>(20, 21) = kWall_m;
+  view.depth.at<float>(25, 43) = kWall_m;
+  const cv::Mat rest = WithoutBleeding(view.depth, view.ids, kStep_m);
+  EXPECT_EQ(rest.data, view.ids.data);
 }
 
 TEST(Bleeding, NothingOfOneIdAndNothingAtAll) {
@@ -135,8 +170,10 @@ TEST(Bleeding, NothingOfOneIdAndNothingAtAll) {
 // something is tracked by signed distances.
 TEST(Bleeding, WaitsInThePipeline) {
   View view;
-  const cv::Point at(21, 20);
-  view.depth.at<float>(at) = kWall_m;
+  for (int u = 20; u < 44; u += 2) {
+    for (const int v : {12, 31}) view.depth.at<float>(v, u) = kWall_m;
+  }
+  const cv::Point at(24, 12);
   Frame frame;
   frame.index = 1;
   frame.intrinsics = {64, 48, 60, 60, 31.5, 23.5};
