@@ -136,8 +136,9 @@ std::optional<std::string> SurfelMap::FindFault() const {
   for (const auto& [id, object] : objects_) {
     for (std::size_t i = 0; i < object.surfels.size(); ++i) {
       const Surfel& surfel = object.surfels[i];
-      const auto fault = [&](std::string_view what) {
-        return fmt::format("surfel {} of object {} {}", i, id, what);
+      // Named anew: clang 14 lets no lambda have a name that a declaration took apart.
+      const auto fault = [i, of = id](std::string_view what) {
+        return fmt::format("surfel {} of object {} {}", i, of, what);
       };
       if (!surfel.centre.allFinite()) return fault("is nowhere");
       if (!(std::abs(surfel.normal.norm() - 1) <= kUnitTolerance)) {
