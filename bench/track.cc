@@ -27,6 +27,9 @@ constexpr double kLeastMoved_m = 0.05;
 // Turns are judged where the terms on the true surface know of each at least this share, which a
 // ball's do not.
 constexpr double kFixedTurn = 0.01;
+// Between these the squared errors of motions are called as large as the covariance says.
+constexpr double kLeastNees = 0.5;
+constexpr double kMostNees = 2;
 constexpr std::size_t kPoints = 500;  // of a true surface, for ADD and ADD-S, which is quadratic
 
 struct RunPlan {
@@ -149,9 +152,11 @@ std::vector<Row> Judge(const std::string& scene, const Plan& plan, const Stage& 
       const InstanceId id = model.info.id;
       const auto estimate = run.trajectories().find(id);
       if (!stage.shown.contains(id) || estimate == run.trajectories().end()) continue;
-      Row row{scene, stage.depth, plan.runs[i].name, model.info.name,
-              ScoreTracked(
-                  {estimate->second, truth.at(id), stage.shown.at(id), SomePoints(model.mesh_O)})};
+      TrackedObject object{estimate->second, truth.at(id), stage.shown.at(id),
+                           SomePoints(model.mesh_O)};
+      const auto motions = run.log().motions().find(id);
+      if (motions != run.log().motions().end()) object.motions = motions->second;
+      Row row{scene, stage.depth, plan.runs[i].name, model.info.name, ScoreTracked(object)};
       if (row.scores.moved_m < kLeastMoved_m) continue;
       row.span = run.log().objects().at(id);
       row.shown = stage.shown.at(id).size();
@@ -210,11 +215,11 @@ std::string Scaled(const Measured& value, double factor, int digits) {
 
 Expected<void> WriteObjects(const std::vector<Row>& rows, const fs::path& out) {
   FigureTable table(
-      {"scene",           "depth",         "run",     "object",       "moved cm",
-       "ATE mm",          "farthest mm",   "end mm",  "rotation deg", "Co-Fusion ATE mm",
-       "RPE mm",          "RPE deg",       "ADD mm",  "ADD-S mm",     "within 5 mm",
-       "within 2 cm",     "shown",         "tracked", "stayed",       "frozen",
-       "known of shifts", "known of turns"});
+      {"scene",           "depth",          "run",     "object",         "moved cm",
+       "ATE mm",          "farthest mm",    "end mm",  "rotation deg",   "Co-Fusion ATE mm",
+       "RPE mm",          "RPE deg",        "ADD mm",  "ADD-S mm",       "within 5 mm",
+       "within 2 cm",     "shown",          "tracked", "stayed",         "frozen",
+       "known of shifts", "known of turns", "NEES",    "free directions"});
   for (const Row& row : rows) {
     const TrackScores& s = row.scores;
     table.Add({row.scene,
@@ -238,7 +243,9 @@ Expected<void> WriteObjects(const std::vector<Row>& rows, const fs::path& out) {
                std::to_string(row.span.stayed),
                std::to_string(row.span.frozen),
                Cell(row.shift_share, 4),
-               Cell(row.turn_share, 4)});
+               Cell(row.turn_share, 4),
+               Scaled(s.nees, 1, 2),
+               Cell(s.free_directions, 2)});
   }
   return table.Write(out, "objects");
 }
@@ -287,6 +294,28 @@ Expected<void> WriteTimes(const std::vector<Row>& rows, const fs::path& out) {
   return table.Write(out, "times");
 }
 
+// A row a depth and run, over the scenes and objects.
+Expected<void> WriteUncertainty(const std::vector<Row>& rows, const Plan& plan,
+                                const fs::path& out) {
+  FigureTable table({"depth", "run", "objects", "0.5 to 2", "least", "median", "largest"});
+  for (const std::string& depth : plan.depths) {
+    for (const RunPlan& run : plan.runs) {
+      std::vector<double> values;
+      for (const Row& row : rows) {
+        if (row.depth != depth || row.run != run.name || !row.scores.nees.value) continue;
+        values.push_back(*row.scores.nees.value);
+      }
+      if (values.empty()) continue;
+      const auto honest = std::ranges::count_if(
+          values, [](double value) { return value >= kLeastNees && value <= kMostNees; });
+      table.Add({depth, run.name, std::to_string(values.size()), std::to_string(honest),
+                 Cell(*std::ranges::min_element(values), 2), Cell(MedianOf(values), 2),
+                 Cell(*std::ranges::max_element(values), 2)});
+    }
+  }
+  return table.Write(out, "uncertainty");
+}
+
 Expected<void> WriteTables(const std::vector<Row>& rows, const Plan& plan, const fs::path& out) {
   TSDFPP_RETURN_IF_ERROR(WriteObjects(rows, out));
   TSDFPP_RETURN_IF_ERROR(WriteByScene(rows, plan, out, "shifts", 2, [](const Row& row) {
@@ -297,6 +326,7 @@ Expected<void> WriteTables(const std::vector<Row>& rows, const Plan& plan, const
     return row.turn_share < kFixedTurn ? std::nullopt
                                        : row.scores.trajectory.rotation_rmse_deg.value;
   }));
+  TSDFPP_RETURN_IF_ERROR(WriteUncertainty(rows, plan, out));
   return WriteTimes(rows, out);
 }
 

@@ -24,7 +24,9 @@ struct TrackBenchOptions {
 // nguyen2012, to each run. `known` registers to the distances of the true surfaces, beginning at
 // the true poses. Writes objects.csv, a row for each run and object of which a point moves at least
 // 5 cm; of these, a row a scene and depth, shifts.csv (ATE, millimetres) and turns.csv (rotation,
-// degrees); and times.csv, a row a run: milliseconds an object and frame, medians. Errors: kUsage
+// degrees); uncertainty.csv, a row a depth and run: of how many objects the squared errors of the
+// motions are as large as their covariances say (TrackScores::nees); and times.csv, a row a run:
+// milliseconds an object and frame, medians. Errors: kUsage
 // for an unknown scene, depth or run, or wrong settings; else those of the scenes and the renderer.
 Expected<void> RunTrackBench(const TrackBenchOptions& options);
 

@@ -1,6 +1,7 @@
 #include "bench/track_scores.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "metrics/object_pose.h"
 #include "metrics/statistics.h"
@@ -27,6 +28,34 @@ Measured Within(const std::vector<double>& errors_m, double length_m) {
   const auto within =
       std::ranges::count_if(errors_m, [&](double error) { return error <= length_m; });
   return Measured::Of(static_cast<double>(within) / static_cast<double>(errors_m.size()));
+}
+
+// From the mean over six directions to that over those which are not free.
+struct MotionScore {
+  double nees = 0;
+  int free_directions = 0;
+};
+
+// Nothing where the object did not move, nothing of its motion is known, or it was not seen before.
+std::optional<MotionScore> ScoreMotion(int frame, const MotionUncertainty& motion,
+                                       const Trajectory& estimate, const Trajectory& truth) {
+  if (motion.free_directions >= 6) return std::nullopt;
+  const auto pose_at = [](const Trajectory& poses, int at) -> std::optional<Pose> {
+    const auto found = poses.find(at);
+    return found == poses.end() ? std::nullopt : std::optional(found->second);
+  };
+  const auto estimate_before = pose_at(estimate, motion.since);
+  const auto truth_before = pose_at(truth, motion.since);
+  const auto estimate_after = pose_at(estimate, frame);
+  const auto truth_after = pose_at(truth, frame);
+  if (!estimate_before || !truth_before || !estimate_after || !truth_after) return std::nullopt;
+  const Pose true_motion = *truth_after * truth_before->inverse();
+  const Vector6 way = motion.frame_W.LengthsOf(true_motion);
+  if (way.head<3>().norm() + way.tail<3>().norm() < kLeastMotion_m) return std::nullopt;
+  const Pose found_motion = *estimate_after * estimate_before->inverse();
+  const Vector6 error = motion.frame_W.LengthsOf(found_motion * true_motion.inverse());
+  const double squares = error.dot(motion.covariance_m2.ldlt().solve(error));
+  return MotionScore{squares / (6 - motion.free_directions), motion.free_directions};
 }
 
 }  // namespace
@@ -63,6 +92,18 @@ TrackScores ScoreTracked(const TrackedObject& object) {
   scores.add_s_m = Measured::Of(MeanOf(add_s_m));
   scores.within_5mm = Within(add_s_m, 0.005);
   scores.within_2cm = Within(add_s_m, 0.02);
+  std::vector<double> nees;
+  std::vector<double> free_directions;
+  for (const auto& [frame, motion] : object.motions) {
+    const auto score = ScoreMotion(frame, motion, estimate, truth);
+    if (!score) continue;
+    nees.push_back(score->nees);
+    free_directions.push_back(score->free_directions);
+  }
+  if (!nees.empty()) {
+    scores.nees = Measured::Of(MeanOf(nees));
+    scores.free_directions = MeanOf(free_directions);
+  }
   return scores;
 }
 

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <set>
 #include <vector>
 
+#include "mapper/track/motion_uncertainty.h"
 #include "metrics/measured.h"
 #include "metrics/trajectory.h"
 
@@ -13,9 +15,13 @@ namespace tsdfpp {
 struct TrackedObject {
   Trajectory T_WO_estimate;
   Trajectory T_WO_truth;
-  std::set<int> shown;                    // the frames that show enough of it
-  std::vector<Eigen::Vector3f> points_O;  // of its true surface
+  std::set<int> shown;                         // the frames that show enough of it
+  std::vector<Eigen::Vector3f> points_O;       // of its true surface
+  std::map<int, MotionUncertainty> motions{};  // as the tracker knows them, by frame
 };
+
+// Motions of less are not judged: an object at rest is left where it is, without an error.
+inline constexpr double kLeastMotion_m = 0.0005;
 
 struct TrackScores {
   double moved_m = 0;      // the farthest that one of its points comes from where it began
@@ -27,6 +33,10 @@ struct TrackScores {
   Measured add_s_m;
   Measured within_5mm;  // shares of them, by ADD-S
   Measured within_2cm;
+  // Over the motions that move a point by at least kLeastMotion_m: the mean of the squared error of
+  // the six lengths in units of the covariance, a direction that is not free. 1 is honest.
+  Measured nees;
+  double free_directions = 0;  // of these motions, the mean
 };
 
 // Over the frames that show the object, and for which there is an estimate and the truth: what is

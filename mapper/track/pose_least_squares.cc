@@ -28,27 +28,6 @@ NormalEquations WithPrior(const NormalEquations& terms, const Pose& T, const Mot
 
 }  // namespace
 
-Pose MotionFrame::MotionOf(const Vector6& x) const {
-  const Eigen::Vector3d turn = x.tail<3>() / radius_m;
-  const double angle = turn.norm();
-  Pose motion = Pose::Identity();
-  if (angle > 0) {
-    // Through a quaternion, whose matrix is a rotation to rounding.
-    motion.linear() =
-        Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle)).normalized().toRotationMatrix();
-  }
-  motion.translation() = centre - motion.linear() * centre + x.head<3>();
-  return motion;
-}
-
-Vector6 MotionFrame::LengthsOf(const Pose& motion) const {
-  const Eigen::AngleAxisd turn(motion.linear());
-  Vector6 x;
-  x.head<3>() = motion * centre - centre;
-  x.tail<3>() = turn.angle() * radius_m * turn.axis();
-  return x;
-}
-
 LeastSquaresResult MinimiseOverPose(const std::function<NormalEquations(const Pose&)>& terms,
                                     const Pose& start, const MotionFrame& frame,
                                     const MotionPrior& prior, const LeastSquaresOptions& options) {

@@ -1,29 +1,13 @@
 // Levenberg-Marquardt over one pose, whatever the terms.
 #pragma once
 
-#include <Eigen/Core>
 #include <functional>
 #include <limits>
 
 #include "core/types.h"
+#include "mapper/track/motion_frame.h"
 
 namespace tsdfpp {
-
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-// A small motion of the object's points y about `centre`, as six lengths: they are shifted by
-// x[0..2] and turned by x[3..5] / radius (a rotation vector), so that one number means about as
-// much way at the object's surface wherever it stands in x.
-struct MotionFrame {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double radius_m = 1;
-
-  // y -> centre + exp(x[3..5] / radius) (y - centre) + x[0..2].
-  Pose MotionOf(const Vector6& x) const;
-  // The inverse of MotionOf, for turns of less than pi.
-  Vector6 LengthsOf(const Pose& motion) const;
-};
 
 // What the terms say of a pose: half the sum of squares, its gradient and its Hessian after Gauss
 // and Newton, over MotionFrame's six lengths.

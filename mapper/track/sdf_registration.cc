@@ -92,21 +92,17 @@ void RegisterCoarsely(const SdfRegistration& task, const SdfTrackConfig& config,
   for (const Pose& seed : task.T_LC_seeds) try_seed(seed);
 }
 
-struct FineFit {
-  MotionPrior prior;
-  LeastSquaresResult found;
-};
-
 // Of the fine search: with a share of the points, and then with all of them, or with all alone.
 constexpr int kMiddlePasses = 2;
 constexpr int kLastPasses = 1;
 constexpr int kPassesOfAll = kMiddlePasses + kLastPasses;
 
 // With as narrow a Huber function as the residuals ask for.
-FineFit RunPasses(const SdfRegistration& task, const SdfTrackConfig& config,
-                  const LeastSquaresOptions& options, int passes, DistanceTerm& term,
-                  SdfRegistrationResult& result) {
-  FineFit fit;
+LeastSquaresResult RunPasses(const SdfRegistration& task, const SdfTrackConfig& config,
+                             const LeastSquaresOptions& options, int passes, DistanceTerm& term,
+                             SdfRegistrationResult& result) {
+  MotionPrior prior;
+  LeastSquaresResult found;
   for (int pass = 0; pass < passes; ++pass) {
     term.KeepAt(result.T_LC);
     const double deviation_m =
@@ -114,19 +110,19 @@ FineFit RunPasses(const SdfRegistration& task, const SdfTrackConfig& config,
     term.SetHuber(
         std::min(config.huber_voxels * task.voxel_m, config.huber_deviations * deviation_m));
     if (pass == 0) {
-      fit.prior = PriorFor(term.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
+      prior = PriorFor(term.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
     }
-    fit.found = MinimiseOverPose([&](const Pose& T) { return term.Sums(T); }, result.T_LC,
-                                 result.frame, fit.prior, options);
-    result.iterations += fit.found.iterations;
-    result.T_LC = fit.found.T;
+    found = MinimiseOverPose([&](const Pose& T) { return term.Sums(T); }, result.T_LC, result.frame,
+                             prior, options);
+    result.iterations += found.iterations;
+    result.T_LC = found.T;
   }
-  return fit;
+  return found;
 }
 
-FineFit RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
-                       const LeastSquaresOptions& options, DistanceTerm& all,
-                       SdfRegistrationResult& result) {
+LeastSquaresResult RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
+                                  const LeastSquaresOptions& options, DistanceTerm& all,
+                                  SdfRegistrationResult& result) {
   const std::size_t stride = task.points.size() / static_cast<std::size_t>(config.middle_points);
   if (stride < 2) return RunPasses(task, config, options, kPassesOfAll, all, result);
   DistanceTerm some = TermOf(task, result.frame, config, stride);
@@ -166,7 +162,7 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   const LeastSquaresOptions options{config.max_iterations, config.settled_voxels * task.voxel_m};
   RegisterCoarsely(task, config, options, result);
   DistanceTerm fine = TermOf(task, result.frame, config, 1);
-  const auto [prior, found] = RegisterFinely(task, config, options, fine, result);
+  const LeastSquaresResult found = RegisterFinely(task, config, options, fine, result);
   const bool is_settled =
       found.converged || found.last_step_m < kNearlySettled_voxels * task.voxel_m;
   // Where no point has a distance there is nothing to be at rest on.
@@ -174,9 +170,10 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   result.counts = fine.Count(found.T);
   result.information = found.at.H;
   result.known = DirectionsOf(found.at.H);
-  const Matrix6 all = found.at.H + prior.P + 1e-9 * Matrix6::Identity();
+  const Matrix6 floor = (1e-9 + kNoShare * found.at.H.trace() / 6) * Matrix6::Identity();
+  const Matrix6 information = found.at.H + floor;
   const double deviation_m = result.counts.deviation_m;
-  result.covariance = deviation_m * deviation_m * all.ldlt().solve(Matrix6::Identity());
+  result.covariance = deviation_m * deviation_m * information.ldlt().solve(Matrix6::Identity());
   return result;
 }
 

@@ -37,6 +37,11 @@ struct KnownDirections {
   Eigen::Matrix3d turns = Eigen::Matrix3d::Identity();
 
   double LeastShare() const { return std::min(shift_shares[0], turn_shares[0]); }
+  // Directions whose share is less.
+  int CountBelow(double share) const {
+    return static_cast<int>((shift_shares.array() < share).count() +
+                            (turn_shares.array() < share).count());
+  }
 };
 KnownDirections DirectionsOf(const Matrix6& information);
 
@@ -51,8 +56,9 @@ struct SdfRegistrationResult {
   Matrix6 information = Matrix6::Zero();
   // Its weak and strong directions.
   KnownDirections known;
-  // Of the six lengths, square metres, if the points' errors were independent of each other and of
-  // the deviation in `counts`; the expectation counts in it as if it were data.
+  // Of the six lengths, square metres, where the points' errors are independent of each other and
+  // of the deviation in `counts`, as a camera's noise is. The expectation counts as nothing: along
+  // a direction that the points do not know the variance is large.
   Matrix6 covariance = Matrix6::Zero();
 };
 

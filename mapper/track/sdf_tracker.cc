@@ -68,7 +68,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     if (known == before.end()) {
       status = TrackStatus::kBegun;
       after.T_WO[id] = Pose::Identity();
-      memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), std::nullopt};
+      memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}};
       if (config_.keyframe_turn_rad > 0) {
         memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
       }
@@ -76,19 +76,20 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     }
     const std::optional<ObjectModel> model = models_(map, id);
     if (!model) continue;
-    const auto T_WL = Register(frame, points, *model, voxel_m, known->second, memory);
-    if (!T_WL) continue;
+    const auto registered = Register(frame, points, *model, voxel_m, known->second, memory);
+    if (!registered) continue;
     status = TrackStatus::kTracked;
-    if (SameNumbers(*T_WL, model->T_WL)) continue;  // at rest
-    after.T_WO[id] = AsRigid(*T_WL * model->T_WL.inverse() * known->second);
+    after.motions[id] = registered->motion;
+    if (SameNumbers(registered->T_WL, model->T_WL)) continue;  // at rest
+    after.T_WO[id] = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
   }
   return after;
 }
 
-std::optional<Pose> SdfTracker::Register(const Frame& frame,
-                                         const std::vector<SegmentPoint>& points,
-                                         const ObjectModel& model, double voxel_m, const Pose& T_WO,
-                                         Memory& memory) const {
+std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
+                                                           const std::vector<SegmentPoint>& points,
+                                                           const ObjectModel& model, double voxel_m,
+                                                           const Pose& T_WO, Memory& memory) const {
   const SurfaceReader reader(*model.grid, voxel_m);
   Sight sight{&frame,  &points,    CentreOf(points),           &reader,
               voxel_m, model.T_WL, model.T_WL.inverse() * T_WO};
@@ -102,13 +103,14 @@ std::optional<Pose> SdfTracker::Register(const Frame& frame,
   if (!found.converged) return std::nullopt;
   Calibrate(sight, memory, found);
   if (!PassesGates(sight, found)) return std::nullopt;
+  const MotionUncertainty motion = Uncertainty(sight, found, memory);
   Remember(sight, found, memory);
 
   const Vector6 way = found.frame.LengthsOf(MotionOf(model.T_WL, frame.T_WC, found.T_LC));
   // Points lie up to some two radii from the centre.
   const double longest_m = way.head<3>().norm() + 2 * way.tail<3>().norm();
-  if (longest_m <= config_.rest_voxels * voxel_m) return model.T_WL;
-  return AsRigid(frame.T_WC * found.T_LC.inverse());
+  if (longest_m <= config_.rest_voxels * voxel_m) return Registered{model.T_WL, motion};
+  return Registered{AsRigid(frame.T_WC * found.T_LC.inverse()), motion};
 }
 
 SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) const {
@@ -152,6 +154,21 @@ bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& fo
          counts.observed >= config_.min_observed_share * counts.points &&
          counts.inliers >= config_.min_inlier_share * counts.observed &&
          counts.inliers >= config_.min_points;
+}
+
+MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
+                                          Memory& memory) const {
+  PlaceUncertainty here{sight.frame->index, found.frame, found.covariance};
+  here.frame_L.centre = found.T_LC * sight.centre_C;
+  // Of the segment that the model began with no place is known but that it is as noisy.
+  PlaceUncertainty before = memory.place.value_or(here);
+  before.frame = sight.frame->index - sight.passed;
+  const Eigen::Matrix3d R_WL = (sight.frame->T_WC * found.T_LC.inverse()).linear();
+  MotionUncertainty motion =
+      UncertaintyOfMotion(before, here, R_WL, sight.frame->T_WC * sight.centre_C);
+  motion.free_directions = found.known.CountBelow(config_.weak_share);
+  memory.place = here;
+  return motion;
 }
 
 void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found,

@@ -44,6 +44,7 @@ class SdfTracker : public Tracker {
     Pose motion_L = Pose::Identity();         // a frame: T_WL(before)^-1 * T_WL(after)
     std::optional<Eigen::Vector3d> centre_L;  // of its segment then
     std::optional<Keyframe> keyframe;
+    std::optional<PlaceUncertainty> place;  // then
   };
 
   // A frame's segment of an object, and the object as the map has it.
@@ -58,14 +59,22 @@ class SdfTracker : public Tracker {
     int passed = 1;  // frames since it was last tracked
   };
 
-  // The object's T_WL after the frame; nothing where it is frozen. T_WO is that before it.
-  std::optional<Pose> Register(const Frame& frame, const std::vector<SegmentPoint>& points,
-                               const ObjectModel& model, double voxel_m, const Pose& T_WO,
-                               Memory& memory) const;
+  struct Registered {
+    Pose T_WL = Pose::Identity();  // after the frame
+    MotionUncertainty motion;
+  };
+
+  // Nothing where the object is frozen. T_WO is that before the frame.
+  std::optional<Registered> Register(const Frame& frame, const std::vector<SegmentPoint>& points,
+                                     const ObjectModel& model, double voxel_m, const Pose& T_WO,
+                                     Memory& memory) const;
   SdfRegistration TaskOf(const Sight& sight, const Memory& memory) const;
   // Takes off `found` what the keyframe says that the model adds.
   void Calibrate(const Sight& sight, const Memory& memory, SdfRegistrationResult& found) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
+  // How well its motion is known since it was last tracked; remembers the place for the next.
+  MotionUncertainty Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
+                                Memory& memory) const;
   void Remember(const Sight& sight, const SdfRegistrationResult& found, Memory& memory) const;
   Keyframe KeyframeOf(const std::vector<SegmentPoint>& points, const Pose& T_OC,
                       const Intrinsics& camera) const;

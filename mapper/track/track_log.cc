@@ -6,6 +6,7 @@ namespace tsdfpp {
 
 void TrackLog::Add(int frame, const TrackedPoses& tracked) {
   ++frames_;
+  for (const auto& [id, motion] : tracked.motions) motions_[id][frame] = motion;
   for (const auto& [id, status] : tracked.seen) {
     TrackSpan& span = objects_.try_emplace(id, TrackSpan{frame, frame, 0, 0, 0}).first->second;
     switch (status) {

@@ -26,10 +26,13 @@ class TrackLog {
   // No object was registered in any frame.
   bool IsEmpty() const;
   const std::map<InstanceId, TrackSpan>& objects() const { return objects_; }
+  // By object and frame; of trackers that know (TrackedPoses::motions).
+  const std::map<InstanceId, std::map<int, MotionUncertainty>>& motions() const { return motions_; }
 
  private:
   int frames_ = 0;
   std::map<InstanceId, TrackSpan> objects_;
+  std::map<InstanceId, std::map<int, MotionUncertainty>> motions_;
 };
 
 }  // namespace tsdfpp

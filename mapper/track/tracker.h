@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/types.h"
 #include "mapper/map_representation.h"
+#include "mapper/track/motion_uncertainty.h"
 
 namespace tsdfpp {
 
@@ -25,6 +26,8 @@ enum class TrackStatus {
 struct TrackedPoses {
   ObjectPoses T_WO;                          // of all objects that have had a pose
   std::map<InstanceId, TrackStatus> seen{};  // of those that are tracked and that the frame shows
+  // Of those that were registered by a tracker that knows: how well their motion since is known.
+  std::map<InstanceId, MotionUncertainty> motions{};
 };
 
 class Tracker {

@@ -54,6 +54,36 @@ TEST(TrackScores, ShiftsCountWhereTheObjectIsShown) {
   EXPECT_NEAR(*scores.within_2cm.value, 2.0 / 3, kRounding);
 }
 
+MotionUncertainty Known(int since, const Eigen::Vector3d& centre_W, double deviation_m) {
+  MotionUncertainty motion{since, {centre_W, 0.1}, {}, 0};
+  motion.covariance_m2 = deviation_m * deviation_m * Matrix6::Identity();
+  return motion;
+}
+
+// Off by 2 mm where 1 mm is expected, in one of six lengths; and by nothing afterwards.
+TEST(TrackScores, MotionsAreOffByWhatIsKnownOfThem) {
+  TrackedObject object = Driving();
+  object.T_WO_estimate = {{1, At(0.01)}, {2, At(0.022)}, {3, At(0.032)}};
+  object.motions = {{2, Known(1, {0.02, 0.2, 0.1}, 0.001)}, {3, Known(2, {0.03, 0.2, 0.1}, 0.001)}};
+  EXPECT_NEAR(*ScoreTracked(object).nees.value, 4.0 / 6 / 2, kRounding);
+  // A turn that is free is not counted.
+  object.motions[2].free_directions = 2;
+  const TrackScores scores = ScoreTracked(object);
+  EXPECT_NEAR(*scores.nees.value, 4.0 / 4 / 2, kRounding);
+  EXPECT_EQ(scores.free_directions, 1);
+}
+
+TEST(TrackScores, MotionsAreLeftOutWhereNothingMovesOrIsSeen) {
+  TrackedObject object = Driving();
+  object.T_WO_truth[3] = object.T_WO_truth[2];
+  object.T_WO_estimate = {{1, At(0.01)}, {2, At(0.022)}, {3, At(0.032)}, {4, At(0.04)}};
+  object.shown = {1, 2, 3};
+  object.motions = {{2, Known(0, {0.02, 0.2, 0.1}, 0.001)},   // nothing is known of frame 0
+                    {3, Known(2, {0.02, 0.2, 0.1}, 0.001)},   // at rest
+                    {4, Known(3, {0.03, 0.2, 0.1}, 0.001)}};  // not shown
+  EXPECT_FALSE(ScoreTracked(object).nees.value);
+}
+
 // What only turns has moved, too.
 TEST(TrackScores, TurningIsMoving) {
   TrackedObject object = Driving();

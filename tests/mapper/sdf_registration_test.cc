@@ -1,4 +1,5 @@
 // Registration of points to signed distances, against shapes whose distances are known exactly.
+// Longer than most files: each of these on the same shapes.
 #include "mapper/track/sdf_registration.h"
 
 #include <gtest/gtest.h>
@@ -350,6 +351,43 @@ TEST(SdfRegistration, DoesNotSlideAlongAPlane) {
   EXPECT_LT(found.known.shift_shares[1], 1e-6);
   EXPECT_LT(found.known.turn_shares[0], 1e-6);
   EXPECT_GT(found.known.turn_shares[1], SdfTrackConfig().weak_share);
+}
+
+// Over many draws of a camera's noise the squared errors are as large as the covariance says, along
+// the directions that the shape does not leave free; and it is said how many it does.
+TEST(SdfRegistration, KnowsHowWellItKnows) {
+  constexpr double kNoise_m = 0.002;
+  constexpr std::uint32_t kRuns = 60;
+  constexpr double kLeast = 0.7;  // four deviations of a mean of 60 with three directions each
+  constexpr double kMost = 1.3;
+  struct Shape {
+    std::string name;
+    DistanceFunction distance;
+    int free_directions;
+  };
+  for (const Shape& shape : {Shape{"torus", reference::TorusDistance(0.06, 0.04), 1},
+                             Shape{"ball", reference::SphereDistance(0.06), 3}}) {
+    SCOPED_TRACE(shape.name);
+    const TsdfGrid grid = GridOf(shape.distance);
+    const SurfaceReader model(grid, kVoxel_m);
+    const auto exact = InCamera(reference::VisiblePoints(shape.distance, kEye, 80));
+    double sum = 0;
+    for (std::uint32_t run = 0; run < kRuns; ++run) {
+      std::vector<SegmentPoint> points = exact;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const auto at = static_cast<std::uint32_t>(i);
+        const auto draw = static_cast<float>(GaussianDraw(2, run, at)[0]);
+        points[i].p_C += kNoise_m * draw * points[i].p_C.normalized();
+      }
+      const auto found = RegisterToDistances(TaskFrom(model, points, Pose::Identity()), {});
+      ASSERT_TRUE(found.converged);
+      EXPECT_EQ(found.known.CountBelow(SdfTrackConfig().weak_share), shape.free_directions);
+      const Vector6 off = found.frame.LengthsOf(found.T_LC * TrueLC().inverse());
+      sum += off.dot(found.covariance.ldlt().solve(off)) / (6 - shape.free_directions);
+    }
+    EXPECT_GT(sum / kRuns, kLeast);
+    EXPECT_LT(sum / kRuns, kMost);
+  }
 }
 
 TEST(SdfRegistration, SurvivesWhatIsNoSegment) {
