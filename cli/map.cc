@@ -27,6 +27,7 @@ struct MapArguments {
   SequenceArguments source;
   std::string method = "tsdf++/anchored";
   std::string segmentation;
+  std::string segmentation_config;
   std::string associate;
   std::string camera = "gt";
   std::string bleeding = "auto";
@@ -96,6 +97,14 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
     if (options.source.path.empty()) {
       return UsageError("--segmentation {} needs a sequence to map", options.segmentation);
     }
+  }
+  if (!options.segmentation_config.empty()) {
+    if (wishes.segmentation != Segmentation::kDepth) {
+      return UsageError("--segmentation-config needs --segmentation depth");
+    }
+    TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.segmentation_config));
+    TSDFPP_ASSIGN(wishes.depth_segments,
+                  DepthSegmentsConfig::FromToml(table, options.segmentation_config));
   }
   TSDFPP_ASSIGN(wishes.track, ReadTracking(options));
   if (options.load.empty()) {
@@ -285,10 +294,14 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--method", options->method,
                  MethodNames() + " (tsdfpp methods says what they are)")
       ->capture_default_str();
-  app.add_option("--segmentation", options->segmentation,
-                 "Where masks come from: gt (the sequence) or none (all is background); by default "
-                 "gt where the sequence has masks. Segments of depth: tsdfpp segment")
-      ->check(OneOf({"gt", "none"}));
+  app.add_option(
+         "--segmentation", options->segmentation,
+         "Where masks come from: gt (the sequence), none (all is background) or depth (convex "
+         "parts of the depth image, associated by votes, docs/segmentation.md); by default "
+         "gt where the sequence has masks")
+      ->check(OneOf({"gt", "none", "depth"}));
+  app.add_option("--segmentation-config", options->segmentation_config,
+                 "Settings of --segmentation depth, TOML (docs/segmentation.md)");
   app.add_option("--associate", options->associate,
                  "Which objects segments are: given (the masks' ids) or votes (their points vote, "
                  "ids are the map's own; poses are then tracked); by default given unless ids are "

@@ -14,6 +14,10 @@ Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
                         std::optional<Segmentation> segmentation) {
   TSDFPP_ASSIGN(start.source, OpenArguments(arguments));
   start.info = start.source->info();
+  if (segmentation == Segmentation::kDepth) {
+    start.config.segmentation = Segmentation::kDepth;
+    return {};
+  }
   if (segmentation == Segmentation::kNone) {
     start.config.segmentation = Segmentation::kNone;
     start.mask_remark = fmt::format(
@@ -39,11 +43,17 @@ Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
 
 // Who says which object a segment is.
 Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
-  const bool of_objects = start.info.mask_ids_are_objects;
+  const bool of_objects = start.ids_are_objects();
   const bool has_segments = start.config.segmentation != Segmentation::kNone;
   start.config.associate = wishes.associate.value_or(
       of_objects || !has_segments ? AssociationMode::kGiven : AssociationMode::kVotes);
   if (start.by_votes() || of_objects || !has_segments) return {};
+  if (start.config.segmentation == Segmentation::kDepth) {
+    return UsageError(
+        "--associate given: the ids of --segmentation depth are drawn anew in every frame, "
+        "expected "
+        "--associate votes");
+  }
   return UsageError(
       "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
       "--associate votes",
@@ -96,9 +106,9 @@ bool AreOfSequence(const std::vector<ObjectInfo>& objects, const std::vector<Obj
                      });
 }
 
-// What the masks' ids stand for.
-std::vector<ObjectInfo> ObjectsOfMasks(const SequenceInfo& info) {
-  return info.mask_ids_are_objects ? info.objects : std::vector<ObjectInfo>{};
+// What the segments' ids stand for.
+std::vector<ObjectInfo> ObjectsOfSegments(const MapStart& start) {
+  return start.ids_are_objects() ? start.info.objects : std::vector<ObjectInfo>{};
 }
 
 }  // namespace
@@ -107,6 +117,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
                             const MapWishes& wishes, int until) {
   MapStart start;
   start.config = config;
+  start.config.depth_segments = wishes.depth_segments;
   TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
   TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
@@ -121,7 +132,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
     return UsageError("--until {} is out of range: {} has frames {} to {}", start.last,
                       start.info.name, start.first, end);
   }
-  start.pipeline = std::make_unique<Pipeline>(start.config, ObjectsOfMasks(start.info));
+  start.pipeline = std::make_unique<Pipeline>(start.config, ObjectsOfSegments(start));
   return start;
 }
 
@@ -146,6 +157,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   if (poses) start.config.poses = *poses;
   const auto fits = poses ? start.config.Validate() : tl::unexpected(poses.error());
   if (!fits) return DataError("{}: its run cannot go on: {}", file, fits.error().message);
+  start.config.depth_segments = wishes.depth_segments;
   start.config.camera = wishes.camera;
   start.config.bleeding = wishes.bleeding;
   TSDFPP_RETURN_IF_ERROR(CheckCamera(start.config.method, wishes.camera));
@@ -157,6 +169,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.last = run.last_frame;
   if (!source.path.empty()) {
     TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
+    TSDFPP_RETURN_IF_ERROR(start.config.Validate());
     // With votes the map's objects are its own.
     const bool is_other = start.info.name != run.sequence ||
                           (!votes && !AreOfSequence(run.objects, start.info.objects));
@@ -183,7 +196,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(
-      start.config, votes ? ObjectsOfMasks(start.info) : run.objects, std::move(loaded.map),
+      start.config, votes ? ObjectsOfSegments(start) : run.objects, std::move(loaded.map),
       std::move(run.trajectories), votes ? run.objects : nobody);
   return start;
 }

@@ -20,6 +20,7 @@ struct TrackWishes {
 // What was asked for beside a config; nothing: as the sequence is.
 struct MapWishes {
   std::optional<Segmentation> segmentation;
+  DepthSegmentsConfig depth_segments{};
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
@@ -39,13 +40,17 @@ struct MapStart {
   std::unique_ptr<Pipeline> pipeline;
 
   int frames() const { return last - first + 1; }  // to map
+  // Whether the segments' ids are those of the sequence's objects.
+  bool ids_are_objects() const {
+    return info.mask_ids_are_objects && config.segmentation != Segmentation::kDepth;
+  }
   // Whether the map's objects are its own, found by votes.
   bool by_votes() const { return config.associate == AssociationMode::kVotes; }
 };
 
 // With an empty map. `until` is the last frame, or below 0 for the sequence's. Where nothing is
 // wished, masks are those of the sequence if its first frame has one, association is by votes if
-// the masks' ids are of one frame alone, and poses are DefaultPoses(); the config's
+// the segments' ids are of one frame alone, and poses are DefaultPoses(); the config's
 // association and poses are not looked at.
 // Errors: those of OpenArguments; kUsage where `until` is out of range, ids of one frame are to be
 // those of objects, given poses are to go with votes, the method has not what poses are to be

@@ -78,11 +78,17 @@ bool PipelineConfig::BleedingWaits() const {
 
 Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(map.Validate());
+  TSDFPP_RETURN_IF_ERROR(depth_segments.Validate());
   TSDFPP_RETURN_IF_ERROR(votes.Validate());
   TSDFPP_RETURN_IF_ERROR(icp.Validate());
   TSDFPP_RETURN_IF_ERROR(track.Validate());
   TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
   TSDFPP_RETURN_IF_ERROR(CheckCamera(method, camera));
+  if (segmentation == Segmentation::kDepth && associate == AssociationMode::kGiven) {
+    return UsageError(
+        "the ids of segments of depth are drawn anew in every frame: expected association by "
+        "votes");
+  }
   if (associate == AssociationMode::kVotes && !InfoOf(method).has_voxels) {
     return UsageError(
         "association by votes asks a map for its voxels, which method '{}' has not, expected given "
@@ -109,7 +115,7 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
                    std::map<InstanceId, std::map<int, Pose>> trajectories,
                    const std::vector<ObjectInfo>& born)
     : config_(config),
-      segmenter_(MakeSegmenter(config.segmentation, objects)),
+      segmenter_(MakeSegmenter(config.segmentation, objects, config.depth_segments)),
       camera_(std::make_unique<CameraTracker>(config.camera, config.track)),
       associator_(MakeAssociator(config, born, trajectories)),
       tracker_(MakeTracker(config)),

@@ -31,6 +31,7 @@ struct PipelineConfig {
   Method method = Method::kTsdfpp;
   MapConfig map{};
   Segmentation segmentation = Segmentation::kGiven;
+  DepthSegmentsConfig depth_segments{};  // of Segmentation::kDepth
   BleedingPixels bleeding = BleedingPixels::kAuto;
   AssociationMode associate = AssociationMode::kGiven;
   VoteConfig votes{};
@@ -43,8 +44,8 @@ struct PipelineConfig {
   // Whether pixels that bleed wait, as `bleeding` says or, where it is kAuto, the tracking.
   bool BleedingWaits() const;
 
-  // Errors: kUsage where a part is wrong, or given poses, which are those of given ids, are to go
-  // with association by votes.
+  // Errors: kUsage where a part is wrong, given poses, which are those of given ids, are to go with
+  // association by votes, or given ids with segments whose ids are of one frame alone.
   Expected<void> Validate() const;
 };
 

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "mapper/segment/depth_segments.h"
 #include "mapper/segment/given_masks.h"
 #include "mapper/segment/no_masks.h"
 
@@ -10,7 +11,8 @@ namespace tsdfpp {
 Expected<Segmentation> SegmentationFromName(std::string_view name) {
   if (name == "gt") return Segmentation::kGiven;
   if (name == "none") return Segmentation::kNone;
-  return UsageError("segmentation '{}' is unknown, expected gt or none", name);
+  if (name == "depth") return Segmentation::kDepth;
+  return UsageError("segmentation '{}' is unknown, expected gt, none or depth", name);
 }
 
 std::string_view SegmentationName(Segmentation segmentation) {
@@ -19,17 +21,22 @@ std::string_view SegmentationName(Segmentation segmentation) {
       return "gt";
     case Segmentation::kNone:
       return "none";
+    case Segmentation::kDepth:
+      return "depth";
   }
   std::abort();
 }
 
 std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
-                                         const std::vector<ObjectInfo>& objects) {
+                                         const std::vector<ObjectInfo>& objects,
+                                         const DepthSegmentsConfig& depth) {
   switch (segmentation) {
     case Segmentation::kGiven:
       return std::make_unique<GivenMasks>(objects);
     case Segmentation::kNone:
       return std::make_unique<NoMasks>();
+    case Segmentation::kDepth:
+      return std::make_unique<DepthSegments>(depth);
   }
   std::abort();
 }

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/types.h"
+#include "mapper/segment/depth_segments_config.h"
 
 namespace tsdfpp {
 
@@ -33,15 +34,17 @@ class Segmenter {
 enum class Segmentation {
   kGiven,  // Frame::mask
   kNone,   // Frame::mask is not read
+  kDepth,  // nor is it: convex parts of the depth image, whose ids are of one frame alone
 };
 
-// "gt" or "none". Errors: kUsage.
+// "gt", "none" or "depth". Errors: kUsage.
 Expected<Segmentation> SegmentationFromName(std::string_view name);
 std::string_view SegmentationName(Segmentation segmentation);
 
 // `objects` are what the ids of the frames' masks stand for; none where those ids are of one frame
-// alone.
+// alone. `depth` is of kDepth and must be valid.
 std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
-                                         const std::vector<ObjectInfo>& objects);
+                                         const std::vector<ObjectInfo>& objects,
+                                         const DepthSegmentsConfig& depth);
 
 }  // namespace tsdfpp

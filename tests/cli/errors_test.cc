@@ -156,7 +156,8 @@ TEST_F(CommandErrors, Arguments) {
   ExpectError({"map", scene_, "--out", out_, "--profile", "thin"}, kUsage,
               {"thin", "paper", "close"});
   ExpectError({"map", scene_, "--out", out_, "--poses", "vicon"}, kUsage, {"vicon", "gt", "icp"});
-  ExpectError({"map", scene_, "--out", out_, "--segmentation", "net"}, kUsage, {"net", "gt, none"});
+  ExpectError({"map", scene_, "--out", out_, "--segmentation", "net"}, kUsage,
+              {"net", "gt, none, depth"});
   ExpectError({"map", scene_, "--out", out_, "--layers", "0"}, kUsage, {"--layers", "0"});
   ExpectError({"map", scene_, "--out", out_, "--layers", "3", "--method", "tsdf"}, kUsage,
               {"--layers", "3", "tsdf"});

@@ -112,16 +112,5 @@ TEST_F(SegmentCommand, RefusesWithOneSentence) {
   EXPECT_EQ(Run({}, unmasked).exit_code, 0);
 }
 
-TEST_F(SegmentCommand, MapRefusesSegmentsOfDepthAndDoesNotOfferThem) {
-  const CommandOutput run = test::RunTsdfpp(
-      {"map", Recording(), "--segmentation", "depth", "--out", folder_ / "map"}, folder_.path());
-  EXPECT_EQ(run.exit_code, kUsage);
-  EXPECT_NE(run.err.find("--segmentation: found 'depth', expected one of gt, none"),
-            std::string::npos)
-      << run.err;
-  const CommandOutput help = test::RunTsdfpp({"map", "--help"}, folder_.path());
-  EXPECT_NE(help.out.find("--segmentation TEXT:gt|none "), std::string::npos) << help.out;
-}
-
 }  // namespace
 }  // namespace tsdfpp

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <utility>
 
 #include "core/files.h"
 #include "sequence/export.h"
@@ -104,6 +105,54 @@ TEST_F(Unmasked, IsWhatSegmentationNoneMakesOfMasks) {
   EXPECT_NE(refused.err.find("has no masks, expected one for each frame, for --segmentation gt"),
             std::string::npos)
       << refused.err;
+}
+
+// Segments of depth are the same with masks on disk and without, and their ids are votes'.
+TEST_F(Unmasked, AreSegmentedByDepth) {
+  const fs::path recording = Recording();
+  test::BoxSource source(4);
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kTum, folder_ / "set/boxes").has_value());
+  const std::string config = folder_ / "segments.toml";
+  ASSERT_TRUE(WriteFile(config, "noise = \"exact\"\n").has_value());
+  const std::vector<std::string> options{"--segmentation", "depth", "--segmentation-config",
+                                         config};
+  using Mapped = std::pair<fs::path, std::string>;
+  for (const auto& [from, out] :
+       {Mapped{recording, "without"}, Mapped{folder_ / "set/boxes", "with"}}) {
+    const CommandOutput output = Map(from, out, options);
+    ASSERT_EQ(output.exit_code, 0) << output.err;
+    EXPECT_EQ(output.err.find("taken for background"), std::string::npos) << output.err;
+    EXPECT_EQ(Stats(out)["segmentation"], "depth");
+    EXPECT_EQ(Stats(out)["associate"], "votes");
+    EXPECT_EQ(Stats(out)["poses"], "track");
+  }
+  EXPECT_EQ(ReadFile(folder_ / "without/mesh/scene.ply").value(),
+            ReadFile(folder_ / "with/mesh/scene.ply").value());
+  // The config is read: all that is seen is large enough to be a plane of the background.
+  ASSERT_TRUE(WriteFile(config, "noise = \"exact\"\nplane_m2 = 0.001\n").has_value());
+  ASSERT_EQ(Map(recording, "planes", options).exit_code, 0);
+  EXPECT_NE(ReadFile(folder_ / "without/mesh/scene.ply").value(),
+            ReadFile(folder_ / "planes/mesh/scene.ply").value());
+}
+
+TEST_F(Unmasked, SegmentsOfDepthHaveNoGivenIds) {
+  const fs::path recording = Recording();
+  const auto refuses = [&](const std::vector<std::string>& options, const std::string& sentence) {
+    const CommandOutput output = Map(recording, "out", options);
+    EXPECT_EQ(output.exit_code, kUsage);
+    EXPECT_NE(output.err.find(sentence), std::string::npos) << output.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  };
+  refuses({"--segmentation", "depth", "--associate", "given"},
+          "--associate given: the ids of --segmentation depth are drawn anew in every frame, "
+          "expected --associate votes");
+  refuses({"--segmentation", "depth", "--poses", "gt"},
+          "--poses gt are the poses of given ids, and --associate votes gives ids of its own");
+  refuses({"--segmentation", "depth", "--method", "surfels"}, "which method 'surfels' has not");
+  refuses({"--segmentation-config", "x.toml"}, "--segmentation-config needs --segmentation depth");
+  ASSERT_TRUE(WriteFile(folder_ / "segments.toml", "sigmas = -1\n").has_value());
+  refuses({"--segmentation", "depth", "--segmentation-config", folder_ / "segments.toml"},
+          "sigmas");
 }
 
 TEST_F(Unmasked, HaveNothingToRemove) {
