@@ -30,9 +30,8 @@ Measured Within(const std::vector<double>& errors_m, double length_m) {
   return Measured::Of(static_cast<double>(within) / static_cast<double>(errors_m.size()));
 }
 
-// From the mean over six directions to that over those which are not free.
 struct MotionScore {
-  double nees = 0;
+  double nees = 0;  // a direction that is not free
   int free_directions = 0;
 };
 

@@ -51,8 +51,7 @@ Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
   if (start.config.segmentation == Segmentation::kDepth) {
     return UsageError(
         "--associate given: the ids of --segmentation depth are drawn anew in every frame, "
-        "expected "
-        "--associate votes");
+        "expected --associate votes");
   }
   return UsageError(
       "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "

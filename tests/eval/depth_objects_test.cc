@@ -19,7 +19,7 @@ constexpr InstanceId kTruck = 1;
 constexpr InstanceId kCar = 2;
 // An object of the map counts as found from here on.
 constexpr int kSettled = 10;
-constexpr double kLeastSameId = 0.95;
+constexpr double kLeastSameId = 0.95;     // a frame or two may be cut otherwise
 constexpr double kMostBackground = 0.05;  // a small part beside the table may be taken for it
 constexpr double kFarthest_m = 0.01;      // a voxel
 

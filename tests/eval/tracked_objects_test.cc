@@ -17,7 +17,7 @@ constexpr const char* kMini = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
 constexpr InstanceId kCar = 1;
 constexpr const char* kContact = TSDFPP_SOURCE_DIR "/scenes/contact.toml";
 constexpr InstanceId kCube = 3;
-// What the tracker is to reach (docs/tracking.md has 0.3 and 1.1 mm): a twentieth and a fifth of a
+// What the tracker is to reach (docs/tracking.md has 0.3 and 1.0 mm): a twentieth and a fifth of a
 // voxel, on a way of 70.
 constexpr double kMostExact_m = 0.0005;
 constexpr double kMostWithNoise_m = 0.002;

@@ -358,7 +358,8 @@ TEST(SdfRegistration, DoesNotSlideAlongAPlane) {
 TEST(SdfRegistration, KnowsHowWellItKnows) {
   constexpr double kNoise_m = 0.002;
   constexpr std::uint32_t kRuns = 60;
-  constexpr double kLeast = 0.7;  // four deviations of a mean of 60 with three directions each
+  constexpr double kLeast =
+      0.7;  // some three deviations of a mean of 60 with three directions each
   constexpr double kMost = 1.3;
   struct Shape {
     std::string name;
