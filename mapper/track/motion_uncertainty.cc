@@ -23,7 +23,7 @@ MotionUncertainty UncertaintyOfMotion(const PlaceUncertainty& before, const Plac
   Matrix6 axes = Matrix6::Zero();
   axes.topLeftCorner<3, 3>() = R_WL;
   axes.bottomRightCorner<3, 3>() = R_WL;
-  MotionUncertainty motion{before.frame, {centre_W, after.frame_L.radius_m}, {}, 0};
+  MotionUncertainty motion{0, {centre_W, after.frame_L.radius_m}, {}, 0};
   motion.covariance_m2 = axes * sum_L * axes.transpose();
   return motion;
 }

@@ -8,7 +8,6 @@ namespace tsdfpp {
 // Where one segment was registered, and how well: six lengths about the segment's centroid, in the
 // axes of the object's lattice.
 struct PlaceUncertainty {
-  int frame = 0;
   MotionFrame frame_L;
   Matrix6 covariance_m2 = Matrix6::Zero();
 };
@@ -29,7 +28,7 @@ Matrix6 CovarianceIn(const MotionFrame& to, const MotionFrame& from, const Matri
 
 // The covariance of `after` and of `before` together: errors of two segments of a camera with noise
 // are independent. R_WL turns the lattice's axes into the world's, after the motion, and centre_W
-// is the later segment's centroid.
+// is the later segment's centroid. Of frames and free directions it knows nothing.
 MotionUncertainty UncertaintyOfMotion(const PlaceUncertainty& before, const PlaceUncertainty& after,
                                       const Eigen::Matrix3d& R_WL, const Eigen::Vector3d& centre_W);
 

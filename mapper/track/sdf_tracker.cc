@@ -158,14 +158,14 @@ bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& fo
 
 MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
                                           Memory& memory) const {
-  PlaceUncertainty here{sight.frame->index, found.frame, found.covariance};
+  PlaceUncertainty here{found.frame, found.covariance};
   here.frame_L.centre = found.T_LC * sight.centre_C;
   // Of the segment that the model began with no place is known but that it is as noisy.
-  PlaceUncertainty before = memory.place.value_or(here);
-  before.frame = sight.frame->index - sight.passed;
+  const PlaceUncertainty before = memory.place.value_or(here);
   const Eigen::Matrix3d R_WL = (sight.frame->T_WC * found.T_LC.inverse()).linear();
   MotionUncertainty motion =
       UncertaintyOfMotion(before, here, R_WL, sight.frame->T_WC * sight.centre_C);
+  motion.since = sight.frame->index - sight.passed;
   motion.free_directions = found.known.CountBelow(config_.weak_share);
   memory.place = here;
   return motion;

@@ -73,11 +73,10 @@ TEST(MotionUncertainty, IsThatOfBothPlacesInTheWorld) {
     samples += x * x.transpose() / kSamples;
   }
   const double square = kDeviation_m * kDeviation_m;
-  const PlaceUncertainty before{7, before_L, square * L * L.transpose()};
-  const PlaceUncertainty after{9, after_L, 4 * square * Matrix6::Identity()};
+  const PlaceUncertainty before{before_L, square * L * L.transpose()};
+  const PlaceUncertainty after{after_L, 4 * square * Matrix6::Identity()};
   const MotionUncertainty motion =
       UncertaintyOfMotion(before, after, T_WL_after.linear(), centre_W);
-  EXPECT_EQ(motion.since, 7);
   EXPECT_EQ(motion.frame_W.centre, centre_W);
   EXPECT_EQ(motion.frame_W.radius_m, after_L.radius_m);
   ExpectAlike(motion.covariance_m2, samples);
