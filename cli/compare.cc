@@ -26,6 +26,7 @@ struct CompareArguments {
   std::string profiles = "paper,close";
   std::string camera = "gt";
   std::string bleeding = "auto";
+  std::string mask_repair = "off";
   std::string poses;
   std::string associate;
   std::vector<std::string> adapters;
@@ -164,6 +165,9 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
   if (options.bleeding != BleedingPixelsName(BleedingPixels::kAuto)) {
     command += " --bleeding " + options.bleeding;
   }
+  if (options.mask_repair != MaskRepairModeName(MaskRepairMode::kOff)) {
+    command += " --mask-repair " + options.mask_repair;
+  }
   if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   return command;
@@ -209,6 +213,7 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
   TSDFPP_ASSIGN(config.camera, CameraSourceFromName(options.camera));
   TSDFPP_ASSIGN(config.bleeding, BleedingPixelsFromName(options.bleeding));
+  TSDFPP_ASSIGN(config.mask_repair, MaskRepairModeFromName(options.mask_repair));
   const std::string pose_names = PoseNames(options, config, *opened.source);
   TSDFPP_RETURN_IF_ERROR(ReadPoses(pose_names, config));
   TSDFPP_RETURN_IF_ERROR(CheckLists(options, pose_names, config));
@@ -247,6 +252,11 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
                  "(mapped like others), wait (left out of the frame), auto (wait where objects or "
                  "the camera are tracked by signed distances)")
       ->check(OneOf({"auto", "keep", "wait"}))
+      ->capture_default_str();
+  app.add_option("--mask-repair", options->mask_repair,
+                 "For our maps, whether their surfaces and steps in depth correct the masks before "
+                 "they are mapped: off or on (docs/segmentation.md)")
+      ->check(OneOf({"off", "on"}))
       ->capture_default_str();
   app.add_option("--camera", options->camera,
                  "Camera poses of our maps: gt (given), refine (given and then corrected by the "

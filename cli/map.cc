@@ -31,6 +31,8 @@ struct MapArguments {
   std::string associate;
   std::string camera = "gt";
   std::string bleeding = "auto";
+  std::string mask_repair = "off";
+  std::string mask_repair_config;
   std::string poses;
   std::string track = "auto";
   std::string track_config;
@@ -62,6 +64,18 @@ Expected<TrackWishes> ReadTracking(const MapArguments& options) {
   return wishes;
 }
 
+Expected<RepairWishes> ReadMaskRepair(const MapArguments& options) {
+  RepairWishes wishes;
+  TSDFPP_ASSIGN(wishes.mode, MaskRepairModeFromName(options.mask_repair));
+  if (options.mask_repair_config.empty()) return wishes;
+  if (wishes.mode == MaskRepairMode::kOff) {
+    return UsageError("--mask-repair-config needs --mask-repair on");
+  }
+  TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.mask_repair_config));
+  TSDFPP_ASSIGN(wishes.config, MaskRepairConfig::FromToml(table, options.mask_repair_config));
+  return wishes;
+}
+
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   PipelineConfig config;
   TSDFPP_ASSIGN(config.method, MethodFromName(options.method));
@@ -89,6 +103,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   }
   TSDFPP_ASSIGN(wishes.camera, CameraSourceFromName(options.camera));
   TSDFPP_ASSIGN(wishes.bleeding, BleedingPixelsFromName(options.bleeding));
+  TSDFPP_ASSIGN(wishes.repair, ReadMaskRepair(options));
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -313,6 +328,14 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "are tracked by signed distances)")
       ->check(OneOf({"auto", "keep", "wait"}))
       ->capture_default_str();
+  app.add_option("--mask-repair", options->mask_repair,
+                 "Whether the map's surfaces and steps in depth correct the masks before they are "
+                 "mapped: off or on (docs/segmentation.md)")
+      ->check(OneOf({"off", "on"}))
+      ->capture_default_str();
+  app.add_option("--mask-repair-config", options->mask_repair_config,
+                 "Settings of --mask-repair on, a TOML file (docs/segmentation.md)")
+      ->check(NotEmpty("a file"));
   app.add_option("--camera", options->camera,
                  "Camera poses: gt (given), refine (given and then corrected by the map's "
                  "background), track (the first one given, the others found by it)")

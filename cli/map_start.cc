@@ -122,6 +122,8 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
   TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
   start.config.camera = wishes.camera;
   start.config.bleeding = wishes.bleeding;
+  start.config.mask_repair = wishes.repair.mode;
+  start.config.repair = wishes.repair.config;
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   TSDFPP_RETURN_IF_ERROR(start.config.Validate());
   start.first = start.info.first_index;
@@ -159,6 +161,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.config.depth_segments = wishes.depth_segments;
   start.config.camera = wishes.camera;
   start.config.bleeding = wishes.bleeding;
+  start.config.mask_repair = wishes.repair.mode;
+  start.config.repair = wishes.repair.config;
   TSDFPP_RETURN_IF_ERROR(CheckCamera(start.config.method, wishes.camera));
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   const bool votes = start.by_votes();
@@ -192,6 +196,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     return UsageError("--camera {} needs a sequence to map", CameraSourceName(wishes.camera));
   } else if (wishes.bleeding != BleedingPixels::kAuto) {
     return UsageError("--bleeding {} needs a sequence to map", BleedingPixelsName(wishes.bleeding));
+  } else if (wishes.repair.mode == MaskRepairMode::kOn) {
+    return UsageError("--mask-repair on needs a sequence to map");
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(

@@ -17,6 +17,12 @@ struct TrackWishes {
   std::optional<SdfTrackConfig> config;
 };
 
+// Of masks that are repaired.
+struct RepairWishes {
+  MaskRepairMode mode = MaskRepairMode::kOff;
+  MaskRepairConfig config{};
+};
+
 // What was asked for beside a config; nothing: as the sequence is.
 struct MapWishes {
   std::optional<Segmentation> segmentation;
@@ -24,6 +30,7 @@ struct MapWishes {
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
+  RepairWishes repair;
   std::optional<PoseSource> poses;
   TrackWishes track;
 };
@@ -60,7 +67,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
                             const MapWishes& wishes, int until);
 
 // With the map in `file`; goes on after its last frame where `source` names a sequence. Of `wishes`
-// only segmentation, bleeding, camera and tracking are looked at, as the file has the rest.
+// only segmentation, bleeding, repair, camera and tracking are looked at, as the file has the rest.
 // Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than the map's,
 // or nothing is left to map; kData where what the file says does not go together.
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,

@@ -7,6 +7,7 @@
 #include <new>
 #include <opencv2/core.hpp>
 #include <string>
+#include <string_view>
 
 #include "core/address_space.h"
 #include "core/one_line.h"
@@ -15,6 +16,13 @@ namespace tsdfpp {
 namespace {
 
 constexpr const char* kOutOfMemory = "out of memory: what was asked for needs more than there is";
+
+// Whether a library's words for what it threw are those of Open3D, or of the system, for a piece of
+// memory that was too large; what is smaller may still be had.
+bool SaysOutOfMemory(std::string_view words) {
+  return words.find("malloc failed") != std::string_view::npos ||
+         words.find("Cannot allocate memory") != std::string_view::npos;
+}
 
 }  // namespace
 
@@ -31,7 +39,9 @@ Error ErrorOfException() {
     return {ErrorKind::kInternal, fmt::format("internal error, in OpenCV: {}", error.err)};
   } catch (const std::exception& error) {
     // Libraries have their own words for it.
-    if (IsOutOfAddressSpace()) return {ErrorKind::kEnvironment, kOutOfMemory};
+    if (IsOutOfAddressSpace() || SaysOutOfMemory(error.what())) {
+      return {ErrorKind::kEnvironment, kOutOfMemory};
+    }
     return {ErrorKind::kInternal, fmt::format("internal error: {}", error.what())};
   } catch (...) {
     return {ErrorKind::kInternal, "internal error"};

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "mapper/associate/given_ids.h"
+#include "mapper/associate/mask_repair.h"
 #include "mapper/associate/voxel_votes.h"
 #include "mapper/map_reach.h"
 #include "mapper/track/camera_tracker.h"
@@ -80,6 +81,7 @@ Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(map.Validate());
   TSDFPP_RETURN_IF_ERROR(depth_segments.Validate());
   TSDFPP_RETURN_IF_ERROR(votes.Validate());
+  TSDFPP_RETURN_IF_ERROR(repair.Validate());
   TSDFPP_RETURN_IF_ERROR(icp.Validate());
   TSDFPP_RETURN_IF_ERROR(track.Validate());
   TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
@@ -93,6 +95,11 @@ Expected<void> PipelineConfig::Validate() const {
     return UsageError(
         "association by votes asks a map for its voxels, which method '{}' has not, expected given "
         "ids",
+        MethodName(method));
+  }
+  if (mask_repair == MaskRepairMode::kOn && !InfoOf(method).has_voxels) {
+    return UsageError(
+        "the repair of masks asks a map for its voxels, which method '{}' has not, expected off",
         MethodName(method));
   }
   if (associate == AssociationMode::kVotes && poses == PoseSource::kGiven) {
@@ -119,6 +126,9 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
       camera_(std::make_unique<CameraTracker>(config.camera, config.track)),
       associator_(MakeAssociator(config, born, trajectories)),
       tracker_(MakeTracker(config)),
+      repair_(config.mask_repair == MaskRepairMode::kOn
+                  ? std::make_unique<MaskRepair>(config.repair)
+                  : nullptr),
       map_(std::move(map)),
       trajectories_(std::move(trajectories)),
       objects_(config.associate == AssociationMode::kGiven ? objects : born),
@@ -149,7 +159,9 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   times.track_s = watch.Lap();
   UpdatePoses(frame->index, std::move(tracked.T_WO));
   times.update_poses_s = watch.Lap();
-  Fuse(*frame, tracked.labels);
+  const cv::Mat labels = RepairMasks(*frame, tracked.labels);
+  times.repair_s = watch.Lap();
+  Fuse(*frame, labels);
   times.fuse_s = watch.Lap();
   return times;
 }
@@ -183,6 +195,10 @@ void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
     map_->SetObjectPose(id, pose);
     trajectories_[id][frame] = pose;
   }
+}
+
+cv::Mat Pipeline::RepairMasks(const Frame& frame, const cv::Mat& labels) {
+  return repair_ == nullptr ? labels : repair_->Repair(frame, labels, T_WO_, *map_);
 }
 
 void Pipeline::Fuse(const Frame& frame, const cv::Mat& labels) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mapper/associate/associator.h"
+#include "mapper/associate/mask_repair_config.h"
 #include "mapper/associate/vote_config.h"
 #include "mapper/frame_counts.h"
 #include "mapper/map_representation.h"
@@ -25,6 +26,7 @@
 namespace tsdfpp {
 
 class CameraTracker;
+class MaskRepair;
 
 // All that a pipeline is told.
 struct PipelineConfig {
@@ -35,6 +37,8 @@ struct PipelineConfig {
   BleedingPixels bleeding = BleedingPixels::kAuto;
   AssociationMode associate = AssociationMode::kGiven;
   VoteConfig votes{};
+  MaskRepairMode mask_repair = MaskRepairMode::kOff;
+  MaskRepairConfig repair{};
   CameraSource camera = CameraSource::kGiven;
   PoseSource poses = PoseSource::kGiven;
   TrackChoice tracked = TrackChoice::kAuto;  // which objects, where poses are not given
@@ -56,9 +60,10 @@ struct StepTimes {
   double associate_s = 0;     // paper III-C: votes; 0 with given ids
   double track_s = 0;         // paper III-D: objects' meshes, ICP; 0 with given poses
   double update_poses_s = 0;  // paper III-E
+  double repair_s = 0;        // of labels, by the map; 0 where they are not repaired
   double fuse_s = 0;          // paper III-F
   double Total_s() const {
-    return segment_s + locate_s + associate_s + track_s + update_poses_s + fuse_s;
+    return segment_s + locate_s + associate_s + track_s + update_poses_s + repair_s + fuse_s;
   }
 };
 
@@ -128,6 +133,8 @@ class Pipeline {
   Expected<TrackedFrame> Track(const Frame& frame, const AssociatedObjects& association);
   // Moves the objects to where they are after the frame, and writes it down.
   void UpdatePoses(int frame, ObjectPoses T_WO);
+  // The labels to fuse, where the objects are now.
+  cv::Mat RepairMasks(const Frame& frame, const cv::Mat& labels);
   void Fuse(const Frame& frame, const cv::Mat& labels);
   // Looks at the pixels only while the map is empty.
   void CountWhileEmpty(const Frame& frame, const cv::Mat& labels);
@@ -137,6 +144,7 @@ class Pipeline {
   std::unique_ptr<CameraTracker> camera_;
   std::unique_ptr<Associator> associator_;
   std::unique_ptr<Tracker> tracker_;
+  std::unique_ptr<MaskRepair> repair_;  // nullptr where masks are not repaired
   std::unique_ptr<MapRepresentation> map_;
   ObjectPoses T_WO_;
   std::map<InstanceId, std::map<int, Pose>> trajectories_;

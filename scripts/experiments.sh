@@ -6,5 +6,5 @@ cd "$(dirname "$0")/.."
 names=()
 while [ $# -gt 0 ] && [ "$1" != "--" ]; do names+=("$1"); shift; done
 if [ $# -gt 0 ]; then shift; fi
-if [ ${#names[@]} -eq 0 ]; then names=(claim baseline voxel truncation noise masks poses speed objects moves limits); fi
+if [ ${#names[@]} -eq 0 ]; then names=(claim baseline voxel truncation noise masks repair poses speed objects moves limits); fi
 exec /usr/bin/python3 scripts/pages.py make "${names[@]}" -- "$@"

@@ -13,6 +13,8 @@
 #include <csignal>
 #include <ctime>
 
+#include "core/own_environment.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -64,6 +66,7 @@ void CloseAllBut(std::array<int, 6> kept) {
   if (dup2(program.input, STDIN_FILENO) >= 0 && dup2(program.output, STDOUT_FILENO) >= 0 &&
       dup2(program.output, STDERR_FILENO) >= 0 && chdir(program.at) == 0) {
     close_range(STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);
+    TakeOutOwn(environ);
     execvp(program.words[0], program.words);
   }
   const int failure = errno;

@@ -69,6 +69,7 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
                                 .map = config.map,
                                 .bleeding = config.bleeding,
                                 .associate = AssociationOf(config, info),
+                                .mask_repair = config.mask_repair,
                                 .camera = config.camera,
                                 .poses = poses,
                                 .icp = config.icp};

@@ -22,6 +22,7 @@ struct CompareConfig {
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
+  MaskRepairMode mask_repair = MaskRepairMode::kOff;
   std::vector<PoseSource> poses{PoseSource::kGiven};
   MapConfig map;  // truncation is the profile's
   IcpConfig icp;

@@ -39,6 +39,7 @@ void RunTimes::Add(const StepTimes& step) {
   associate_s.push_back(step.associate_s);
   track_s.push_back(step.track_s);
   update_poses_s.push_back(step.update_poses_s);
+  repair_s.push_back(step.repair_s);
   fuse_s.push_back(step.fuse_s);
 }
 
@@ -48,6 +49,7 @@ nlohmann::json RunTimes::ToJson() const {
           {"associate", Spread(associate_s)},
           {"track", Spread(track_s)},
           {"update_poses", Spread(update_poses_s)},
+          {"repair_masks", Spread(repair_s)},
           {"fuse", Spread(fuse_s)},
           {"mesh_scene", Spread(mesh_s)}};
 }

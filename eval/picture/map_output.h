@@ -17,6 +17,7 @@ struct RunTimes {
   std::vector<double> associate_s;
   std::vector<double> track_s;
   std::vector<double> update_poses_s;
+  std::vector<double> repair_s;
   std::vector<double> fuse_s;
   std::vector<double> mesh_s;  // of the visible scene, at the frames that were meshed
 

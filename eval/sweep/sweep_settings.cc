@@ -118,6 +118,12 @@ Expected<void> SetResampling(Settings& settings, const AxisValue& value) {
   return known ? Expected<void>{} : Because(value, known.error());
 }
 
+Expected<void> SetMaskRepair(Settings& settings, const AxisValue& value) {
+  TSDFPP_ASSIGN(settings.mask_repair, Text(value, "off or on"));
+  const auto known = MaskRepairModeFromName(settings.mask_repair);
+  return known ? Expected<void>{} : Because(value, known.error());
+}
+
 Expected<void> SetMovedVoxels(Settings& settings, const AxisValue& value) {
   TSDFPP_ASSIGN(settings.moved_voxels, Text(value, "all or near_surface"));
   const auto known = MovedVoxelsFromName(settings.moved_voxels);
@@ -177,6 +183,7 @@ std::vector<Axis> MakeAxes() {
       {"layers", [](Settings& s, V v) { return SetWhole<&Settings::layers>(s, v, 1, kMaxLayers); },
        [](const Settings& s) -> AxisValue { return static_cast<double>(s.layers); }},
       {"poses", SetPoses, [](const Settings& s) -> AxisValue { return s.poses; }},
+      {"mask_repair", SetMaskRepair, [](const Settings& s) -> AxisValue { return s.mask_repair; }},
       {"resampling", SetResampling, [](const Settings& s) -> AxisValue { return s.resampling; }},
       {"moved_voxels", SetMovedVoxels,
        [](const Settings& s) -> AxisValue { return s.moved_voxels; }},
@@ -228,6 +235,7 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   }
   config.map.voxel_m = voxel_m;
   config.map.layers = layers;
+  TSDFPP_ASSIGN(config.mask_repair, MaskRepairModeFromName(mask_repair));
   TSDFPP_ASSIGN(config.map.resampling, ResamplingFromName(resampling));
   TSDFPP_ASSIGN(config.map.moved_voxels, MovedVoxelsFromName(moved_voxels));
   TSDFPP_ASSIGN(config.map.removed_voxels, RemovedVoxelsFromName(removed_voxels));
@@ -282,9 +290,10 @@ std::string MapKey(const CellSettings& settings) {
                        PoseSourceName(config.poses), sabotage);
   }
   return fmt::format(
-      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}", info.name, config.map.voxel_m,
+      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}{}", info.name, config.map.voxel_m,
       config.map.trunc_front_voxels, config.map.trunc_back_voxels,
       LayersOf(config.method, config.map), PoseSourceName(config.poses),
+      config.mask_repair == MaskRepairMode::kOn ? " mask_repair on" : "",
       info.moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "",
       IsOneField(config.method)
           ? fmt::format(" moved_voxels {} removed_voxels {} vote_band {}",

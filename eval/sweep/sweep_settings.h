@@ -40,6 +40,7 @@ struct CellSettings {
   double voxel_m = 0.01;
   int layers = 0;  // K; 0: the method's own
   std::string poses = "gt";
+  std::string mask_repair = "off";
   std::string resampling = "all";
   // Of one field:
   std::string moved_voxels = "all";

@@ -12,13 +12,18 @@ constexpr float kLeastKnown = 0.5F;  // of the coefficients
 // Further out no voxel is, and indices stay far from the ends of their 21 bits.
 constexpr double kFurthest = double{kBlockSide} * (kFurthestBlock + 1);
 
-// The distance at a point of the lattice, in the unit of the stored ones; infinity where too little
-// is observed.
-float DistanceFromObserved(const VoxelReader& reader, const Eigen::Vector3d& q) {
-  if (!(q.cwiseAbs().maxCoeff() < kFurthest)) return kUnknown;
+// What a volume says at a point of its lattice.
+struct Answer {
+  float distance = kUnknown;  // in the unit of the stored ones; infinite where too little is known
+  float weight = 0;
+};
+
+Answer FromObserved(const VoxelReader& reader, const Eigen::Vector3d& q) {
+  if (!(q.cwiseAbs().maxCoeff() < kFurthest)) return {};
   const Corners corners = FindCorners(reader, q);
   float known = 0;
   float sum = 0;
+  float weights = 0;
   for (std::size_t i = 0; i < corners.block.size(); ++i) {
     const TsdfBlock* block = corners.block[i];
     const auto place = static_cast<std::size_t>(corners.place[i]);
@@ -30,8 +35,10 @@ float DistanceFromObserved(const VoxelReader& reader, const Eigen::Vector3d& q) 
     }
     known += coefficient;
     sum += coefficient * static_cast<float>(block->distance[place]);
+    weights += coefficient * static_cast<float>(block->weight[place]);
   }
-  return known >= kLeastKnown ? std::abs(sum / known) : kUnknown;
+  if (!(known >= kLeastKnown)) return {};
+  return {std::abs(sum / known), weights / known};
 }
 
 // Around the points whose eight voxels are not all outside of the blocks.
@@ -53,12 +60,12 @@ Eigen::AlignedBox3d BoxOf(const VoxelReader& reader, const Pose& T_WL, double vo
 
 }  // namespace
 
-ObjectLookup::ObjectLookup(const MapRepresentation& map)
+ObjectLookup::ObjectLookup(const MapRepresentation& map, Of of)
     : voxels_(map.inspection()),
       voxel_m_(map.config().voxel_m),
       ids_(map.Objects()),
       one_field_(IsOneField(map.method())) {
-  std::erase(ids_, kBackground);
+  if (of == Of::kObjects) std::erase(ids_, kBackground);
   std::erase_if(
       ids_, [&](InstanceId id) { return voxels_ == nullptr || voxels_->GridOf(id) == nullptr; });
   const auto add_place = [&](InstanceId id, const Pose& T_WL) {
@@ -71,6 +78,12 @@ ObjectLookup::ObjectLookup(const MapRepresentation& map)
     return;
   }
   for (const InstanceId id : ids_) add_place(id, map.ObjectLattice(id));
+}
+
+std::optional<std::size_t> ObjectLookup::NumberOf(InstanceId id) const {
+  const auto found = std::lower_bound(ids_.begin(), ids_.end(), id);
+  if (found == ids_.end() || *found != id) return std::nullopt;
+  return static_cast<std::size_t>(found - ids_.begin());
 }
 
 std::vector<std::size_t> ObjectLookup::Around(const std::vector<Eigen::Vector3d>& points_W) const {
@@ -86,30 +99,48 @@ std::vector<std::size_t> ObjectLookup::Around(const std::vector<Eigen::Vector3d>
   return objects;
 }
 
+bool ObjectLookup::HasSurfaceAround(std::size_t object, const Eigen::Vector3d& p_W) const {
+  const Place& place = one_field_ ? places_.front() : places_[object];
+  const Eigen::Vector3d q = place.T_LW * p_W / voxel_m_;
+  if (place.reader.empty() || !(q.cwiseAbs().maxCoeff() < kFurthest)) return false;
+  const Index3 middle = BlockOf(FloorOf(q));
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        const TsdfBlock* block = place.reader.BlockAt(middle + Index3{x, y, z});
+        if (block != nullptr && block->AnyNegative()) return true;
+      }
+    }
+  }
+  return false;
+}
+
 void ObjectLookup::Distances(const Eigen::Vector3d& p_W, std::span<const std::size_t> objects,
                              std::vector<Distance>& distances) const {
   distances.clear();
   if (objects.empty()) return;
   const auto at = [&](const Place& place) {
     const Eigen::Vector3d q = place.T_LW * p_W / voxel_m_;
-    return DistanceFromObserved(place.reader, q) / static_cast<float>(voxel_m_);
+    Answer answer = FromObserved(place.reader, q);
+    answer.distance /= static_cast<float>(voxel_m_);
+    return answer;
   };
   if (!one_field_) {
     for (const std::size_t i : objects) {
-      const float voxels = at(places_[i]);
-      if (voxels != kUnknown) distances.push_back({i, voxels});
+      const Answer answer = at(places_[i]);
+      if (answer.distance != kUnknown) distances.push_back({i, answer.distance, answer.weight});
     }
     return;
   }
-  const float voxels = at(places_.front());
-  if (voxels == kUnknown) return;
+  const Answer answer = at(places_.front());
+  if (answer.distance == kUnknown) return;
   const Index3 nearest = FloorOf(p_W / voxel_m_ + Eigen::Vector3d::Constant(0.5));
   const std::vector<Listing> list = voxels_->ListAt({nearest.x, nearest.y, nearest.z});
   if (list.empty()) return;
-  const auto of = std::lower_bound(ids_.begin(), ids_.end(), list.front().id);
-  if (of == ids_.end() || *of != list.front().id) return;
-  const auto i = static_cast<std::size_t>(of - ids_.begin());
-  if (std::binary_search(objects.begin(), objects.end(), i)) distances.push_back({i, voxels});
+  const std::optional<std::size_t> i = NumberOf(list.front().id);
+  if (i && std::binary_search(objects.begin(), objects.end(), *i)) {
+    distances.push_back({*i, answer.distance, answer.weight});
+  }
 }
 
 }  // namespace tsdfpp

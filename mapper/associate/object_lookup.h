@@ -1,6 +1,7 @@
 // How far points are from the surfaces of a map's objects: all that association asks of a map.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,10 +18,15 @@ namespace tsdfpp {
 // one frame; the map must not change meanwhile.
 class ObjectLookup {
  public:
-  explicit ObjectLookup(const MapRepresentation& map);
+  enum class Of { kObjects, kObjectsAndBackground };
+  explicit ObjectLookup(const MapRepresentation& map, Of of = Of::kObjects);
 
-  // The map's objects that have a volume (none of a map without voxels), but the background, by id.
+  // The map's objects that have a volume (none of a map without voxels), by id, the background only
+  // where it was asked for.
   const std::vector<InstanceId>& ids() const { return ids_; }
+
+  // The place of an object in ids().
+  std::optional<std::size_t> NumberOf(InstanceId id) const;
 
   // Which of ids() may have a surface where one of the points is, all of the world's frame.
   std::vector<std::size_t> Around(const std::vector<Eigen::Vector3d>& points_W) const;
@@ -28,13 +34,19 @@ class ObjectLookup {
   struct Distance {
     std::size_t object = 0;  // of ids()
     float voxels = 0;        // without sign
+    float weight = 0;        // observations behind it
   };
 
   // The distances of a point to the surfaces of those objects (some of ids(), increasing) that say
-  // something there, each at its last pose. They are interpolated between those of the eight voxels
-  // around the point that are observed, which must make up half of the coefficients.
+  // something there, each at its last pose. They and the weights are interpolated between those of
+  // the eight voxels around the point that are observed, which must make up half of the
+  // coefficients.
   void Distances(const Eigen::Vector3d& p_W, std::span<const std::size_t> objects,
                  std::vector<Distance>& distances) const;
+
+  // Whether the volume of an object (one of ids(); all of one field) has a surface in the block of
+  // the point, which is of the world's frame, or in one beside it.
+  bool HasSurfaceAround(std::size_t object, const Eigen::Vector3d& p_W) const;
 
  private:
   struct Place {

@@ -73,13 +73,14 @@ void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const 
     lookup.Distances(p_W, around, distances);
     Votes* nearest = nullptr;
     float least = 0;
-    for (const auto& [object, voxels] : distances) {
-      const auto place = std::lower_bound(around.begin(), around.end(), object) - around.begin();
+    for (const ObjectLookup::Distance& distance : distances) {
+      const auto place =
+          std::lower_bound(around.begin(), around.end(), distance.object) - around.begin();
       Votes& votes = counts[static_cast<std::size_t>(place)];
-      if (voxels <= config_.near_voxels) ++votes.near;
-      if (nearest == nullptr ? voxels <= config_.at_voxels : voxels < least) {
+      if (distance.voxels <= config_.near_voxels) ++votes.near;
+      if (nearest == nullptr ? distance.voxels <= config_.at_voxels : distance.voxels < least) {
         nearest = &votes;
-        least = voxels;
+        least = distance.voxels;
       }
     }
     if (nearest != nullptr) ++nearest->at;

@@ -103,6 +103,17 @@ TEST(Guard, ErrorsPassThrough) {
   EXPECT_EQ(thrown.error().kind, ErrorKind::kInternal);
 }
 
+// A piece that is too large, while smaller ones can be had.
+TEST(Guard, LibrariesWordsForWantOfMemoryAreKnown) {
+  for (const char* words : {"[Open3D Error] MemoryManagerCPU.cpp:39: CPU malloc failed",
+                            "mmap: Cannot allocate memory"}) {
+    const auto thrown = Guarded([&]() -> Expected<void> { throw std::runtime_error(words); });
+    ASSERT_FALSE(thrown.has_value());
+    EXPECT_EQ(thrown.error().kind, ErrorKind::kEnvironment);
+    EXPECT_TRUE(thrown.error().message.starts_with("out of memory")) << thrown.error().message;
+  }
+}
+
 TEST(Guard, MessagesAreOneLineOfText) {
   testing::internal::CaptureStderr();
   PrintError("program", "a\nb\x1b[31m\xff" + std::string(10'000, 'x'));
