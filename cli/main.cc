@@ -13,6 +13,7 @@
 
 #include "cli/command.h"
 #include "cli/log_lines.h"
+#include "cli/openmp_threads.h"
 #include "cli/report.h"
 #include "cli/segment.h"
 #include "core/guard.h"
@@ -130,6 +131,7 @@ int RunCommand(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tsdfpp::LimitOpenMpThreads();
   return tsdfpp::GuardedMain("tsdfpp", [&] {
     spdlog::set_default_logger(spdlog::stderr_color_mt("tsdfpp"));
     tsdfpp::LogOneLineEach();

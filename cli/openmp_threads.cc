@@ -1,4 +1,8 @@
-// How many threads of OpenMP the command's libraries get (core/own_environment.h).
+#include "cli/openmp_threads.h"
+
+#include <omp.h>
+#include <tbb/task_scheduler_observer.h>
+
 #include <cstdlib>
 
 #include "core/own_environment.h"
@@ -6,14 +10,23 @@
 namespace tsdfpp {
 namespace {
 
-void LimitThreads(int /*argc*/, char** /*argv*/, char** /*environment*/) {
-  if (std::getenv(kOpenMpThreads) != nullptr) return;
-  if (setenv(kOpenMpThreads, "1", 1) == 0) setenv(kOwnOpenMpThreads, "1", 1);
-}
-
-// Run by the loader before the runtime's initialiser, which reads the environment once.
-[[gnu::section(".preinit_array"), gnu::used]] void (*const kLimitThreads)(int, char**,
-                                                                          char**) = LimitThreads;
+// OpenMP's number is a thread's own.
+class LimitEachWorker : public tbb::task_scheduler_observer {
+ public:
+  LimitEachWorker() { observe(true); }
+  ~LimitEachWorker() override { observe(false); }
+  void on_scheduler_entry(bool /*is_worker*/) override { omp_set_num_threads(1); }
+};
 
 }  // namespace
+
+void LimitOpenMpThreads() {
+  if (std::getenv(kOpenMpThreads) != nullptr) return;
+  // Open3D looks at the variable and then asks OpenMP, whose runtime has read it long ago.
+  setenv(kOpenMpThreads, "1", 1);
+  setenv(kOwnOpenMpThreads, "1", 1);
+  omp_set_num_threads(1);
+  static const LimitEachWorker limit_each_worker;
+}
+
 }  // namespace tsdfpp

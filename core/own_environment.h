@@ -5,8 +5,8 @@
 namespace tsdfpp {
 
 // OpenMP's runtime ends a process that cannot make a thread with exit code 1 and words of its own,
-// and nothing of the command gains by it: what takes time is TBB's. So the command's libraries are
-// loaded with one thread of it, unless the environment says otherwise.
+// and nothing of the command gains by it: what takes time is TBB's. So the command's libraries get
+// one thread of it, unless the environment says otherwise.
 inline constexpr const char* kOpenMpThreads = "OMP_NUM_THREADS";
 // Set where kOpenMpThreads is ours.
 inline constexpr const char* kOwnOpenMpThreads = "TSDFPP_OWN_OMP_NUM_THREADS";

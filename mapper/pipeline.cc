@@ -169,6 +169,9 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
 Expected<Segments> Pipeline::Segment(const Frame& frame) {
   TSDFPP_ASSIGN(Segments segments, segmenter_->Segment(frame));
   TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
+  if (repair_ != nullptr) {
+    segments.ids = repair_->SetOutlines(frame, segments.ids, config_.map.voxel_m);
+  }
   if (config_.BleedingWaits()) {
     const double step_m = kBleedingStep_voxels * config_.map.voxel_m;
     segments.ids = WithoutBleeding(frame.depth, segments.ids, static_cast<float>(step_m));

@@ -135,7 +135,7 @@ MaskRepair::OfTile MaskRepair::ExplainTile(const ObjectLookup& lookup, const Obj
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     lookup.Distances(points_W[i], around, distances);
     InstanceId& label = work.labels.at<InstanceId>(pixels[i]);
-    if (work.given.at<InstanceId>(pixels[i]) == label) {
+    if (is_changed_.at<std::uint8_t>(pixels[i]) == 0) {
       Testify(lookup, distances, cells, points_W[i], label, of_tile.said);
     }
     const auto object = LikeliestOf(lookup, distances, cells, points_W[i], label);
@@ -162,27 +162,32 @@ void MaskRepair::Explain(const ObjectLookup& lookup, const ObjectCells& cells, W
   contested_.Add(std::move(work.said));
 }
 
+cv::Mat MaskRepair::SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m) {
+  const SurfaceMaps& maps = surfaces_.Compute(frame.depth, frame.intrinsics, {});
+  OutlineLabels outlines =
+      LabelsByOutline(maps, frame.depth, ids, static_cast<float>(kOutlineStep_voxels * voxel_m));
+  is_doubtful_ = outlines.is_doubtful;
+  is_changed_ = outlines.labels != ids;
+  return outlines.labels;
+}
+
 cv::Mat MaskRepair::Repair(const Frame& frame, const cv::Mat& labels,
                            const std::map<InstanceId, Pose>& T_WO, MapRepresentation& map) {
   const double voxel_m = map.config().voxel_m;
-  const SurfaceMaps& maps = surfaces_.Compute(frame.depth, frame.intrinsics, {});
-  OutlineLabels outlines =
-      LabelsByOutline(maps, frame.depth, labels, static_cast<float>(kOutlineStep_voxels * voxel_m));
-
   const ObjectCells voxels(T_WO, voxel_m);
   for (const auto& [object, cells] : contested_.TakeLost()) {
     const auto pose = T_WO.find(object);
     TakeOut(cells, voxel_m, object, pose == T_WO.end() ? Pose::Identity() : pose->second, map);
   }
   const ObjectLookup lookup(map, ObjectLookup::Of::kObjectsAndBackground);
-  Work work{frame, labels, outlines.labels, LabelledPixels(frame, labels), {}, {}};
+  Work work{frame, labels.clone(), LabelledPixels(frame, labels), {}, {}};
   Explain(lookup, voxels, work);
   FollowExplained(lookup, work.explained, work.is_open, work.labels);
 
   std::vector<cv::Point> pixels;
   std::vector<NewPoint> points;
   ForEachIn(work.is_open, [&](int v, int u) {
-    if (outlines.is_doubtful.at<std::uint8_t>(v, u) != 0) {
+    if (is_doubtful_.at<std::uint8_t>(v, u) != 0) {
       work.labels.at<InstanceId>(v, u) = kNoInstance;
       return;
     }

@@ -28,23 +28,27 @@ class MaskRepair {
   explicit MaskRepair(const MaskRepairConfig& config)
       : config_(config), new_surface_(config.confirm_frames, config.forget_frames) {}
 
-  // The labels (CV_16UC1, ids of the map's objects) that are to be fused instead of `labels`, once
-  // the map's objects have the frame's poses, T_WO. In this order:
-  //  1. *Outlines.* A point that does not go on from its own label's surface, but does from that of
-  //     another label beside it, gets that label (mapper/associate/outline_surfaces.h).
-  //  2. *Taking out.* Cells of a voxel on an object's surface that frames gave to others more often
+  // The frame's segments (CV_16UC1) with outlines set right: a point that does not go on from its
+  // own segment's surface, but does from that of another one beside it, gets that one's id
+  // (mapper/associate/outline_surfaces.h). To be called first of each frame.
+  cv::Mat SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m);
+
+  // The labels (CV_16UC1, ids of the map's objects) that are to be fused instead of `labels`, which
+  // are the segments after SetOutlines() as associated, once the map's objects have the frame's
+  // poses, T_WO. In this order:
+  //  1. *Taking out.* Cells of a voxel on an object's surface that frames gave to others more often
   //     than to it are taken out of the object (mapper/associate/take_out.h). Points say so that
-  //     are within take_voxels of it, and whose label was not changed in step 1.
-  //  3. *Known surfaces.* A point is explained by an object to whose surface it is near:
+  //     are within take_voxels of it, and whose segment SetOutlines() did not change.
+  //  2. *Known surfaces.* A point is explained by an object to whose surface it is near:
   //     keep_voxels for the label's own, take_voxels for another one's, where that is its own in at
   //     least half of the frames that disputed it. It becomes that of the likeliest: weight times
   //     that share times exp(-distance^2 / 2 sigma_voxels^2), and own_factor for the label's own.
   //     Ties go to the lower id.
-  //  4. *Unknown ids.* Where the map has no surface of a label, and more than half of its points
-  //     became one object's in step 3 (not the background's), the others do, too.
-  //  5. *New surface.* What is left is of no label (kNoInstance: not fused) until its place has had
-  //     that label in confirm_frames frames (mapper/associate/new_surface.h), and where step 1 saw
-  //     that it goes on from neither side.
+  //  3. *Unknown ids.* Where the map has no surface of a label, and more than half of its points
+  //     became one object's in step 2 (not the background's), the others do, too.
+  //  4. *New surface.* What is left is of no label (kNoInstance: not fused) until its place has had
+  //     that label in confirm_frames frames (mapper/associate/new_surface.h), and where
+  //     SetOutlines() saw that it goes on from neither side.
   // Pixels without valid depth keep their label, and kNoInstance stays. The same for any number of
   // threads.
   cv::Mat Repair(const Frame& frame, const cv::Mat& labels, const std::map<InstanceId, Pose>& T_WO,
@@ -57,7 +61,6 @@ class MaskRepair {
   // A frame on its way. Of `labels` those are the map's own word where `is_open` is 0.
   struct Work {
     const Frame& frame;
-    const cv::Mat& given;
     cv::Mat labels;
     cv::Mat is_open;  // CV_8UC1
     std::map<std::pair<InstanceId, InstanceId>, std::int64_t> explained;
@@ -82,6 +85,8 @@ class MaskRepair {
 
   MaskRepairConfig config_;
   SurfaceMapper surfaces_;
+  cv::Mat is_doubtful_;  // of the frame, CV_8UC1, as in OutlineLabels
+  cv::Mat is_changed_;   // by SetOutlines()
   ContestedCells contested_;
   NewSurface new_surface_;
 };

@@ -48,6 +48,32 @@ std::vector<Index3> LargestPart(std::vector<Index3> cells) {
 
 }  // namespace
 
+// What an object that has no surface yet would begin with.
+class NewSurface::Body {
+ public:
+  Body(const std::vector<Index3>& seen, const NewSurface& surface, InstanceId label) {
+    const Counted& counted = surface.counted_.at(label);
+    std::vector<Index3> confirmed;
+    std::vector<Index3> all;
+    for (const Index3& cell : seen) {
+      all.push_back(CoarseOf(cell));
+      if (FramesOf(counted, cell) >= surface.confirm_frames_) confirmed.push_back(all.back());
+    }
+    const auto labelled = surface.labelled_.find(label);
+    moves_ =
+        labelled->second.frames >= surface.confirm_frames_ && 2 * confirmed.size() < seen.size();
+    part_ = LargestPart(moves_ ? std::move(all) : std::move(confirmed));
+  }
+  bool Has(const Index3& cell, bool is_confirmed) const {
+    return (is_confirmed || moves_) &&
+           std::binary_search(part_.begin(), part_.end(), CoarseOf(cell));
+  }
+
+ private:
+  bool moves_ = false;
+  std::vector<Index3> part_;  // coarse, sorted
+};
+
 void NewSurface::Count(const std::vector<Index3>& seen, Counted& counted) const {
   Counted next;
   next.reserve(counted.size() + seen.size());
@@ -90,17 +116,17 @@ std::vector<bool> NewSurface::Confirm(std::span<const NewPoint> points, const Ob
     if (cell_of[i]) seen[points[i].label].push_back(*cell_of[i]);
   }
   // Of objects that have no surface yet.
-  std::map<InstanceId, std::vector<Index3>> bodies;
+  std::map<InstanceId, Body> bodies;
   for (auto& [label, of_label] : seen) {
     SortOnce(of_label);
     Counted& counted = counted_[label];
     Count(of_label, counted);
     if (label == kBackground || lookup.NumberOf(label)) continue;
-    std::vector<Index3> confirmed;
-    for (const Index3& cell : of_label) {
-      if (FramesOf(counted, cell) >= confirm_frames_) confirmed.push_back(CoarseOf(cell));
-    }
-    bodies[label] = LargestPart(std::move(confirmed));
+    Sightings& label_seen = labelled_[label];
+    if (frame_ - label_seen.last > forget_frames_) label_seen.frames = 0;
+    ++label_seen.frames;
+    label_seen.last = frame_;
+    bodies.emplace(label, Body(of_label, *this, label));
   }
   std::vector<bool> is_confirmed(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -109,14 +135,12 @@ std::vector<bool> NewSurface::Confirm(std::span<const NewPoint> points, const Ob
     if (!cell_of[i]) continue;
     const int frames = FramesOf(counted_.at(label), *cell_of[i]);
     is_confirmed[i] = frames >= confirm_frames_;
-    if (!is_confirmed[i] || label == kBackground || frames >= kTimesLongerApart * confirm_frames_) {
-      continue;
+    if (label == kBackground || frames >= kTimesLongerApart * confirm_frames_) continue;
+    if (const auto body = bodies.find(label); body != bodies.end()) {
+      is_confirmed[i] = body->second.Has(*cell_of[i], is_confirmed[i]);
+    } else if (is_confirmed[i]) {
+      is_confirmed[i] = lookup.HasSurfaceAround(*lookup.NumberOf(label), points[i].p_W);
     }
-    const std::optional<std::size_t> object = lookup.NumberOf(label);
-    const auto body = bodies.find(label);
-    is_confirmed[i] = object ? lookup.HasSurfaceAround(*object, points[i].p_W)
-                             : std::binary_search(body->second.begin(), body->second.end(),
-                                                  CoarseOf(*cell_of[i]));
   }
   return is_confirmed;
 }

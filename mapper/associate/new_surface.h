@@ -32,8 +32,10 @@ class NewSurface {
   // cell. The cells of an object, of which `lookup` has all with a surface, are those of its own
   // frame; such as are apart from it need kTimesLongerApart times as many frames: with no surface
   // in a voxel block beside the point's or, of an object without any surface, outside of the
-  // greatest part of its confirmed cells (cubes of four, connected through neighbours). The
-  // background has no such part.
+  // greatest part of its confirmed cells (cubes of four, connected through neighbours). Where an
+  // object without surface was seen in enough frames, but most of its cells were not, it moves and
+  // nobody knows how, as no tracker can before it is in the map: it begins with the greatest part
+  // of what this frame shows. The background has no such parts.
   std::vector<bool> Confirm(std::span<const NewPoint> points, const ObjectCells& cells,
                             const ObjectLookup& lookup);
 
@@ -46,6 +48,8 @@ class NewSurface {
   };
   using Counted = std::vector<Sightings>;  // sorted by cell
 
+  class Body;
+
   // Counts the frame's cells of one label, sorted.
   void Count(const std::vector<Index3>& seen, Counted& counted) const;
   static int FramesOf(const Counted& counted, const Index3& cell);
@@ -54,6 +58,8 @@ class NewSurface {
   int forget_frames_;
   int frame_ = 0;                          // counted here
   std::map<InstanceId, Counted> counted_;  // by label
+  // Of labels that the map had no surface of; their cells mean nothing.
+  std::map<InstanceId, Sightings> labelled_;
 };
 
 }  // namespace tsdfpp

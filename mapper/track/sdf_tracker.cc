@@ -65,17 +65,17 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
     Memory& memory = memory_[id];
     const auto known = before.find(id);
-    if (known == before.end()) {
+    const std::optional<ObjectModel> model = models_(map, id);
+    // Its pixels may have waited until now, so that the map has nothing of it.
+    if (known == before.end() || !model) {
       status = TrackStatus::kBegun;
-      after.T_WO[id] = Pose::Identity();
+      after.T_WO.try_emplace(id, Pose::Identity());
       memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}};
       if (config_.keyframe_turn_rad > 0) {
         memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
       }
       continue;
     }
-    const std::optional<ObjectModel> model = models_(map, id);
-    if (!model) continue;
     const auto registered = Register(frame, points, *model, voxel_m, known->second, memory);
     if (!registered) continue;
     status = TrackStatus::kTracked;

@@ -21,14 +21,18 @@ struct Tally {
   std::int64_t waiting = 0;  // not fused
 };
 
-Expected<Tally> MapMini(const std::string& sensor, MaskRepairMode mode, Method method) {
+Expected<std::unique_ptr<SimulatedSource>> OpenMini(const std::string& sensor) {
   const auto file = std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes" / "mini.toml";
   TSDFPP_ASSIGN(SceneConfig config, LoadSceneConfig(file));
   config.intrinsics = Scaled(config.intrinsics, kImageScale);
   TSDFPP_ASSIGN(config.sensor, SensorPresetNamed(sensor));
   SimOptions options;
   options.render_colour = false;
-  TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(config, options));
+  return SimulatedSource::Open(config, options);
+}
+
+Expected<Tally> MapMini(const std::string& sensor, MaskRepairMode mode, Method method) {
+  TSDFPP_ASSIGN(const auto source, OpenMini(sensor));
   PipelineConfig pipeline_config{.method = method, .mask_repair = mode};
   TSDFPP_RETURN_IF_ERROR(pipeline_config.map.SetProfile("close"));
   TSDFPP_RETURN_IF_ERROR(pipeline_config.Validate());
@@ -85,6 +89,29 @@ TEST_P(MaskRepairScene, ChangesLittleThatIsRight) {
   ASSERT_TRUE(on.has_value()) << on.error().message;
   EXPECT_EQ(on->given, 0);
   EXPECT_LT(on->wrong, on->pixels / 500);
+}
+
+// A tracker needs a model, which waits to be confirmed, while the car drives.
+TEST(MaskRepairTracking, ObjectsAreBornAndThenTracked) {
+  const auto source = OpenMini("exact");
+  ASSERT_TRUE(source.has_value()) << source.error().message;
+  PipelineConfig config{.method = Method::kTsdfppAnchored,
+                        .mask_repair = MaskRepairMode::kOn,
+                        .poses = PoseSource::kTrack};
+  ASSERT_TRUE(config.map.SetProfile("close").has_value());
+  ASSERT_TRUE(config.Validate().has_value());
+  Pipeline pipeline(config, (*source)->info().objects);
+  const int frames = (*source)->info().frame_count;
+  for (int index = 1; index <= frames; ++index) {
+    Frame frame = (*source)->ReadSensed(index)->frame;
+    frame.colour = cv::Mat::zeros(frame.depth.size(), CV_8UC3);
+    ASSERT_TRUE(pipeline.Process(frame).has_value());
+  }
+  const auto objects = pipeline.track_log().objects();
+  EXPECT_GT(objects.size(), 0U);
+  for (const auto& [id, log] : objects) {
+    EXPECT_GE(log.tracked, frames - config.repair.confirm_frames - 1) << id;
+  }
 }
 
 }  // namespace

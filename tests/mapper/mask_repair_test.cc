@@ -113,6 +113,14 @@ TEST_F(NewSurfaceTest, OfAnObjectBeginsWithItsGreatestPart) {
   EXPECT_EQ(confirmed, (std::vector<bool>{true, true, true, true}));
 }
 
+// An object that moves before any tracker can know how is born all the same.
+TEST_F(NewSurfaceTest, OfAnObjectThatMovesBeginsWithWhatAFrameShows) {
+  for (int i = 1; i < kConfirm; ++i) {
+    EXPECT_EQ(See(1, {0.1 * i, 0.1 * i + 0.05}), (std::vector<bool>{false, false}));
+  }
+  EXPECT_EQ(See(1, {0.5, 0.55, 2.01}), (std::vector<bool>{true, true, false}));
+}
+
 // --- Taking out --------------------------------------------------------------------------------
 
 class TakeOutOfMethod : public EveryMethodTest {};
@@ -192,7 +200,8 @@ class RepairedWorld {
   // `mask` is what is seen of the frame, whose own is the truth.
   Wrong Map(const Frame& frame, const cv::Mat& mask) {
     for (const auto& [id, pose] : frame.T_WO) map_->SetObjectPose(id, pose);
-    labels_ = repair_.Repair(frame, mask, frame.T_WO, *map_);
+    const cv::Mat outlined = repair_.SetOutlines(frame, mask, map_->config().voxel_m);
+    labels_ = repair_.Repair(frame, outlined, frame.T_WO, *map_);
     map_->Fuse(frame, labels_);
     Wrong wrong;
     for (int v = 0; v < labels_.rows; ++v) {
