@@ -127,7 +127,10 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
       associator_(MakeAssociator(config, born, trajectories)),
       tracker_(MakeTracker(config)),
       repair_(config.mask_repair == MaskRepairMode::kOn
-                  ? std::make_unique<MaskRepair>(config.repair)
+                  ? std::make_unique<MaskRepair>(config.repair,
+                                                 config.associate == AssociationMode::kVotes
+                                                     ? MaskRepair::Births::kConfirmed
+                                                     : MaskRepair::Births::kCounted)
                   : nullptr),
       map_(std::move(map)),
       trajectories_(std::move(trajectories)),

@@ -24,9 +24,17 @@ namespace tsdfpp {
 
 class MaskRepair {
  public:
+  // Who says that a label of which the map has nothing is an object.
+  enum class Births {
+    kConfirmed,  // association, which has held it back until it was sure
+    kCounted,    // the frames in which it is there, as for any new surface
+  };
   // The config must be valid.
-  explicit MaskRepair(const MaskRepairConfig& config)
-      : config_(config), new_surface_(config.confirm_frames, config.forget_frames) {}
+  explicit MaskRepair(const MaskRepairConfig& config, Births births = Births::kCounted)
+      : config_(config),
+        new_surface_(config.confirm_frames,
+                     births == Births::kConfirmed ? 1 : config.confirm_frames,
+                     config.forget_frames) {}
 
   // The frame's segments (CV_16UC1) with outlines set right: a point that does not go on from its
   // own segment's surface, but does from that of another one beside it, gets that one's id

@@ -61,7 +61,7 @@ class NewSurface::Body {
     }
     const auto labelled = surface.labelled_.find(label);
     moves_ =
-        labelled->second.frames >= surface.confirm_frames_ && 2 * confirmed.size() < seen.size();
+        labelled->second.frames >= surface.birth_frames_ && 2 * confirmed.size() < seen.size();
     part_ = LargestPart(moves_ ? std::move(all) : std::move(confirmed));
   }
   bool Has(const Index3& cell, bool is_confirmed) const {

@@ -24,9 +24,12 @@ struct NewPoint {
 class NewSurface {
  public:
   // A label is confirmed in a cell where it was seen in `confirm_frames` frames, none of them more
-  // than `forget_frames` after the one before.
-  NewSurface(int confirm_frames, int forget_frames)
-      : confirm_frames_(confirm_frames), forget_frames_(forget_frames) {}
+  // than `forget_frames` after the one before. An object without surface was seen in enough frames
+  // after `birth_frames`.
+  NewSurface(int confirm_frames, int birth_frames, int forget_frames)
+      : confirm_frames_(confirm_frames),
+        birth_frames_(birth_frames),
+        forget_frames_(forget_frames) {}
 
   // Takes in the points of the next frame. Says for each whether its label is confirmed in its
   // cell. The cells of an object, of which `lookup` has all with a surface, are those of its own
@@ -55,6 +58,7 @@ class NewSurface {
   static int FramesOf(const Counted& counted, const Index3& cell);
 
   int confirm_frames_;
+  int birth_frames_;
   int forget_frames_;
   int frame_ = 0;                          // counted here
   std::map<InstanceId, Counted> counted_;  // by label

@@ -67,6 +67,23 @@ TEST_F(MaskRepairCommand, CompareSaysItPerRun) {
   EXPECT_NE(summary["command"].get<std::string>().find("--mask-repair on"), std::string::npos);
 }
 
+// Objects that association has held back already are not held back again.
+TEST_F(MaskRepairCommand, ObjectsOfVotesAreBornOnce) {
+  const auto tracked_with = [&](const std::string& mode) {
+    const CommandOutput run = Run({"map", kScene, "--associate", "votes", "--mask-repair", mode});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    std::vector<int> ids;
+    for (const auto& object : Stats()["tracking"]["objects"]) {
+      EXPECT_GT(object["tracked_frames"], 0) << object.dump();
+      ids.push_back(object["id"]);
+    }
+    return ids;
+  };
+  const std::vector<int> without = tracked_with("off");
+  EXPECT_FALSE(without.empty());
+  EXPECT_EQ(tracked_with("on"), without);
+}
+
 TEST_F(MaskRepairCommand, IsRefusedWhereItCannotBe) {
   ExpectRefused({"map", kScene, "--mask-repair", "perhaps"}, "--mask-repair");
   ExpectRefused({"map", kScene, "--mask-repair-config", Settings("")},

@@ -72,7 +72,7 @@ class NewSurfaceTest : public testing::Test {
     return surface_.Confirm(points, ObjectCells({{1, T_WO}}, 0.04), lookup);
   }
   std::unique_ptr<MapRepresentation> map_ = MakeMap(Method::kTsdfppAnchored, ToyConfig());
-  NewSurface surface_{kConfirm, kForget};
+  NewSurface surface_{kConfirm, kConfirm, kForget};
 };
 
 TEST_F(NewSurfaceTest, IsConfirmedWhereItWasSeenOftenEnough) {
