@@ -3,7 +3,8 @@
 
 namespace tsdfpp {
 
-// One, in the calling thread and in those of TBB, unless the environment says otherwise. To be called first in main().
+// One, in the calling thread and in those of TBB, unless the environment says otherwise. To be
+// called first in main().
 void LimitOpenMpThreads();
 
 }  // namespace tsdfpp

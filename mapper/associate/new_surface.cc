@@ -60,8 +60,7 @@ class NewSurface::Body {
       if (FramesOf(counted, cell) >= surface.confirm_frames_) confirmed.push_back(all.back());
     }
     const auto labelled = surface.labelled_.find(label);
-    moves_ =
-        labelled->second.frames >= surface.birth_frames_ && 2 * confirmed.size() < seen.size();
+    moves_ = labelled->second.frames >= surface.birth_frames_ && 2 * confirmed.size() < seen.size();
     part_ = LargestPart(moves_ ? std::move(all) : std::move(confirmed));
   }
   bool Has(const Index3& cell, bool is_confirmed) const {

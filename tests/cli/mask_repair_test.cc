@@ -73,7 +73,8 @@ TEST_F(MaskRepairCommand, ObjectsOfVotesAreBornOnce) {
     const CommandOutput run = Run({"map", kScene, "--associate", "votes", "--mask-repair", mode});
     EXPECT_EQ(run.exit_code, 0) << run.err;
     std::vector<int> ids;
-    for (const auto& object : Stats()["tracking"]["objects"]) {
+    const nlohmann::json stats = Stats();
+    for (const auto& object : stats["tracking"]["objects"]) {
       EXPECT_GT(object["tracked_frames"], 0) << object.dump();
       ids.push_back(object["id"]);
     }
