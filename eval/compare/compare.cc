@@ -56,7 +56,14 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
                                                             const SequenceInfo& info,
                                                             const SceneTruth& truth) {
   std::vector<std::unique_ptr<CompareRun>> runs;
-  if (!info.mask_ids_are_objects && AssociationOf(config, info) == AssociationMode::kGiven) {
+  const bool ids_are_objects = IdsAreObjects(config, info);
+  if (config.segmentation == Segmentation::kDepth &&
+      AssociationOf(config, info) == AssociationMode::kGiven) {
+    return UsageError(
+        "--associate given: the ids of --segmentation depth are drawn anew in every frame, "
+        "expected --associate votes");
+  }
+  if (!ids_are_objects && AssociationOf(config, info) == AssociationMode::kGiven) {
     return UsageError(
         "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
         "--associate votes",
@@ -67,6 +74,8 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
       for (const Method method : config.methods) {
         PipelineConfig pipeline{.method = method,
                                 .map = config.map,
+                                .segmentation = config.segmentation,
+                                .depth_segments = config.depth_segments,
                                 .bleeding = config.bleeding,
                                 .associate = AssociationOf(config, info),
                                 .mask_repair = config.mask_repair,
@@ -77,7 +86,7 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
         TSDFPP_RETURN_IF_ERROR(pipeline.Validate());
         const std::vector<ObjectInfo> nobody;
         runs.push_back(std::make_unique<CompareRun>(
-            pipeline, profile, info.mask_ids_are_objects ? info.objects : nobody, truth));
+            pipeline, profile, ids_are_objects ? info.objects : nobody, truth));
       }
     }
   }
@@ -145,9 +154,13 @@ int LastEvaluated(const CompareResult& result) {
 
 }  // namespace
 
+bool IdsAreObjects(const CompareConfig& config, const SequenceInfo& info) {
+  return info.mask_ids_are_objects && config.segmentation != Segmentation::kDepth;
+}
+
 AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info) {
-  return config.associate.value_or(info.mask_ids_are_objects ? AssociationMode::kGiven
-                                                             : AssociationMode::kVotes);
+  return config.associate.value_or(IdsAreObjects(config, info) ? AssociationMode::kGiven
+                                                               : AssociationMode::kVotes);
 }
 
 CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profile_name,
@@ -158,8 +171,9 @@ CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profil
       last_seen(MakeLastSeenStores(truth)) {}
 
 std::string CompareRun::Title() const {
-  return fmt::format("{}, {}, {}{}", MethodName(config.method), profile,
+  return fmt::format("{}, {}, {}{}{}", MethodName(config.method), profile,
                      PoseSourceTitle(config.poses),
+                     config.segmentation == Segmentation::kDepth ? ", segments of depth" : "",
                      config.associate == AssociationMode::kVotes ? ", ids by votes" : "");
 }
 

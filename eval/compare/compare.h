@@ -18,7 +18,10 @@ namespace tsdfpp {
 struct CompareConfig {
   std::vector<Method> methods{Method::kTsdf, Method::kTsdfpp, Method::kTsdfppAnchored};
   std::vector<std::string> profiles{"paper", "close"};
-  // Nothing: votes, unless the masks' ids are the truth's.
+  // Of our maps; adapters get the sequence's masks.
+  Segmentation segmentation = Segmentation::kGiven;
+  DepthSegmentsConfig depth_segments{};  // of Segmentation::kDepth
+  // Nothing: votes, unless the segments' ids are the truth's.
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
@@ -42,7 +45,10 @@ struct CompareConfig {
   bool record = false;  // what `tsdfpp report` shows in 3-D, below record/ (docs/report.md)
 };
 
-// What the config says; else by votes where ids in the masks are of one frame alone.
+// Whether the ids of the segments are the truth's.
+bool IdsAreObjects(const CompareConfig& config, const SequenceInfo& info);
+
+// What the config says; else by votes where ids of segments are of one frame alone.
 AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info);
 
 // One map of the comparison.

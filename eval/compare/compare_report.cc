@@ -102,6 +102,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"camera", CameraJson(result, run)},
           {"bleeding", BleedingPixelsName(run.config.BleedingWaits() ? BleedingPixels::kWait
                                                                      : BleedingPixels::kKeep)},
+          {"segmentation", SegmentationName(run.config.segmentation)},
           {"mask_repair", MaskRepairModeName(run.config.mask_repair)},
           {"poses", PoseSourceName(run.config.poses)},
           {"associate", AssociationModeName(run.config.associate)},
