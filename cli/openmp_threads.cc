@@ -1,11 +1,13 @@
 #include "cli/openmp_threads.h"
 
-#include <omp.h>
 #include <tbb/task_scheduler_observer.h>
 
 #include <cstdlib>
 
 #include "core/own_environment.h"
+
+// Of OpenMP's runtime, which Open3D brings; its header is the compiler's, and not every compiler's.
+extern "C" void omp_set_num_threads(int threads);
 
 namespace tsdfpp {
 namespace {

@@ -15,15 +15,14 @@ namespace fs = std::filesystem;
 using test::CommandOutput;
 using test::kUsage;
 
+const std::string kScene = TSDFPP_SOURCE_DIR "/scenes/stack.toml";
+
 class CompareSegmentation : public testing::Test {
  protected:
   CommandOutput Run(const std::vector<std::string>& options) {
-    std::vector<std::string> arguments{"compare",    TSDFPP_SOURCE_DIR "/scenes/stack.toml",
-                                       "--methods",  "tsdf++/anchored",
-                                       "--profiles", "close",
-                                       "--until",    "12",
-                                       "--every",    "12",
-                                       "--out",      folder_ / "out"};
+    std::vector<std::string> arguments{"compare",    kScene,  "--methods", "tsdf++/anchored",
+                                       "--profiles", "close", "--until",   "12",
+                                       "--every",    "12",    "--out",     folder_ / "out"};
     arguments.insert(arguments.end(), options.begin(), options.end());
     return test::RunTsdfpp(arguments, folder_.path());
   }

@@ -67,6 +67,7 @@ class NewSurfaceTest : public testing::Test {
   std::vector<bool> See(InstanceId label, const std::vector<double>& x_m,
                         const Pose& T_WO = Pose::Identity()) {
     std::vector<NewPoint> points;
+    points.reserve(x_m.size());
     for (const double x : x_m) points.push_back({label, T_WO * Eigen::Vector3d(x, 0.01, 0.01)});
     const ObjectLookup lookup(*map_, ObjectLookup::Of::kObjectsAndBackground);
     return surface_.Confirm(points, ObjectCells({{1, T_WO}}, 0.04), lookup);
