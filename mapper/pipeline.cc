@@ -72,6 +72,13 @@ std::unique_ptr<Associator> MakeAssociator(
 
 }  // namespace
 
+Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode) {
+  if (mode == MaskRepairMode::kOff || InfoOf(method).has_voxels) return {};
+  return UsageError(
+      "the repair of masks asks a map for its voxels, which method '{}' has not, expected off",
+      MethodName(method));
+}
+
 bool PipelineConfig::BleedingWaits() const {
   if (bleeding != BleedingPixels::kAuto) return bleeding == BleedingPixels::kWait;
   return poses == PoseSource::kTrack || camera != CameraSource::kGiven;
@@ -97,11 +104,7 @@ Expected<void> PipelineConfig::Validate() const {
         "ids",
         MethodName(method));
   }
-  if (mask_repair == MaskRepairMode::kOn && !InfoOf(method).has_voxels) {
-    return UsageError(
-        "the repair of masks asks a map for its voxels, which method '{}' has not, expected off",
-        MethodName(method));
-  }
+  TSDFPP_RETURN_IF_ERROR(CheckMaskRepair(method, mask_repair));
   if (associate == AssociationMode::kVotes && poses == PoseSource::kGiven) {
     return UsageError(
         "given poses are those of given ids, and association by votes gives ids of its own: "

@@ -28,6 +28,9 @@ namespace tsdfpp {
 class CameraTracker;
 class MaskRepair;
 
+// Errors: kUsage where masks are to be repaired by a map that has no voxels to ask.
+Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode);
+
 // All that a pipeline is told.
 struct PipelineConfig {
   Method method = Method::kTsdfpp;
@@ -55,7 +58,7 @@ struct PipelineConfig {
 
 // Wall-clock seconds of the steps of one frame.
 struct StepTimes {
-  double segment_s = 0;       // paper III-B; with given masks that of pixels that bleed, or 0
+  double segment_s = 0;       // paper III-B; with given masks that of outlines and bleeding, or 0
   double locate_s = 0;        // the camera; 0 with given poses of it
   double associate_s = 0;     // paper III-C: votes; 0 with given ids
   double track_s = 0;         // paper III-D: objects' meshes, ICP; 0 with given poses

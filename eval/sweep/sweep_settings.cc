@@ -242,6 +242,7 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   config.map.vote_band_voxels = vote_band;
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(poses));
   TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
+  TSDFPP_RETURN_IF_ERROR(CheckMaskRepair(config.method, config.mask_repair));
   SabotageMap(sabotage, config);
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
   return config;

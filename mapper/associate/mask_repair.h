@@ -71,7 +71,7 @@ class MaskRepair {
     const Frame& frame;
     cv::Mat labels;
     cv::Mat is_open;  // CV_8UC1
-    std::map<std::pair<InstanceId, InstanceId>, std::int64_t> explained;
+    Explained explained;
     std::vector<Testimony> said;
   };
 

@@ -16,8 +16,6 @@ class ObjectCells {
     for (const auto& [id, pose] : T_WO) T_OW_[id] = pose.inverse();
   }
 
-  double cell_m() const { return cell_m_; }
-
   // The cell of an object's frame in which a point of the world is; nothing so far out that no map
   // has a voxel there.
   std::optional<Index3> CellOf(InstanceId object, const Eigen::Vector3d& p_W) const {
