@@ -3,8 +3,9 @@
 
 namespace tsdfpp {
 
-// Makes the default logger print each message as "<level>: <message>": one line, whatever text from
-// outside is in it, under 500 bytes.
+// Makes a default logger that prints each message to stderr as "<level>: <message>": one line,
+// whatever text from outside is in it, under 500 bytes; also while a QuietStderr
+// (core/quiet_stderr.h) keeps what others print from it.
 void LogOneLineEach();
 
 }  // namespace tsdfpp

@@ -1,7 +1,5 @@
 // The command `tsdfpp`. Exit codes: core/error.h; 0 where all went well.
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 
 #include <cerrno>
@@ -133,7 +131,6 @@ int RunCommand(int argc, char** argv) {
 int main(int argc, char** argv) {
   tsdfpp::LimitOpenMpThreads();
   return tsdfpp::GuardedMain("tsdfpp", [&] {
-    spdlog::set_default_logger(spdlog::stderr_color_mt("tsdfpp"));
     tsdfpp::LogOneLineEach();
     return RunCommand(argc, argv);
   });

@@ -7,8 +7,9 @@
 namespace tsdfpp {
 
 // OpenCV and the codecs below it print their own words about a damaged image, or a lack of memory,
-// to stderr, and offer no hook. While this lives, what the process prints there is kept from it. A
-// second one waits for another thread's; of one thread the last ends first.
+// to stderr, and offer no hook; nor does the compiler within a software renderer. While this lives,
+// what the process prints there is kept from it. A second one waits for another thread's; of one
+// thread the last ends first.
 class QuietStderr {
  public:
   QuietStderr();

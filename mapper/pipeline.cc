@@ -72,13 +72,6 @@ std::unique_ptr<Associator> MakeAssociator(
 
 }  // namespace
 
-Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode) {
-  if (mode == MaskRepairMode::kOff || InfoOf(method).has_voxels) return {};
-  return UsageError(
-      "the repair of masks asks a map for its voxels, which method '{}' has not, expected off",
-      MethodName(method));
-}
-
 bool PipelineConfig::BleedingWaits() const {
   if (bleeding != BleedingPixels::kAuto) return bleeding == BleedingPixels::kWait;
   return poses == PoseSource::kTrack || camera != CameraSource::kGiven;

@@ -28,9 +28,6 @@ namespace tsdfpp {
 class CameraTracker;
 class MaskRepair;
 
-// Errors: kUsage where masks are to be repaired by a map that has no voxels to ask.
-Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode);
-
 // All that a pipeline is told.
 struct PipelineConfig {
   Method method = Method::kTsdfpp;

@@ -243,6 +243,9 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(poses));
   TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
   TSDFPP_RETURN_IF_ERROR(CheckMaskRepair(config.method, config.mask_repair));
+  if (config.mask_repair == MaskRepairMode::kOn && Open3dBand_voxels(method)) {
+    return UsageError("method '{}' is given no masks that could be repaired, expected off", method);
+  }
   SabotageMap(sabotage, config);
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
   return config;

@@ -30,6 +30,13 @@ std::string_view MaskRepairModeName(MaskRepairMode mode) {
   std::abort();
 }
 
+Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode) {
+  if (mode == MaskRepairMode::kOff || InfoOf(method).has_voxels) return {};
+  return UsageError(
+      "the repair of masks asks a map for its voxels, which method '{}' has not, expected off",
+      MethodName(method));
+}
+
 Expected<void> MaskRepairConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckRepair("keep_voxels", keep_voxels, 0.01, 100));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("take_voxels", take_voxels, 0, keep_voxels));

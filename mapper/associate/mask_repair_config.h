@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/toml_reader.h"
+#include "mapper/method_info.h"
 
 namespace tsdfpp {
 
@@ -18,6 +19,9 @@ enum class MaskRepairMode {
 // "off" or "on". Errors: kUsage.
 Expected<MaskRepairMode> MaskRepairModeFromName(std::string_view name);
 std::string_view MaskRepairModeName(MaskRepairMode mode);
+
+// Errors: kUsage where masks are to be repaired by a map that has no voxels to ask.
+Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode);
 
 struct MaskRepairConfig {
   double keep_voxels = 1;     // a surface so near to a point explains it, if it is its label's own

@@ -5,6 +5,7 @@
 #include <opencv2/core/utility.hpp>
 #include <vector>
 
+#include "core/quiet_stderr.h"
 #include "sim/render/sliver_pixels.h"
 #include "sim/scene/mujoco_guard.h"
 
@@ -149,6 +150,8 @@ Expected<void> Renderer::Draw(mjrContext& context, bool ids, unsigned char* rgb,
   visible_.flags[mjRND_IDCOLOR] = static_cast<mjtByte>(ids);
   visible_.flags[mjRND_SHADOW] = static_cast<mjtByte>(!ids);
   int gl_error = 0;
+  // LLVM, which makes the code of a software renderer, says so itself where it finds no memory.
+  const QuietStderr quiet;
   const auto start = Clock::now();
   TSDFPP_RETURN_IF_ERROR(RunGuarded([&] {
     mjr_setBuffer(mjFB_OFFSCREEN, &context);

@@ -194,11 +194,14 @@ TEST_F(Sweep, WhatDoesNotFitASceneGetsASentence) {
       {"sensor = \"pose_drift\"\ncamera_error = 1", "has pose errors of its own"},
       {"speed = 100", "expected 2 or more"},
       {"fuse_until = 8", "fuse_until is 8, but the last frame is 7"},
+      {"method = \"surfels\"\nmask_repair = \"on\"", "which method 'surfels' has not"},
+      {"method = \"open3d/8\"\nmask_repair = \"on\"", "'open3d/8' is given no masks"},
   };
-  for (const auto& [grid, sentence] : cases) {
-    const auto ran = RunTsdfpp(
-        {"sweep", Experiment("method = \"tsdf\"\n" + grid).string(), "--out", folder_ / "out"},
-        folder_.path());
+  for (const auto& [setting, sentence] : cases) {
+    const bool with_method = setting.starts_with("method");
+    const std::string grid = with_method ? setting : "method = \"tsdf\"\n" + setting;
+    const auto ran =
+        RunTsdfpp({"sweep", Experiment(grid).string(), "--out", folder_ / "out"}, folder_.path());
     EXPECT_EQ(ran.exit_code, 2) << grid;
     EXPECT_NE(ran.err.find(sentence), std::string::npos) << ran.err;
     EXPECT_NE(ran.err.find("grid '1'"), std::string::npos) << ran.err;
