@@ -133,9 +133,9 @@ void AddSegment(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<SegmentBenchOptions>();
   CLI::App* command = app.add_subcommand("segment", "What docs/segmentation.md shows, as CSV");
   command->add_option("--out", options->out, "Output folder")->required();
-  command->add_option("--parts", options->parts, "Some of them: scenes, shelf")
+  command->add_option("--parts", options->parts, "Some of them: scenes, networks, shelf")
       ->delimiter(',')
-      ->check(CLI::IsMember({"scenes", "shelf"}))
+      ->check(CLI::IsMember({"scenes", "networks", "shelf"}))
       ->capture_default_str();
   command->add_option("--scenes", options->scenes, "Folder of scenes")->capture_default_str();
   command->add_option("--shelf", options->shelf, "Folder of apc_shelf_scene0000")

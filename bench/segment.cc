@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "bench/segment_networks.h"
 #include "bench/segment_shelf.h"
 #include "core/files.h"
 #include "core/folders.h"
@@ -122,6 +123,9 @@ Expected<void> RunSegmentBench(const SegmentBenchOptions& options) {
   for (const std::string& part : options.parts) {
     if (part == "scenes") {
       TSDFPP_RETURN_IF_ERROR(WriteScenes(options));
+    } else if (part == "networks") {
+      TSDFPP_ASSIGN(const std::string csv, NetworkScoresCsv(options.scenes, options.frames));
+      TSDFPP_RETURN_IF_ERROR(WriteFile(fs::path(options.out) / "networks.csv", csv));
     } else {
       TSDFPP_RETURN_IF_ERROR(WriteShelf(options));
     }

@@ -9,6 +9,7 @@
 
 #include "cli/command.h"
 #include "cli/pose_choice.h"
+#include "cli/segmentation_options.h"
 #include "cli/sequence_options.h"
 #include "eval/compare/compare_report.h"
 #include "eval/compare/compare_tables.h"
@@ -29,8 +30,7 @@ struct CompareArguments {
   std::string mask_repair = "off";
   std::string poses;
   std::string associate;
-  std::string segmentation = "gt";
-  std::string segmentation_config;
+  SegmentationOptions segmentation{.segmentation = "gt"};
   std::vector<std::string> adapters;
   int reveal = -1;
   std::string removed;
@@ -170,12 +170,11 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
   if (options.mask_repair != MaskRepairModeName(MaskRepairMode::kOff)) {
     command += " --mask-repair " + options.mask_repair;
   }
-  if (options.segmentation != SegmentationName(Segmentation::kGiven)) {
-    command += " --segmentation " + options.segmentation;
+  if (const std::string& name = options.segmentation.segmentation;
+      name != SegmentationName(Segmentation::kGiven)) {
+    command += " --segmentation " + name;
   }
-  if (!options.segmentation_config.empty()) {
-    command += " --segmentation-config " + options.segmentation_config;
-  }
+  command += options.segmentation.Text();
   if (!options.associate.empty()) command += " --associate " + options.associate;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   return command;
@@ -213,14 +212,8 @@ CommandResult ResultOf(const CompareResult& result, const std::string& out,
 
 // Where the masks of our maps come from.
 Expected<void> ReadSegmentation(const CompareArguments& options, CompareConfig& config) {
-  TSDFPP_ASSIGN(config.segmentation, SegmentationFromName(options.segmentation));
-  if (options.segmentation_config.empty()) return {};
-  if (config.segmentation != Segmentation::kDepth) {
-    return UsageError("--segmentation-config needs --segmentation depth");
-  }
-  TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.segmentation_config));
-  TSDFPP_ASSIGN(config.depth_segments,
-                DepthSegmentsConfig::FromToml(table, options.segmentation_config));
+  TSDFPP_ASSIGN(config.segmentation, SegmentationFromName(options.segmentation.segmentation));
+  TSDFPP_ASSIGN(config.segmenter, ReadSegmenterParts(options.segmentation, config.segmentation));
   return {};
 }
 
@@ -264,16 +257,11 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
       ->capture_default_str();
   app.add_option("--profiles", options->profiles, "Truncation profiles: paper, close")
       ->capture_default_str();
-  app.add_option(
-         "--segmentation", options->segmentation,
-         "Where the masks of our maps come from: gt (the sequence), none (all is background) "
-         "or depth (convex parts of the depth image, associated by votes, "
-         "docs/segmentation.md)")
-      ->check(OneOf({"gt", "none", "depth"}))
-      ->capture_default_str();
-  app.add_option("--segmentation-config", options->segmentation_config,
-                 "Settings of --segmentation depth, TOML (docs/segmentation.md)")
-      ->check(NotEmpty("a file"));
+  AddSegmentationOptions(app,
+                         "Where the masks of our maps come from: gt (the sequence), none (all is "
+                         "background),",
+                         options->segmentation);
+  AddDepthConfigOption(app, options->segmentation);
   app.add_option("--associate", options->associate,
                  "Which objects segments are: given (the masks' ids) or votes (their points vote; "
                  "ids are the map's own and matched to the truth's by overlap, each once); by "

@@ -10,6 +10,7 @@
 #include "cli/map_start.h"
 #include "cli/map_stats.h"
 #include "cli/pose_choice.h"
+#include "cli/segmentation_options.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "core/json_text.h"
@@ -26,8 +27,7 @@ namespace {
 struct MapArguments {
   SequenceArguments source;
   std::string method = "tsdf++/anchored";
-  std::string segmentation;
-  std::string segmentation_config;
+  SegmentationOptions segmentation;
   std::string associate;
   std::string camera = "gt";
   std::string bleeding = "auto";
@@ -107,20 +107,13 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
-  if (!options.segmentation.empty()) {
-    TSDFPP_ASSIGN(wishes.segmentation, SegmentationFromName(options.segmentation));
+  if (const std::string& name = options.segmentation.segmentation; !name.empty()) {
+    TSDFPP_ASSIGN(wishes.segmentation, SegmentationFromName(name));
     if (options.source.path.empty()) {
-      return UsageError("--segmentation {} needs a sequence to map", options.segmentation);
+      return UsageError("--segmentation {} needs a sequence to map", name);
     }
   }
-  if (!options.segmentation_config.empty()) {
-    if (wishes.segmentation != Segmentation::kDepth) {
-      return UsageError("--segmentation-config needs --segmentation depth");
-    }
-    TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.segmentation_config));
-    TSDFPP_ASSIGN(wishes.depth_segments,
-                  DepthSegmentsConfig::FromToml(table, options.segmentation_config));
-  }
+  TSDFPP_ASSIGN(wishes.segmenter, ReadSegmenterParts(options.segmentation, wishes.segmentation));
   TSDFPP_ASSIGN(wishes.track, ReadTracking(options));
   if (options.load.empty()) {
     if (options.source.path.empty()) {
@@ -309,14 +302,11 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--method", options->method,
                  MethodNames() + " (tsdfpp methods says what they are)")
       ->capture_default_str();
-  app.add_option(
-         "--segmentation", options->segmentation,
-         "Where masks come from: gt (the sequence), none (all is background) or depth (convex "
-         "parts of the depth image, associated by votes, docs/segmentation.md); by default "
-         "gt where the sequence has masks")
-      ->check(OneOf({"gt", "none", "depth"}));
-  app.add_option("--segmentation-config", options->segmentation_config,
-                 "Settings of --segmentation depth, TOML (docs/segmentation.md)");
+  AddSegmentationOptions(app,
+                         "Where masks come from, by default the sequence if it has any: gt (the "
+                         "sequence), none (all is background),",
+                         options->segmentation);
+  AddDepthConfigOption(app, options->segmentation);
   app.add_option("--associate", options->associate,
                  "Which objects segments are: given (the masks' ids) or votes (their points vote, "
                  "ids are the map's own; poses are then tracked); by default given unless ids are "

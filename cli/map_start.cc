@@ -14,8 +14,8 @@ Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
                         std::optional<Segmentation> segmentation) {
   TSDFPP_ASSIGN(start.source, OpenArguments(arguments));
   start.info = start.source->info();
-  if (segmentation == Segmentation::kDepth) {
-    start.config.segmentation = Segmentation::kDepth;
+  if (segmentation && IdsAreOfOneFrame(*segmentation)) {
+    start.config.segmentation = *segmentation;
     return {};
   }
   if (segmentation == Segmentation::kNone) {
@@ -48,10 +48,11 @@ Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
   start.config.associate = wishes.associate.value_or(
       of_objects || !has_segments ? AssociationMode::kGiven : AssociationMode::kVotes);
   if (start.by_votes() || of_objects || !has_segments) return {};
-  if (start.config.segmentation == Segmentation::kDepth) {
+  if (IdsAreOfOneFrame(start.config.segmentation)) {
     return UsageError(
-        "--associate given: the ids of --segmentation depth are drawn anew in every frame, "
-        "expected --associate votes");
+        "--associate given: the ids of --segmentation {} are drawn anew in every frame, expected "
+        "--associate votes",
+        SegmentationName(start.config.segmentation));
   }
   return UsageError(
       "--associate given: the ids in the masks of {} are drawn anew in every frame, expected "
@@ -116,7 +117,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
                             const MapWishes& wishes, int until) {
   MapStart start;
   start.config = config;
-  start.config.depth_segments = wishes.depth_segments;
+  start.config.segmenter = wishes.segmenter;
   TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
   TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
@@ -158,7 +159,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   if (poses) start.config.poses = *poses;
   const auto fits = poses ? start.config.Validate() : tl::unexpected(poses.error());
   if (!fits) return DataError("{}: its run cannot go on: {}", file, fits.error().message);
-  start.config.depth_segments = wishes.depth_segments;
+  start.config.segmenter = wishes.segmenter;
   start.config.camera = wishes.camera;
   start.config.bleeding = wishes.bleeding;
   start.config.mask_repair = wishes.repair.mode;

@@ -26,7 +26,7 @@ struct RepairWishes {
 // What was asked for beside a config; nothing: as the sequence is.
 struct MapWishes {
   std::optional<Segmentation> segmentation;
-  DepthSegmentsConfig depth_segments{};
+  SegmenterParts segmenter{};
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
@@ -49,7 +49,7 @@ struct MapStart {
   int frames() const { return last - first + 1; }  // to map
   // Whether the segments' ids are those of the sequence's objects.
   bool ids_are_objects() const {
-    return info.mask_ids_are_objects && config.segmentation != Segmentation::kDepth;
+    return info.mask_ids_are_objects && !IdsAreOfOneFrame(config.segmentation);
   }
   // Whether the map's objects are its own, found by votes.
   bool by_votes() const { return config.associate == AssociationMode::kVotes; }

@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "cli/segmentation_options.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
 #include "core/json_text.h"
@@ -16,9 +17,7 @@
 #include "eval/run/run_folder.h"
 #include "eval/score/segment_scores.h"
 #include "mapper/kernels.h"
-#include "mapper/segment/depth_segments.h"
-#include "mapper/segment/given_masks.h"
-#include "mapper/segment/no_masks.h"
+#include "mapper/segment/segmenter.h"
 #include "sequence/image_encoders.h"
 #include "sequence/sequence_json.h"
 
@@ -27,7 +26,7 @@ namespace {
 
 struct SegmentArguments {
   SequenceArguments source;
-  std::string segmentation = "depth";
+  SegmentationOptions segmentation{.segmentation = "depth"};
   std::string settings;
   std::string noise;
   std::string out;
@@ -49,16 +48,16 @@ Expected<DepthSegmentsConfig> DepthConfig(const SegmentArguments& options) {
 }
 
 Expected<std::unique_ptr<Segmenter>> MakeSegmenterOf(const SegmentArguments& options) {
-  if (options.segmentation == "depth") {
-    TSDFPP_ASSIGN(const DepthSegmentsConfig config, DepthConfig(options));
-    return std::make_unique<DepthSegments>(config);
-  }
-  if (!options.settings.empty() || !options.noise.empty()) {
-    return UsageError("{} goes with --segmentation depth only",
+  TSDFPP_ASSIGN(const Segmentation segmentation,
+                SegmentationFromName(options.segmentation.segmentation));
+  TSDFPP_ASSIGN(SegmenterParts parts, ReadSegmenterParts(options.segmentation, segmentation));
+  if (UsesDepth(segmentation)) {
+    TSDFPP_ASSIGN(parts.depth, DepthConfig(options));
+  } else if (!options.settings.empty() || !options.noise.empty()) {
+    return UsageError("{} goes with --segmentation depth or full only",
                       options.noise.empty() ? "--settings" : "--noise");
   }
-  if (options.segmentation == "gt") return std::make_unique<GivenMasks>();
-  return std::make_unique<NoMasks>();
+  return MakeSegmenter(segmentation, {}, parts);
 }
 
 // What a run leaves, frame by frame.
@@ -141,7 +140,7 @@ Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::A
   }
   nlohmann::json json{{"run", run_folder.id()},
                       {"sequence", info.name},
-                      {"segmentation", options.segmentation},
+                      {"segmentation", options.segmentation.segmentation},
                       {"kernels", KernelsName(UsedKernels())},
                       {"frames", writer.frames()},
                       {"every", options.every},
@@ -167,11 +166,9 @@ Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::A
 Run AddSegment(CLI::App& app, const CommonOptions&) {
   auto options = std::make_shared<SegmentArguments>();
   AddSequenceArguments(app, "SCENE-or-SEQ", options->source);
-  app.add_option("--segmentation", options->segmentation,
-                 "depth (surfaces between jumps and concave edges), gt (the sequence's masks) or "
-                 "none (all is background)")
-      ->check(OneOf({"depth", "gt", "none"}))
-      ->capture_default_str();
+  AddSegmentationOptions(
+      app, "What finds segments: gt (the sequence's masks), none (all is background),",
+      options->segmentation);
   app.add_option("--noise", options->noise,
                  "Of depth: nguyen2012 (Kinect v1, the default) or exact; for depth")
       ->check(OneOf({"nguyen2012", "exact"}));

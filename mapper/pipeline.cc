@@ -79,17 +79,22 @@ bool PipelineConfig::BleedingWaits() const {
 
 Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(map.Validate());
-  TSDFPP_RETURN_IF_ERROR(depth_segments.Validate());
+  TSDFPP_RETURN_IF_ERROR(segmenter.depth.Validate());
+  TSDFPP_RETURN_IF_ERROR(segmenter.network.Validate());
   TSDFPP_RETURN_IF_ERROR(votes.Validate());
   TSDFPP_RETURN_IF_ERROR(repair.Validate());
   TSDFPP_RETURN_IF_ERROR(icp.Validate());
   TSDFPP_RETURN_IF_ERROR(track.Validate());
   TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
   TSDFPP_RETURN_IF_ERROR(CheckCamera(method, camera));
-  if (segmentation == Segmentation::kDepth && associate == AssociationMode::kGiven) {
+  if (UsesNetwork(segmentation) && segmenter.finder == nullptr) {
+    return UsageError("segmentation '{}' has nobody who finds instances, expected a network",
+                      SegmentationName(segmentation));
+  }
+  if (IdsAreOfOneFrame(segmentation) && associate == AssociationMode::kGiven) {
     return UsageError(
-        "the ids of segments of depth are drawn anew in every frame: expected association by "
-        "votes");
+        "the ids of segmentation '{}' are drawn anew in every frame: expected association by votes",
+        SegmentationName(segmentation));
   }
   if (associate == AssociationMode::kVotes && !InfoOf(method).has_voxels) {
     return UsageError(
@@ -118,7 +123,7 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
                    std::map<InstanceId, std::map<int, Pose>> trajectories,
                    const std::vector<ObjectInfo>& born)
     : config_(config),
-      segmenter_(MakeSegmenter(config.segmentation, objects, config.depth_segments)),
+      segmenter_(MakeSegmenter(config.segmentation, objects, config.segmenter)),
       camera_(std::make_unique<CameraTracker>(config.camera, config.track)),
       associator_(MakeAssociator(config, born, trajectories)),
       tracker_(MakeTracker(config)),

@@ -33,7 +33,7 @@ struct PipelineConfig {
   Method method = Method::kTsdfpp;
   MapConfig map{};
   Segmentation segmentation = Segmentation::kGiven;
-  DepthSegmentsConfig depth_segments{};  // of Segmentation::kDepth
+  SegmenterParts segmenter{};
   BleedingPixels bleeding = BleedingPixels::kAuto;
   AssociationMode associate = AssociationMode::kGiven;
   VoteConfig votes{};

@@ -57,11 +57,12 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
                                                             const SceneTruth& truth) {
   std::vector<std::unique_ptr<CompareRun>> runs;
   const bool ids_are_objects = IdsAreObjects(config, info);
-  if (config.segmentation == Segmentation::kDepth &&
+  if (IdsAreOfOneFrame(config.segmentation) &&
       AssociationOf(config, info) == AssociationMode::kGiven) {
     return UsageError(
-        "--associate given: the ids of --segmentation depth are drawn anew in every frame, "
-        "expected --associate votes");
+        "--associate given: the ids of --segmentation {} are drawn anew in every frame, expected "
+        "--associate votes",
+        SegmentationName(config.segmentation));
   }
   if (!ids_are_objects && AssociationOf(config, info) == AssociationMode::kGiven) {
     return UsageError(
@@ -75,7 +76,7 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
         PipelineConfig pipeline{.method = method,
                                 .map = config.map,
                                 .segmentation = config.segmentation,
-                                .depth_segments = config.depth_segments,
+                                .segmenter = config.segmenter,
                                 .bleeding = config.bleeding,
                                 .associate = AssociationOf(config, info),
                                 .mask_repair = config.mask_repair,
@@ -153,33 +154,6 @@ int LastEvaluated(const CompareResult& result) {
 }
 
 }  // namespace
-
-bool IdsAreObjects(const CompareConfig& config, const SequenceInfo& info) {
-  return info.mask_ids_are_objects && config.segmentation != Segmentation::kDepth;
-}
-
-AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info) {
-  return config.associate.value_or(IdsAreObjects(config, info) ? AssociationMode::kGiven
-                                                               : AssociationMode::kVotes);
-}
-
-CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profile_name,
-                       const std::vector<ObjectInfo>& objects, const SceneTruth& truth)
-    : config(pipeline_config),
-      profile(std::move(profile_name)),
-      pipeline(config, objects),
-      last_seen(MakeLastSeenStores(truth)) {}
-
-std::string CompareRun::Title() const {
-  return fmt::format("{}, {}, {}{}{}", MethodName(config.method), profile,
-                     PoseSourceTitle(config.poses),
-                     config.segmentation == Segmentation::kDepth ? ", segments of depth" : "",
-                     config.associate == AssociationMode::kVotes ? ", ids by votes" : "");
-}
-
-std::string CompareRun::FolderName() const {
-  return RunFolderName(config.method, profile, config.poses);
-}
 
 bool IsEvaluated(const CompareResult& result, int frame) {
   return (frame - result.info.first_index + 1) % result.config.every == 0 ||

@@ -20,7 +20,7 @@ struct CompareConfig {
   std::vector<std::string> profiles{"paper", "close"};
   // Of our maps; adapters get the sequence's masks.
   Segmentation segmentation = Segmentation::kGiven;
-  DepthSegmentsConfig depth_segments{};  // of Segmentation::kDepth
+  SegmenterParts segmenter{};
   // Nothing: votes, unless the segments' ids are the truth's.
   std::optional<AssociationMode> associate;
   CameraSource camera = CameraSource::kGiven;

@@ -10,6 +10,8 @@
 #include "core/error.h"
 #include "core/types.h"
 #include "mapper/segment/depth_segments_config.h"
+#include "mapper/segment/instance_finder.h"
+#include "mapper/segment/network_config.h"
 
 namespace tsdfpp {
 
@@ -34,17 +36,33 @@ class Segmenter {
 enum class Segmentation {
   kGiven,  // Frame::mask
   kNone,   // Frame::mask is not read
-  kDepth,  // nor is it: convex parts of the depth image, whose ids are of one frame alone
+  // Nor is it by these, whose ids are of one frame alone:
+  kDepth,    // convex parts of the depth image
+  kNetwork,  // instances that a network finds
+  kFull,     // both, joined (paper III-B)
 };
 
-// "gt", "none" or "depth". Errors: kUsage.
+// "gt", "none", "depth", "network" or "full". Errors: kUsage.
 Expected<Segmentation> SegmentationFromName(std::string_view name);
 std::string_view SegmentationName(Segmentation segmentation);
 
+// Whether segments have new ids in every frame, so that they must be associated by votes.
+bool IdsAreOfOneFrame(Segmentation segmentation);
+// Whether it takes settings of depth, and a network.
+bool UsesDepth(Segmentation segmentation);
+bool UsesNetwork(Segmentation segmentation);
+
+// What a segmenter is told besides.
+struct SegmenterParts {
+  DepthSegmentsConfig depth{};               // of kDepth and kFull; must be valid
+  NetworkConfig network{};                   // of kNetwork and kFull; must be valid
+  std::shared_ptr<InstanceFinder> finder{};  // of these; not nullptr then
+};
+
 // `objects` are what the ids of the frames' masks stand for; none where those ids are of one frame
-// alone. `depth` is of kDepth and must be valid.
+// alone.
 std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
                                          const std::vector<ObjectInfo>& objects,
-                                         const DepthSegmentsConfig& depth);
+                                         const SegmenterParts& parts);
 
 }  // namespace tsdfpp

@@ -60,6 +60,15 @@ TEST_F(CompareSegmentation, IsOfTheSequenceUnlessItIsSaid) {
   EXPECT_EQ(Summary()["runs"][0]["segmentation"], "none");
 }
 
+// Pixels alone: our own network joined with depth (paper III-B).
+TEST_F(CompareSegmentation, OfANetworkAndDepthIsScoredToo) {
+  const CommandOutput run = Run({"--segmentation", "full"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json summary = Summary();
+  EXPECT_EQ(summary["runs"][0]["segmentation"], "full");
+  EXPECT_NE(summary["command"].get<std::string>().find("--segmentation full"), std::string::npos);
+}
+
 TEST_F(CompareSegmentation, RefusesWhatDoesNotGoTogether) {
   const auto refuses = [&](const std::vector<std::string>& options, const std::string& sentence) {
     const CommandOutput run = Run(options);
@@ -71,7 +80,7 @@ TEST_F(CompareSegmentation, RefusesWhatDoesNotGoTogether) {
           "the ids of --segmentation depth are drawn anew in every frame");
   refuses({"--segmentation", "depth", "--poses", "gt"}, "given poses are those of given ids");
   refuses({"--segmentation-config", Settings("")},
-          "--segmentation-config needs --segmentation depth");
+          "--segmentation-config needs --segmentation depth or full");
   refuses({"--segmentation", "depth", "--segmentation-config", Settings("sigmas = -1")}, "sigmas");
 }
 

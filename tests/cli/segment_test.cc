@@ -24,6 +24,8 @@ using test::CommandOutput;
 using test::kData;
 using test::kUsage;
 
+const std::string kNetwork = TSDFPP_SOURCE_DIR "/tests/data/networks/centres.onnx";
+
 class SegmentCommand : public testing::Test {
  protected:
   // A TUM set of 4 frames with masks.
@@ -76,6 +78,51 @@ TEST_F(SegmentCommand, DepthLeavesSegmentsPicturesAndNoOtherRunsFiles) {
             CV_8UC3);
 }
 
+// The network says "thing" where it is red; joined, surfaces of depth that are mostly red are one.
+TEST_F(SegmentCommand, ANetworkAloneAndJoined) {
+  const fs::path recording = Recording();
+  ASSERT_TRUE(WriteFile(folder_ / "network.toml", "width = 64\n").has_value());
+  for (const std::string way : {"network", "full"}) {
+    const CommandOutput run = Run({"--segmentation", way, "--model", kNetwork, "--network-config",
+                                   folder_ / "network.toml", "--score", "--json"},
+                                  recording);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.err.find("ERROR"), std::string::npos) << run.err;
+    EXPECT_EQ(nlohmann::json::parse(run.out).at("segmentation"), way);
+    const cv::Mat ids = cv::imread((folder_ / "out/000000.png").string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(ids.type(), CV_16UC1);
+  }
+}
+
+// What one run wrote is another's masks, under other ids.
+TEST_F(SegmentCommand, MasksOfAFolder) {
+  const fs::path recording = Recording();
+  ASSERT_EQ(Run({"--segmentation", "gt"}, recording).exit_code, 0);
+  fs::rename(folder_ / "out", folder_ / "masks");
+  const CommandOutput run = Run(
+      {"--segmentation", "network", "--masks", folder_ / "masks", "--score", "--json"}, recording);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(nlohmann::json::parse(run.out)["scores"]["all"]["pq"], 1.0);
+  const cv::Mat ids = cv::imread((folder_ / "out/000000.png").string(), cv::IMREAD_UNCHANGED);
+  const Frame frame = test::BoxSource(4).Read(0).value();
+  EXPECT_EQ(cv::countNonZero((ids == 1) != (frame.mask == 3)), 0);
+  EXPECT_EQ(cv::countNonZero((ids == 2) != (frame.mask == 8)), 0);
+}
+
+// Our own network, every second frame: between them there are no segments.
+TEST_F(SegmentCommand, OurOwnNetworkIsPartOfTheProgram) {
+  const fs::path recording = Recording();
+  ASSERT_TRUE(WriteFile(folder_ / "network.toml", "every = 2\n").has_value());
+  const CommandOutput run =
+      Run({"--segmentation", "network", "--network-config", folder_ / "network.toml"}, recording);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto image = [&](const char* name) {
+    return cv::imread((folder_ / "out" / name).string(), cv::IMREAD_UNCHANGED);
+  };
+  EXPECT_EQ(cv::countNonZero(image("000000.png") == kNoInstance), 0);
+  EXPECT_EQ(cv::countNonZero(image("000001.png") != kNoInstance), 0);
+}
+
 TEST_F(SegmentCommand, KernelsChangeNoByte) {
   const fs::path recording = Recording();
   std::map<std::string, std::vector<std::string>> images;
@@ -100,8 +147,19 @@ TEST_F(SegmentCommand, RefusesWithOneSentence) {
     EXPECT_FALSE(fs::exists(folder_ / "out/run.json"));
   };
   refused({"--segmentation", "gt", "--noise", "exact"}, kUsage,
-          "--noise goes with --segmentation depth only", recording);
+          "--noise goes with --segmentation depth or full only", recording);
   refused({"--noise", "kinect"}, kUsage, "expected one of nguyen2012, exact", recording);
+  refused({"--model", kNetwork}, kUsage, "--model needs --segmentation network or full", recording);
+  refused({"--masks", folder_.path()}, kUsage, "--masks needs --segmentation network or full",
+          recording);
+  refused({"--segmentation", "full", "--masks", recording / "rgb", "--model", kNetwork}, kUsage,
+          "--masks and --model are both given", recording);
+  refused({"--segmentation", "full", "--masks", folder_ / "no"}, kData, "no", recording);
+  refused({"--segmentation", "network", "--model", folder_ / "none.onnx"}, kData,
+          "none.onnx: there is no such file", recording);
+  ASSERT_TRUE(WriteFile(folder_ / "network.toml", "every = 0\n").has_value());
+  refused({"--segmentation", "full", "--network-config", folder_ / "network.toml"}, kUsage,
+          "'every' is 0, expected 1 to 1000", recording);
   ASSERT_TRUE(WriteFile(folder_ / "bad.toml", "sigmas = 0.0\n").has_value());
   refused({"--settings", folder_ / "bad.toml"}, kUsage, "'sigmas' is 0", recording);
   const fs::path unmasked = folder_ / "unmasked";

@@ -149,7 +149,8 @@ TEST_F(Unmasked, SegmentsOfDepthHaveNoGivenIds) {
   refuses({"--segmentation", "depth", "--poses", "gt"},
           "--poses gt are the poses of given ids, and --associate votes gives ids of its own");
   refuses({"--segmentation", "depth", "--method", "surfels"}, "which method 'surfels' has not");
-  refuses({"--segmentation-config", "x.toml"}, "--segmentation-config needs --segmentation depth");
+  refuses({"--segmentation-config", "x.toml"},
+          "--segmentation-config needs --segmentation depth or full");
   ASSERT_TRUE(WriteFile(folder_ / "segments.toml", "sigmas = -1\n").has_value());
   refuses({"--segmentation", "depth", "--segmentation-config", folder_ / "segments.toml"},
           "sigmas");

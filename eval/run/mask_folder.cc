@@ -1,0 +1,179 @@
+#include "eval/run/mask_folder.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "core/data_folder.h"
+#include "core/folders.h"
+#include "sequence/integer_images.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kClass = "thing";
+
+enum class MaskKind { kIds, kInstance, kInstanceInFolder };
+
+struct NamedMask {
+  MaskKind kind = MaskKind::kIds;
+  int frame = 0;
+  int instance = 0;
+  fs::path file;
+};
+
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+// The digits at the end of `text`, which are taken off it.
+std::optional<int> TakeNumber(std::string_view& text) {
+  std::size_t begin = text.size();
+  while (begin > 0 && IsDigit(text[begin - 1])) --begin;
+  int number = 0;
+  const auto [end, fault] = std::from_chars(text.data() + begin, text.data() + text.size(), number);
+  if (begin == text.size() || fault != std::errc()) return std::nullopt;
+  text.remove_suffix(text.size() - begin);
+  return number;
+}
+
+// What a name without ending says; nothing where it has no number at its end.
+std::optional<NamedMask> NameOf(std::string_view stem) {
+  const auto last = TakeNumber(stem);
+  if (!last) return std::nullopt;
+  if (!stem.ends_with('_')) return NamedMask{MaskKind::kIds, *last, 0, {}};
+  stem.remove_suffix(1);
+  const auto frame = TakeNumber(stem);
+  if (!frame) return NamedMask{MaskKind::kIds, *last, 0, {}};
+  return NamedMask{MaskKind::kInstance, *frame, *last, {}};
+}
+
+bool IsImage(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array kEndings{".png", ".pgm", ".tif", ".tiff", ".bmp"};
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
+// The images in a folder that is named after a frame; none where it is not.
+Expected<std::vector<NamedMask>> MasksIn(const fs::path& folder) {
+  std::vector<NamedMask> masks;
+  const std::string name = folder.filename().string();
+  std::string_view digits = name;
+  const auto frame = TakeNumber(digits);
+  if (!frame || !digits.empty()) return masks;
+  TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFolder(folder));
+  for (const fs::path& file : files) {
+    if (!IsImage(file)) continue;
+    masks.push_back({MaskKind::kInstanceInFolder, *frame, static_cast<int>(masks.size()), file});
+  }
+  return masks;
+}
+
+Expected<std::vector<NamedMask>> ListMasks(const fs::path& folder) {
+  std::vector<NamedMask> masks;
+  TSDFPP_ASSIGN(const std::vector<fs::path> entries, ListFolder(folder));
+  for (const fs::path& entry : entries) {
+    if (IsFolder(entry)) {
+      TSDFPP_ASSIGN(const std::vector<NamedMask> inside, MasksIn(entry));
+      masks.insert(masks.end(), inside.begin(), inside.end());
+      continue;
+    }
+    if (!IsImage(entry)) continue;
+    const std::string stem = entry.stem().string();
+    auto named = NameOf(stem);
+    if (!named) continue;
+    named->file = entry;
+    masks.push_back(std::move(*named));
+  }
+  return masks;
+}
+
+// The instance of the pixels that are not 0 in `is_there`; nothing where there are none.
+std::optional<Instance> InstanceOf(const cv::Mat& is_there) {
+  cv::Rect box;
+  for (int v = 0; v < is_there.rows; ++v) {
+    const auto* row = is_there.ptr<std::uint8_t>(v);
+    for (int u = 0; u < is_there.cols; ++u) {
+      if (row[u] != 0) box |= cv::Rect(u, v, 1, 1);
+    }
+  }
+  if (box.empty()) return std::nullopt;
+  const double share =
+      static_cast<double>(cv::countNonZero(is_there)) / static_cast<double>(is_there.total());
+  return Instance{box, is_there(box).clone(), kClass, static_cast<float>(1 - share)};
+}
+
+std::vector<Instance> InstancesOfIds(const cv::Mat& ids) {
+  std::map<InstanceId, cv::Rect> boxes;
+  for (int v = 0; v < ids.rows; ++v) {
+    const auto* row = ids.ptr<InstanceId>(v);
+    for (int u = 0; u < ids.cols; ++u) {
+      if (row[u] != kBackground && row[u] != kNoInstance) boxes[row[u]] |= cv::Rect(u, v, 1, 1);
+    }
+  }
+  std::vector<Instance> instances;
+  instances.reserve(boxes.size());
+  for (const auto& [id, box] : boxes) {
+    instances.push_back({box, ids(box) == static_cast<double>(id), kClass, 1});
+  }
+  return instances;
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<MaskFolder>> MaskFolder::Open(const fs::path& folder) {
+  TSDFPP_ASSIGN(std::vector<NamedMask> masks, ListMasks(folder));
+  if (masks.empty()) {
+    return DataError(
+        "{}: has no image that is named after a frame, expected masks such as 000012.png, "
+        "000012_000003.png or 12/3.png",
+        folder.string());
+  }
+  std::stable_sort(masks.begin(), masks.end(), [](const NamedMask& a, const NamedMask& b) {
+    return std::pair(a.frame, a.instance) < std::pair(b.frame, b.instance);
+  });
+  std::unique_ptr<MaskFolder> opened(new MaskFolder(folder));
+  opened->is_of_ids_ = masks.front().kind == MaskKind::kIds;
+  for (const NamedMask& mask : masks) {
+    if (mask.kind != masks.front().kind) {
+      return DataError("{}: {} and {} are masks of different kinds, expected one kind",
+                       folder.string(), masks.front().file.string(), mask.file.string());
+    }
+    std::vector<fs::path>& files = opened->files_[mask.frame];
+    if (opened->is_of_ids_ && !files.empty()) {
+      return DataError("{} and {} are both the ids of frame {}, expected one image",
+                       files.front().string(), mask.file.string(), mask.frame);
+    }
+    files.push_back(mask.file);
+  }
+  return opened;
+}
+
+Expected<std::vector<Instance>> MaskFolder::Find(const Frame& frame) {
+  const int first = files_.begin()->first;
+  const int last = files_.rbegin()->first;
+  if (frame.index < first || frame.index > last) {
+    return DataError("frame {}: {} has masks of frames {} to {}", frame.index, folder_.string(),
+                     first, last);
+  }
+  std::vector<Instance> instances;
+  const auto files = files_.find(frame.index);
+  if (files == files_.end()) return instances;
+  const DataFolder folder(folder_);
+  for (const fs::path& file : files->second) {
+    TSDFPP_RETURN_IF_ERROR(folder.CheckLinks(file));
+    const auto ids = ReadIds(file, frame.depth.size(), "the frame's depth");
+    if (!ids) return DataError("frame {}: {}", frame.index, ids.error().message);
+    if (is_of_ids_) return InstancesOfIds(*ids);
+    if (auto instance = InstanceOf(*ids != 0)) instances.push_back(std::move(*instance));
+  }
+  return instances;
+}
+
+}  // namespace tsdfpp

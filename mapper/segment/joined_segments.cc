@@ -1,0 +1,109 @@
+#include "mapper/segment/joined_segments.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+
+namespace tsdfpp {
+namespace {
+
+// Of a segment of depth: its pixels on each instance (by place in the list and 1; 0: on none).
+std::vector<std::vector<std::int64_t>> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted,
+                                                     std::size_t instances) {
+  std::vector<std::vector<std::int64_t>> overlaps;
+  for (int v = 0; v < depth.rows; ++v) {
+    const auto* segment = depth.ptr<InstanceId>(v);
+    const auto* instance = painted.ptr<std::uint16_t>(v);
+    for (int u = 0; u < depth.cols; ++u) {
+      if (segment[u] == kNoInstance) continue;
+      if (segment[u] >= overlaps.size()) overlaps.resize(segment[u] + std::size_t{1});
+      auto& counts = overlaps[segment[u]];
+      if (counts.empty()) counts.resize(instances + 1);
+      ++counts[instance[u]];
+    }
+  }
+  return overlaps;
+}
+
+// The instance (place and 1) of a segment with these counts; 0 where it has none.
+std::size_t InstanceOf(const std::vector<std::int64_t>& counts, double overlap) {
+  if (counts.size() < 2) return 0;
+  const auto most = std::max_element(counts.begin() + 1, counts.end());
+  const auto all = std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
+  if (static_cast<double>(*most) <= overlap * static_cast<double>(all)) return 0;
+  return static_cast<std::size_t>(most - counts.begin());
+}
+
+}  // namespace
+
+cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size) {
+  std::vector<std::size_t> order(instances.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  // The best is painted last.
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return instances[a].score != instances[b].score ? instances[a].score < instances[b].score
+                                                    : a > b;
+  });
+  cv::Mat painted(size, CV_16UC1, cv::Scalar(0));
+  for (const std::size_t i : order) {
+    painted(instances[i].box).setTo(static_cast<double>(i + 1), instances[i].mask);
+  }
+  return painted;
+}
+
+Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
+                      std::span<const Instance> instances, double overlap) {
+  const auto overlaps = CountOverlaps(depth, painted, instances.size());
+  std::vector<std::size_t> instance_of(overlaps.size(), 0);
+  std::vector<bool> is_found(instances.size() + 1, false);
+  for (std::size_t segment = kBackground + 1; segment < overlaps.size(); ++segment) {
+    instance_of[segment] = InstanceOf(overlaps[segment], overlap);
+    is_found[instance_of[segment]] = true;
+  }
+  Segments joined;
+  InstanceId next = kBackground + 1;
+  std::vector<InstanceId> id_of_instance(instances.size() + 1, kNoInstance);
+  for (std::size_t i = 1; i <= instances.size(); ++i) {
+    if (!is_found[i]) continue;
+    joined.classes[next] = instances[i - 1].semantic_class;
+    id_of_instance[i] = next++;
+  }
+  std::vector<InstanceId> id_of(overlaps.size(), kBackground);
+  for (std::size_t segment = kBackground + 1; segment < overlaps.size(); ++segment) {
+    if (overlaps[segment].empty()) continue;
+    id_of[segment] = instance_of[segment] == 0 ? next++ : id_of_instance[instance_of[segment]];
+  }
+  joined.ids = depth.clone();
+  for (int v = 0; v < joined.ids.rows; ++v) {
+    auto* id = joined.ids.ptr<InstanceId>(v);
+    for (int u = 0; u < joined.ids.cols; ++u) {
+      if (id[u] != kNoInstance) id[u] = id_of[id[u]];
+    }
+  }
+  return joined;
+}
+
+Expected<Segments> InstanceSegments::Segment(const Frame& frame) {
+  Segments segments;
+  if (frames_++ % config_.every != 0) {
+    segments.ids = cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(kNoInstance));
+    return segments;
+  }
+  TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
+  segments.ids = PaintInstances(instances, frame.depth.size());
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    segments.classes[static_cast<InstanceId>(i + 1)] = instances[i].semantic_class;
+  }
+  return segments;
+}
+
+Expected<Segments> JoinedSegments::Segment(const Frame& frame) {
+  TSDFPP_ASSIGN(Segments segments, depth_.Segment(frame));
+  if (frames_++ % config_.every != 0) return segments;
+  TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
+  const cv::Mat painted = PaintInstances(instances, frame.depth.size());
+  return JoinSegments(segments.ids, painted, instances, config_.join_overlap);
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,65 @@
+// Segments of a network's instances, alone or joined with those of depth (paper III-B).
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "mapper/segment/depth_segments.h"
+#include "mapper/segment/instance_finder.h"
+#include "mapper/segment/network_config.h"
+#include "mapper/segment/segmenter.h"
+
+namespace tsdfpp {
+
+// The place in `instances` of each pixel's instance and 1: that of the greatest score whose mask
+// has the pixel, of equal ones the first; 0 where there is none. CV_16UC1. At most kNoInstance - 1
+// instances, whose boxes lie within `size`.
+cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size);
+
+// Segments of `depth`, as DepthSegments gives them, that lie on one instance by more than
+// `overlap` of their pixels become one, which has that instance's class; the others stay as they
+// are, and so does the background (paper III-B, tau_overlap). A segment's pixels that are
+// `painted` (PaintInstances) as an instance's lie on it. Ids are numbered anew, those of instances
+// first, each in the order that it had.
+Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
+                      std::span<const Instance> instances, double overlap);
+
+// The instances as segments with ids from 1 on, in the finder's order; what belongs to none is
+// background.
+class InstanceSegments : public Segmenter {
+ public:
+  // The config must be valid.
+  InstanceSegments(std::shared_ptr<InstanceFinder> finder, const NetworkConfig& config)
+      : finder_(std::move(finder)), config_(config) {}
+
+  // With config.every above 1 the frames between have no segments: all of them is kNoInstance.
+  // Errors: the finder's.
+  Expected<Segments> Segment(const Frame& frame) override;
+
+ private:
+  std::shared_ptr<InstanceFinder> finder_;
+  NetworkConfig config_;
+  int frames_ = 0;
+};
+
+// Segments of depth and instances joined.
+class JoinedSegments : public Segmenter {
+ public:
+  // The configs must be valid.
+  JoinedSegments(std::shared_ptr<InstanceFinder> finder, const NetworkConfig& network,
+                 const DepthSegmentsConfig& depth)
+      : finder_(std::move(finder)), config_(network), depth_(depth) {}
+
+  // With config.every above 1 the frames between have those of depth. Errors: those of
+  // DepthSegments and of the finder.
+  Expected<Segments> Segment(const Frame& frame) override;
+
+ private:
+  std::shared_ptr<InstanceFinder> finder_;
+  NetworkConfig config_;
+  DepthSegments depth_;
+  int frames_ = 0;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,100 @@
+#include "mapper/segment/network_config.h"
+
+#include <cmath>
+#include <cstdlib>
+
+namespace tsdfpp {
+namespace {
+
+constexpr int kMostSide_px = 4096;
+constexpr std::size_t kMostClasses = 10'000;
+
+Expected<void> CheckNetwork(std::string_view field, double value, double lowest, double highest) {
+  if (std::isfinite(value) && value >= lowest && value <= highest) return {};
+  return UsageError("network setting '{}' is {}, expected {} to {}", field, value, lowest, highest);
+}
+
+}  // namespace
+
+Expected<NetworkFormat> NetworkFormatFromName(std::string_view name) {
+  if (name == "auto") return NetworkFormat::kAuto;
+  if (name == "centres") return NetworkFormat::kCentres;
+  if (name == "yolo") return NetworkFormat::kYolo;
+  if (name == "mask_rcnn") return NetworkFormat::kMaskRcnn;
+  return UsageError("network format '{}' is unknown, expected auto, centres, yolo or mask_rcnn",
+                    name);
+}
+
+std::string_view NetworkFormatName(NetworkFormat format) {
+  switch (format) {
+    case NetworkFormat::kAuto:
+      return "auto";
+    case NetworkFormat::kCentres:
+      return "centres";
+    case NetworkFormat::kYolo:
+      return "yolo";
+    case NetworkFormat::kMaskRcnn:
+      return "mask_rcnn";
+  }
+  std::abort();
+}
+
+Expected<void> NetworkConfig::Validate() const {
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("width", width, 0, kMostSide_px));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("height", height, 0, kMostSide_px));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("least_score", least_score, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("most_overlap", most_overlap, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_share", mask_share, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("every", every, 1, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_overlap", join_overlap, 0.5, 1));
+  if (classes.size() > kMostClasses) {
+    return UsageError("network setting 'classes' has {} names, expected {} at most", classes.size(),
+                      kMostClasses);
+  }
+  for (const std::string& name : classes) {
+    if (name.empty()) return UsageError("network setting 'classes' has an empty name");
+  }
+  return {};
+}
+
+Expected<NetworkConfig> NetworkConfig::FromToml(const toml::table& table,
+                                                const std::string& where) {
+  NetworkConfig config;
+  std::string format(NetworkFormatName(config.format));
+  TomlReader reader(table, where);
+  reader.Get("format", format)
+      .Get("classes", config.classes)
+      .Get("graph", config.graph)
+      .Get("width", config.width)
+      .Get("height", config.height)
+      .Get("least_score", config.least_score)
+      .Get("most_overlap", config.most_overlap)
+      .Get("mask_share", config.mask_share)
+      .Get("every", config.every)
+      .Get("join_overlap", config.join_overlap);
+  TSDFPP_RETURN_IF_ERROR(reader.Finish());
+  const Expected<NetworkFormat> named = NetworkFormatFromName(format);
+  if (!named) return UsageError("{}: {}", where, named.error().message);
+  config.format = *named;
+  if (auto valid = config.Validate(); !valid) {
+    return UsageError("{}: {}", where, valid.error().message);
+  }
+  return config;
+}
+
+toml::table NetworkConfig::ToToml() const {
+  toml::array names;
+  for (const std::string& name : classes) names.push_back(name);
+  return toml::table{{"format", NetworkFormatName(format)},
+                     {"classes", names},
+                     {"graph", graph},
+                     {"width", width},
+                     {"height", height},
+                     {"least_score", least_score},
+                     {"most_overlap", most_overlap},
+                     {"mask_share", mask_share},
+                     {"every", every},
+                     {"join_overlap", join_overlap}};
+}
+
+}  // namespace tsdfpp

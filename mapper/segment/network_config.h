@@ -1,0 +1,45 @@
+// The settings of networks that find instances (docs/segmentation.md, "Networks").
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "core/toml_reader.h"
+
+namespace tsdfpp {
+
+// What a network takes and gives.
+enum class NetworkFormat {
+  kAuto,      // by the file's ending and its outputs' names
+  kCentres,   // our own: colour and depth to things, their centres and the way there
+  kYolo,      // YOLO's heads for segments, v5 and v8: boxes, scores and weights of prototypes
+  kMaskRcnn,  // TensorFlow's Mask R-CNN as OpenCV reads it: detection_out_final, detection_masks
+};
+
+// "auto", "centres", "yolo" or "mask_rcnn". Errors: kUsage.
+Expected<NetworkFormat> NetworkFormatFromName(std::string_view name);
+std::string_view NetworkFormatName(NetworkFormat format);
+
+struct NetworkConfig {
+  NetworkFormat format = NetworkFormat::kAuto;
+  std::vector<std::string> classes{};  // names by number; none: those of COCO, or "thing"
+  std::string graph{};         // the .pbtxt of mask_rcnn; none: beside the network, with its name
+  int width = 0;               // of the input, pixels; 0: the format's own
+  int height = 0;              // 0: the format's own, or by the frame's shape
+  double least_score = 0;      // what is less sure is no instance; 0: the format's own
+  double most_overlap = 0.45;  // of two boxes of a class that share more the less sure one goes
+  double mask_share = 0.5;     // a pixel with less of a mask is not the instance's
+  int every = 1;               // the network sees every n-th frame
+  double join_overlap = 0.8;   // tau_overlap of paper III-B
+
+  // Errors: kUsage, naming the field, what was found and what was expected.
+  Expected<void> Validate() const;
+  // Reads one table strictly; `where` names the file in errors.
+  static Expected<NetworkConfig> FromToml(const toml::table& table, const std::string& where);
+  toml::table ToToml() const;
+  bool operator==(const NetworkConfig&) const = default;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,99 @@
+// Masks that others wrote, by the names that they give them.
+#include "eval/run/mask_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/core/temp_folder.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MaskFolderTest : public testing::Test {
+ protected:
+  // An image of 6x4 that is `value` in the box and 0 elsewhere.
+  void Write(const std::string& name, const cv::Rect& box, double value, int type = CV_8UC1,
+             cv::Size size = {6, 4}) {
+    cv::Mat image(size, type, cv::Scalar(0));
+    image(box).setTo(value);
+    fs::create_directories((folder_ / name).parent_path());
+    ASSERT_TRUE(cv::imwrite((folder_ / name).string(), image));
+  }
+  static Frame FrameNumber(int index) {
+    Frame frame;
+    frame.index = index;
+    frame.depth = cv::Mat(4, 6, CV_32FC1, cv::Scalar(1));
+    return frame;
+  }
+  std::vector<Instance> Find(int index) {
+    return MaskFolder::Open(folder_.path()).value()->Find(FrameNumber(index)).value();
+  }
+  std::string OpenError() {
+    const auto opened = MaskFolder::Open(folder_.path());
+    return opened ? "" : opened.error().message;
+  }
+  test::TempFolder folder_;
+};
+
+// Co-Fusion's names, and ids of 16 bits.
+TEST_F(MaskFolderTest, ImagesOfIds) {
+  cv::Mat ids(4, 6, CV_16UC1, cv::Scalar(0));
+  ids(cv::Rect(0, 0, 2, 2)).setTo(300);
+  ids(cv::Rect(3, 1, 3, 3)).setTo(7);
+  ids.at<std::uint16_t>(3, 0) = kNoInstance;
+  ASSERT_TRUE(cv::imwrite((folder_ / "Mask0012.png").string(), ids));
+  Write("Mask0014.png", {1, 1, 2, 1}, 5);
+  const auto found = Find(12);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].box, cv::Rect(3, 1, 3, 3));
+  EXPECT_EQ(found[1].box, cv::Rect(0, 0, 2, 2));
+  EXPECT_EQ(cv::countNonZero(found[1].mask), 4);
+  EXPECT_EQ(found[1].semantic_class, "thing");
+  EXPECT_EQ(Find(14).at(0).box, cv::Rect(1, 1, 2, 1));
+  // Nothing was found in the frame between.
+  EXPECT_TRUE(Find(13).empty());
+}
+
+TEST_F(MaskFolderTest, InstancesByNumberAsBopHasThem) {
+  Write("000003_000001.png", {0, 0, 6, 4}, 255);
+  Write("000003_000000.png", {1, 1, 2, 2}, 255);
+  Write("000004_000000.png", {0, 0, 0, 0}, 255);
+  const auto found = Find(3);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].box, cv::Rect(1, 1, 2, 2));
+  EXPECT_GT(found[0].score, found[1].score) << "what is smaller is on top";
+  EXPECT_TRUE(Find(4).empty()) << "a mask of nothing is no instance";
+}
+
+TEST_F(MaskFolderTest, FoldersNamedAfterFramesAsSegmentAnythingLeavesThem) {
+  Write("12/0.png", {0, 0, 2, 2}, 255);
+  Write("12/1.png", {2, 2, 2, 2}, 255);
+  Write("notes/3.png", {2, 2, 2, 2}, 255);
+  EXPECT_EQ(Find(12).size(), 2U);
+}
+
+TEST_F(MaskFolderTest, RefusesWithOneSentence) {
+  EXPECT_NE(OpenError().find("has no image that is named after a frame"), std::string::npos);
+  Write("mask.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("has no image that is named after a frame"), std::string::npos);
+  Write("a5.png", {0, 0, 1, 1}, 1);
+  const auto finder = MaskFolder::Open(folder_.path()).value();
+  EXPECT_NE(finder->Find(FrameNumber(6)).error().message.find("frame 6: "), std::string::npos);
+  Write("b5.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("are both the ids of frame 5"), std::string::npos);
+  fs::remove(folder_ / "b5.png");
+  Write("5_1.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("masks of different kinds"), std::string::npos);
+  fs::remove(folder_ / "5_1.png");
+  Write("a5.png", {0, 0, 1, 1}, 1, CV_8UC1, {7, 4});
+  const std::string words =
+      MaskFolder::Open(folder_.path()).value()->Find(FrameNumber(5)).error().message;
+  EXPECT_NE(words.find("frame 5: "), std::string::npos) << words;
+  EXPECT_NE(words.find("7x4"), std::string::npos) << words;
+}
+
+}  // namespace
+}  // namespace tsdfpp
