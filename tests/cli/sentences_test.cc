@@ -140,7 +140,7 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
       {{"map", scene, "--out", "@/o", "--trunc-back", "inf"},
        "--trunc-back: found inf, expected a number above 0" + see("map")},
       {{"map", scene, "--out", "@/o", "--segmentation", "net"},
-       "--segmentation: found 'net', expected one of gt, none, depth" + see("map")},
+       "--segmentation: found 'net', expected one of gt, none, depth, network, full" + see("map")},
       {{"compare", scene, "--out", ""}, "--out: found nothing, expected a folder" + see("compare")},
       {{"compare", scene, "--out", "@/o", "--until", "soon"},
        "--until is 'soon', expected reveal, end or a frame's number"},
