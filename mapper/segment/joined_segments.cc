@@ -47,7 +47,8 @@ cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size) {
   });
   cv::Mat painted(size, CV_16UC1, cv::Scalar(0));
   for (const std::size_t i : order) {
-    painted(instances[i].box).setTo(static_cast<double>(i + 1), instances[i].mask);
+    const auto& [box, mask, semantic_class, score] = instances[i];
+    painted(box).setTo(static_cast<double>(i + 1), mask);
   }
   return painted;
 }
