@@ -165,6 +165,10 @@ Expected<std::vector<Instance>> MaskFolder::Find(const Frame& frame) {
   std::vector<Instance> instances;
   const auto files = files_.find(frame.index);
   if (files == files_.end()) return instances;
+  if (files->second.size() >= kNoInstance) {
+    return DataError("frame {}: {} has {} masks of it, expected {} at most", frame.index,
+                     folder_.string(), files->second.size(), kNoInstance - 1);
+  }
   const DataFolder folder(folder_);
   for (const fs::path& file : files->second) {
     TSDFPP_RETURN_IF_ERROR(folder.CheckLinks(file));

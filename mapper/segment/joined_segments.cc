@@ -3,36 +3,39 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <numeric>
 
 namespace tsdfpp {
 namespace {
 
-// Of a segment of depth: its pixels on each instance (by place in the list and 1; 0: on none).
-std::vector<std::vector<std::int64_t>> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted,
-                                                     std::size_t instances) {
-  std::vector<std::vector<std::int64_t>> overlaps;
+// A segment's pixels on each instance (by place in the list and 1; 0: on none), where there are
+// any.
+using Overlaps = std::map<std::size_t, std::int64_t>;
+
+// By segment of depth.
+std::vector<Overlaps> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted) {
+  std::vector<Overlaps> overlaps;
   for (int v = 0; v < depth.rows; ++v) {
     const auto* segment = depth.ptr<InstanceId>(v);
     const auto* instance = painted.ptr<std::uint16_t>(v);
     for (int u = 0; u < depth.cols; ++u) {
       if (segment[u] == kNoInstance) continue;
       if (segment[u] >= overlaps.size()) overlaps.resize(segment[u] + std::size_t{1});
-      auto& counts = overlaps[segment[u]];
-      if (counts.empty()) counts.resize(instances + 1);
-      ++counts[instance[u]];
+      ++overlaps[segment[u]][instance[u]];
     }
   }
   return overlaps;
 }
 
-// The instance (place and 1) of a segment with these counts; 0 where it has none.
-std::size_t InstanceOf(const std::vector<std::int64_t>& counts, double overlap) {
-  if (counts.size() < 2) return 0;
-  const auto most = std::max_element(counts.begin() + 1, counts.end());
-  const auto all = std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
-  if (static_cast<double>(*most) <= overlap * static_cast<double>(all)) return 0;
-  return static_cast<std::size_t>(most - counts.begin());
+// The instance (place and 1) that has more than `overlap` of a segment; 0 where none has.
+std::size_t InstanceOf(const Overlaps& overlaps, double overlap) {
+  std::int64_t all = 0;
+  for (const auto& [instance, count] : overlaps) all += count;
+  for (const auto& [instance, count] : overlaps) {
+    if (static_cast<double>(count) > overlap * static_cast<double>(all)) return instance;
+  }
+  return 0;
 }
 
 }  // namespace
@@ -55,7 +58,7 @@ cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size) {
 
 Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
                       std::span<const Instance> instances, double overlap) {
-  const auto overlaps = CountOverlaps(depth, painted, instances.size());
+  const auto overlaps = CountOverlaps(depth, painted);
   std::vector<std::size_t> instance_of(overlaps.size(), 0);
   std::vector<bool> is_found(instances.size() + 1, false);
   for (std::size_t segment = kBackground + 1; segment < overlaps.size(); ++segment) {
