@@ -72,7 +72,7 @@ class SegmentWriter {
     TSDFPP_ASSIGN(const Frame frame, source_.Read(index));
     const auto start = std::chrono::steady_clock::now();
     TSDFPP_ASSIGN(const Segments segments, segmenter.Segment(frame));
-    const cv::Mat& ids = segments.ids;
+    const cv::Mat ids = segments.IdsOfObjects();
     seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (ids.empty()) {
       return DataError(

@@ -79,7 +79,9 @@ std::vector<Candidates::Pair> Candidates::PairsOf(std::size_t segment,
   return pairs;
 }
 
-std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W) {
+std::vector<Candidates::Candidacy> Candidates::Confirm(
+    const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
+    const std::vector<bool>& may_begin) {
   ++frame_;
   std::vector<CellOfCandidate> index;
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
@@ -103,7 +105,7 @@ std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vecto
     is_taken[pair.candidate] = true;
   }
 
-  std::vector<bool> is_confirmed(segments_W.size());
+  std::vector<Candidacy> candidacies(segments_W.size(), Candidacy::kNone);
   std::vector<Candidate> left;
   std::size_t room = kMostCandidates - std::min(kMostCandidates, candidates_.size());
   for (std::size_t s = 0; s < segments_W.size(); ++s) {
@@ -111,15 +113,18 @@ std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vecto
     Candidate candidate;
     if (candidate_of[s]) {
       candidate = std::move(candidates_[*candidate_of[s]]);
-    } else if (room > 0) {
-      --room;
-    } else {
+    } else if (!may_begin[s] || room == 0) {
       continue;
+    } else {
+      --room;
     }
     candidate.seen.push_back(frame_);
     while (candidate.seen.front() <= frame_ - config_.confirm_window) candidate.seen.pop_front();
-    is_confirmed[s] = static_cast<int>(candidate.seen.size()) >= config_.confirm_frames;
-    if (is_confirmed[s]) continue;
+    if (static_cast<int>(candidate.seen.size()) >= config_.confirm_frames) {
+      candidacies[s] = Candidacy::kIsConfirmed;
+      continue;
+    }
+    candidacies[s] = Candidacy::kWaits;
     candidate.cells = CellsOf(segments_W[s]);
     left.push_back(std::move(candidate));
   }
@@ -129,7 +134,7 @@ std::vector<bool> Candidates::Confirm(const std::vector<std::vector<Eigen::Vecto
     left.push_back(std::move(candidates_[c]));
   }
   candidates_ = std::move(left);
-  return is_confirmed;
+  return candidacies;
 }
 
 }  // namespace tsdfpp

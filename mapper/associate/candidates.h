@@ -23,14 +23,23 @@ class Candidates {
   // The config must be valid.
   Candidates(const VoteConfig& config, double voxel_m);
 
+  // What a segment is.
+  enum class Candidacy {
+    kNone,         // too small, or it may begin none and is none
+    kWaits,        // a candidate
+    kIsConfirmed,  // it was one, and is an object from now on
+  };
+
   // Takes in the unclaimed segments of the next frame, each the points that it shows in the world's
-  // frame. Says for each whether it is confirmed: it and its candidate were there, with min_points
-  // or more, in confirm_frames of the last confirm_window frames. Who is confirmed is a candidate
-  // no longer, and who cannot be any more is forgotten. A candidate is one segment of a frame at
-  // most: pairs with the greatest overlap (that share times the share of the candidate's cells that
-  // are near the segment's) are made first, and of a segment's only the kMostPairs greatest are
-  // looked at. While there are kMostCandidates, no segment becomes a further one.
-  std::vector<bool> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W);
+  // frame, and whether it may begin a candidate; the others can but be one that there is. Says what
+  // each is. It is confirmed where it and its candidate were there, with min_points or more, in
+  // confirm_frames of the last confirm_window frames. Who is confirmed is a candidate no longer,
+  // and who cannot be any more is forgotten. A candidate is one segment of a frame at most: pairs
+  // with the greatest overlap (that share times the share of the candidate's cells that are near
+  // the segment's) are made first, and of a segment's only the kMostPairs greatest are looked at.
+  // While there are kMostCandidates, no segment becomes a further one.
+  std::vector<Candidacy> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
+                                 const std::vector<bool>& may_begin);
 
   std::size_t size() const { return candidates_.size(); }
 

@@ -31,8 +31,10 @@ VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id) : config_(
   state_.next_id = first_id;
 }
 
-std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame, const cv::Mat& ids,
+std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
+                                                          const Segments& segments,
                                                           double voxel_m) const {
+  const cv::Mat& ids = segments.ids;
   std::vector<std::vector<int>> pixels(kIds);
   std::vector<bool> is_there(kIds);
   for (int v = 0; v < ids.rows; ++v) {
@@ -44,11 +46,13 @@ std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame, co
       if (IsValidDepth(depth[u])) pixels[row[u]].push_back(v * ids.cols + u);
     }
   }
-  std::vector<Segment> segments;
+  std::vector<Segment> found;
   for (std::size_t id = 0; id < kIds; ++id) {
     if (!is_there[id]) continue;
     Segment segment;
     segment.id = static_cast<InstanceId>(id);
+    segment.is_known =
+        !std::binary_search(segments.unknown.begin(), segments.unknown.end(), segment.id);
     segment.pixels = std::move(pixels[id]);
     const std::size_t all = segment.pixels.size();
     const std::size_t count = std::min(all, static_cast<std::size_t>(config_.max_points));
@@ -58,9 +62,9 @@ std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame, co
       if (!(p_W.cwiseAbs().maxCoeff() < kFarthest_voxels * voxel_m)) continue;
       segment.points_W.push_back(p_W);
     }
-    segments.push_back(std::move(segment));
+    found.push_back(std::move(segment));
   }
-  return segments;
+  return found;
 }
 
 void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const {
@@ -156,15 +160,19 @@ void VoxelVotes::FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segm
 void VoxelVotes::GiveBirth(std::vector<Segment>& segments, double voxel_m) {
   std::vector<Segment*> unclaimed;
   std::vector<std::vector<Eigen::Vector3d>> points_W;
+  std::vector<bool> is_known;
   for (Segment& segment : segments) {
     if (segment.object || segment.points_W.empty()) continue;
     unclaimed.push_back(&segment);
     points_W.push_back(segment.points_W);
+    is_known.push_back(segment.is_known);
   }
   if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
-  const std::vector<bool> is_confirmed = next_.candidates->Confirm(points_W);
+  using enum Candidates::Candidacy;
+  const auto candidacies = next_.candidates->Confirm(points_W, is_known);
   for (std::size_t i = 0; i < unclaimed.size(); ++i) {
-    if (!is_confirmed[i]) continue;
+    if (candidacies[i] == kNone && !is_known[i]) unclaimed[i]->label = kBackground;
+    if (candidacies[i] != kIsConfirmed) continue;
     if (next_.next_id >= kNoInstance) {
       next_.refused_birth = true;
       continue;
@@ -201,7 +209,7 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   ++next_.frame;
   const ObjectLookup lookup(map);
   if (!lookup.ids().empty()) next_.next_id = std::max(next_.next_id, lookup.ids().back() + 1);
-  std::vector<Segment> found = FindSegments(frame, segments.ids, map.config().voxel_m);
+  std::vector<Segment> found = FindSegments(frame, segments, map.config().voxel_m);
   Claim(lookup, found);
   ClaimMoved(lookup, found);
   FindCuts(lookup, found);
@@ -213,7 +221,7 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   for (Segment& segment : found) {
     if (segment.object) segment.label = lookup.ids()[*segment.object];
     label_of[segment.id] = segment.label;
-    if (segment.label == kNoInstance) continue;
+    if (segment.label == kNoInstance || segment.label == kBackground) continue;
     next_.last_seen[segment.label] = next_.frame;
     const auto named = segments.classes.find(segment.id);
     if (named != segments.classes.end()) {

@@ -36,6 +36,8 @@ class VoxelVotes : public Associator {
   //     segment enters the map) until Candidates confirm it, and then a new object. Ids count up
   //     and are never used again; after the last one, kNoInstance - 1, nothing is born any more,
   //     and Remarks() says so.
+  //     Segments that are unknown (Segments::unknown) may become the candidate that a known one was
+  //     before, but begin none: else they are background.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
@@ -55,6 +57,7 @@ class VoxelVotes : public Associator {
   // A segment of the frame, and what becomes of it.
   struct Segment {
     InstanceId id = kNoInstance;            // in the frame's segments
+    bool is_known = true;                   // not one of Segments::unknown
     std::vector<int> pixels;                // with valid depth, by rows
     std::vector<Eigen::Vector3d> points_W;  // of them, thinned
     std::vector<Votes> votes;               // of objects that got any, by ObjectLookup::ids()
@@ -63,7 +66,8 @@ class VoxelVotes : public Associator {
     InstanceId label = kNoInstance;
   };
 
-  std::vector<Segment> FindSegments(const Frame& frame, const cv::Mat& ids, double voxel_m) const;
+  std::vector<Segment> FindSegments(const Frame& frame, const Segments& segments,
+                                    double voxel_m) const;
   void CountVotes(const ObjectLookup& lookup, Segment& segment) const;
   void Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   void ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const;

@@ -17,13 +17,19 @@ namespace tsdfpp {
 // instances, whose boxes lie within `size`.
 cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size);
 
-// Segments of `depth`, as DepthSegments gives them, that lie on one instance by more than
-// `overlap` of their pixels become one, which has that instance's class; the others stay as they
-// are, and so does the background (paper III-B, tau_overlap). A segment's pixels that are
-// `painted` (PaintInstances) as an instance's lie on it. Ids are numbered anew, those of instances
-// first, each in the order that it had.
+// A segment of `depth` (as DepthSegments gives them) becomes an instance's, and gets its class:
+//  - where more than join_overlap of its pixels lie on the instance (paper III-B, tau_overlap), so
+//    that a thing in parts becomes one;
+//  - or where the two have more than join_iou in common, pixels of both by pixels of either: then
+//    they are the same thing, whatever the mask lacks.
+// A segment's pixels that are `painted` (PaintInstances) as an instance's lie on it. Pixels of such
+// an instance that belong to no segment (kNoInstance) become its, too. An instance of at least
+// mask_score of which such segments hold less than half, as no segment lies on what is flat or
+// thin, has all its pixels but those that became another's. Segments that became no instance's are
+// unknown, or objects of their own with unknown_objects. Ids are numbered anew, those of
+// instances first, each in the order that it had.
 Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
-                      std::span<const Instance> instances, double overlap);
+                      std::span<const Instance> instances, const NetworkConfig& config);
 
 // The instances as segments with ids from 1 on, in the finder's order; what belongs to none is
 // background.
@@ -51,8 +57,8 @@ class JoinedSegments : public Segmenter {
                  const DepthSegmentsConfig& depth)
       : finder_(std::move(finder)), config_(network), depth_(depth) {}
 
-  // With config.every above 1 the frames between have those of depth. Errors: those of
-  // DepthSegments and of the finder.
+  // With config.every above 1 the frames between have those of depth, as if there were no instance.
+  // Errors: those of DepthSegments and of the finder.
   Expected<Segments> Segment(const Frame& frame) override;
 
  private:

@@ -47,6 +47,8 @@ Expected<void> NetworkConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_share", mask_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("every", every, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_overlap", join_overlap, 0.5, 1));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_iou", join_iou, 0.5, 1));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_score", mask_score, 0, 1));
   if (classes.size() > kMostClasses) {
     return UsageError("network setting 'classes' has {} names, expected {} at most", classes.size(),
                       kMostClasses);
@@ -71,7 +73,10 @@ Expected<NetworkConfig> NetworkConfig::FromToml(const toml::table& table,
       .Get("most_overlap", config.most_overlap)
       .Get("mask_share", config.mask_share)
       .Get("every", config.every)
-      .Get("join_overlap", config.join_overlap);
+      .Get("join_overlap", config.join_overlap)
+      .Get("join_iou", config.join_iou)
+      .Get("mask_score", config.mask_score)
+      .Get("unknown_objects", config.unknown_objects);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   const Expected<NetworkFormat> named = NetworkFormatFromName(format);
   if (!named) return UsageError("{}: {}", where, named.error().message);
@@ -94,7 +99,10 @@ toml::table NetworkConfig::ToToml() const {
                      {"most_overlap", most_overlap},
                      {"mask_share", mask_share},
                      {"every", every},
-                     {"join_overlap", join_overlap}};
+                     {"join_overlap", join_overlap},
+                     {"join_iou", join_iou},
+                     {"mask_score", mask_score},
+                     {"unknown_objects", unknown_objects}};
 }
 
 }  // namespace tsdfpp

@@ -1,6 +1,8 @@
 #include "mapper/segment/segmenter.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "mapper/segment/depth_segments.h"
 #include "mapper/segment/given_masks.h"
@@ -8,6 +10,17 @@
 #include "mapper/segment/no_masks.h"
 
 namespace tsdfpp {
+
+cv::Mat Segments::IdsOfObjects() const {
+  if (unknown.empty()) return ids;
+  std::vector<InstanceId> id_of(std::size_t{kNoInstance} + 1);
+  std::iota(id_of.begin(), id_of.end(), InstanceId{0});
+  for (const InstanceId id : unknown) id_of[id] = kBackground;
+  cv::Mat of_objects(ids.size(), CV_16UC1);
+  std::transform(ids.begin<InstanceId>(), ids.end<InstanceId>(), of_objects.begin<InstanceId>(),
+                 [&](InstanceId id) { return id_of[id]; });
+  return of_objects;
+}
 
 Expected<Segmentation> SegmentationFromName(std::string_view name) {
   if (name == "gt") return Segmentation::kGiven;

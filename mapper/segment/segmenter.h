@@ -23,6 +23,12 @@ struct Segments {
   // The semantic class of those segments of which it is known, never an empty one; perhaps of
   // segments that the frame lacks, too.
   std::map<InstanceId, std::string> classes{};
+  // Segments, in ascending order, that make no object, since a network knows none there: they
+  // belong to one that the map has, or are background.
+  std::vector<InstanceId> unknown{};
+
+  // The ids with the background in the place of those that are unknown; may be `ids` itself.
+  cv::Mat IdsOfObjects() const;
 };
 
 class Segmenter {

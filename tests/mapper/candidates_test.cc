@@ -15,6 +15,7 @@ namespace tsdfpp {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
+using Candidacy = Candidates::Candidacy;
 constexpr double kVoxel_m = 0.01;
 
 // candidates.h's rules, with the points themselves in place of an index of cells.
@@ -22,7 +23,8 @@ class PlainCandidates {
  public:
   explicit PlainCandidates(const VoteConfig& config) : config_(config) {}
 
-  std::vector<bool> Confirm(const std::vector<Points>& segments_W) {
+  std::vector<Candidacy> Confirm(const std::vector<Points>& segments_W,
+                                 const std::vector<bool>& may_begin) {
     ++frame_;
     struct Pair {
       double overlap;
@@ -48,17 +50,19 @@ class PlainCandidates {
       candidate_of[pair.segment] = pair.candidate;
       taken.insert(pair.candidate);
     }
-    std::vector<bool> is_confirmed(segments_W.size());
+    std::vector<Candidacy> candidacies(segments_W.size(), Candidacy::kNone);
     std::vector<Candidate> left;
     for (std::size_t s = 0; s < segments_W.size(); ++s) {
       if (!IsLarge(segments_W[s])) continue;
+      if (!candidate_of.contains(s) && !may_begin[s]) continue;
       Candidate candidate;
       if (candidate_of.contains(s)) candidate = candidates_[candidate_of[s]];
       candidate.seen.push_back(frame_);
       candidate.points_W = segments_W[s];
-      is_confirmed[s] =
+      const bool is_confirmed =
           SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames;
-      if (!is_confirmed[s]) left.push_back(candidate);
+      candidacies[s] = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
+      if (!is_confirmed) left.push_back(candidate);
     }
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (taken.contains(c)) continue;
@@ -67,7 +71,7 @@ class PlainCandidates {
       }
     }
     candidates_ = left;
-    return is_confirmed;
+    return candidacies;
   }
 
   std::size_t size() const { return candidates_.size(); }
@@ -137,14 +141,16 @@ TEST(Candidates, AreThoseOfPlainPairs) {
     PlainCandidates plain(config);
     for (int frame = 0; frame < 12; ++frame) {
       std::vector<Points> segments_W;
+      std::vector<bool> may_begin;
       const int count = static_cast<int>(clouds.Between(0, 10));
       for (int s = 0; s < count; ++s) {
         const Eigen::Vector3d centre_W(clouds.Between(0, 0.2), clouds.Between(0, 0.2), 1);
         segments_W.push_back(clouds.Around(centre_W, clouds.Between(0.01, 0.1),
                                            static_cast<int>(clouds.Between(3, 30))));
+        may_begin.push_back(clouds.Between(0, 1) < 0.6);
       }
       SCOPED_TRACE(testing::Message() << "trial " << trial << ", frame " << frame);
-      ASSERT_EQ(candidates.Confirm(segments_W), plain.Confirm(segments_W));
+      ASSERT_EQ(candidates.Confirm(segments_W, may_begin), plain.Confirm(segments_W, may_begin));
       ASSERT_EQ(candidates.size(), plain.size());
     }
   }
@@ -165,11 +171,12 @@ TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
   int frames = 0;
   while (!segments_W.empty() && frames < 100) {
     ++frames;
-    const std::vector<bool> is_confirmed = candidates.Confirm(segments_W);
+    const auto candidacies =
+        candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true));
     ASSERT_LE(candidates.size(), Candidates::kMostCandidates);
     std::vector<Points> rest;
     for (std::size_t s = 0; s < segments_W.size(); ++s) {
-      if (is_confirmed[s])
+      if (candidacies[s] == Candidacy::kIsConfirmed)
         ++confirmed;
       else
         rest.push_back(segments_W[s]);
@@ -187,7 +194,10 @@ TEST(Candidates, VeryManySegmentsAtOnePlaceAreBounded) {
   Candidates candidates(config, kVoxel_m);
   std::vector<Points> segments_W(6000, clouds.Around({0, 0, 1}, 0.02, 50));
   for (int frame = 1; frame < config.confirm_frames; ++frame) {
-    for (const bool is_confirmed : candidates.Confirm(segments_W)) ASSERT_FALSE(is_confirmed);
+    for (const Candidacy candidacy :
+         candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true))) {
+      ASSERT_NE(candidacy, Candidacy::kIsConfirmed);
+    }
     EXPECT_EQ(candidates.size(), Candidates::kMostCandidates);
   }
 }

@@ -61,7 +61,7 @@ class VoteWorld {
     map_->Fuse(frame, labels);
     return labels;
   }
-  cv::Mat Map(const Frame& frame) { return Map(frame, {ids_.Of(frame.mask), {}}); }
+  cv::Mat Map(const Frame& frame) { return Map(frame, {ids_.Of(frame.mask), {}, {}}); }
 
   const MapRepresentation& map() const { return *map_; }
   VoxelVotes& votes() { return votes_; }

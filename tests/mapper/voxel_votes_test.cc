@@ -246,6 +246,40 @@ TEST(VoxelVotes, HoldsBackWhatIsSmallOrShortLived) {
   EXPECT_TRUE(MapToBytes(world.map()).value() == MapToBytes(without.map()).value());
 }
 
+// Of what no network knows: it joins the map's objects, and otherwise is background.
+TEST(VoxelVotes, UnknownSegmentsMakeNoObject) {
+  const cv::Rect kTable(2, 58, 12, 8);
+  ToyVotes world;
+  ToyVotes without;
+  for (int i = 0; i < 12; ++i) {
+    const Frame frame = RenderToys(TableWithToys(), 0.3 + 0.05 * i, i);
+    // Known ones at first, unknown ones later; beside them one of the table's, never known.
+    cv::Mat segments = frame.mask.clone();
+    segments(kTable) = 77;
+    std::vector<InstanceId> unknown{77};
+    if (i >= 6) unknown = {1, 2, 3, 77};
+    const cv::Mat labels = world.Map(frame, {segments, {}, unknown});
+    EXPECT_EQ(CountOf(labels(kTable), kBackground), kTable.area()) << i;
+    without.Map(frame, {frame.mask, {}});
+  }
+  EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
+  EXPECT_TRUE(MapToBytes(world.map()).value() == MapToBytes(without.map()).value());
+}
+
+// A network that looks at every second frame: what waits to be an object is not fused between.
+TEST(VoxelVotes, AnUnknownSegmentOfACandidateWaitsWithIt) {
+  ToyVotes world;
+  for (int i = 0; i < kConfirmed; ++i) {
+    const Frame frame = RenderToys(TableWithToys(), 0.3, i);
+    const std::vector<InstanceId> all{1, 2, 3};
+    const cv::Mat labels =
+        world.Map(frame, {frame.mask, {}, i % 2 == 0 ? std::vector<InstanceId>{} : all});
+    const bool is_born = i + 1 == kConfirmed;
+    EXPECT_EQ(CountOf(labels, kNoInstance), is_born ? 0 : cv::countNonZero(frame.mask)) << i;
+  }
+  EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
+}
+
 // Nothing that a mask may hold stops it or enters the map.
 TEST(VoxelVotes, TakesWhatIsHardlyThere) {
   const std::vector<std::pair<std::string, std::function<void(Frame&, cv::Mat&)>>> cases{
