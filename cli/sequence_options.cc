@@ -4,10 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <limits>
 
 #include "cli/command.h"
 #include "core/data_folder.h"
-#include "eval/run/open_source.h"
 #include "sequence/calibration.h"
 
 namespace tsdfpp {
@@ -34,6 +34,13 @@ CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
                "Take a camera without poses on disk as one that does not move");
   app.add_flag("--unchecked", arguments.unchecked,
                "Do not look for wrong units and inverted poses");
+  app.add_option("--sensor", arguments.scene.sensor,
+                 "Of a scene: a ready-made sensor in place of its own, or several joined by '+' "
+                 "(docs/sensors.md)")
+      ->check(NotEmpty("the name of a sensor"));
+  app.add_option("--seed", arguments.scene.seed,
+                 "Of a scene: replaces its seed, of random scenes, jitter, sensor")
+      ->check(WholeBetween(0, std::numeric_limits<std::int64_t>::max()));
   AddFollowLinks(app);
   return path;
 }
@@ -45,6 +52,8 @@ std::string TextOf(const SequenceArguments& arguments) {
   if (arguments.depth_units > 0) text += fmt::format(" --depth-units {}", arguments.depth_units);
   if (arguments.fixed_camera) text += " --fixed-camera";
   if (arguments.unchecked) text += " --unchecked";
+  if (!arguments.scene.sensor.empty()) text += " --sensor " + arguments.scene.sensor;
+  if (arguments.scene.seed) text += fmt::format(" --seed {}", *arguments.scene.seed);
   if (CurrentLinkPolicy() == LinkPolicy::kAnywhere) text += " --follow-links";
   return text;
 }
@@ -65,7 +74,7 @@ Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& ar
   options.fixed_camera = arguments.fixed_camera;
   options.check = !arguments.unchecked;
   SequenceNotes notes;
-  TSDFPP_ASSIGN(auto source, OpenSource(arguments.path, options, &notes));
+  TSDFPP_ASSIGN(auto source, OpenSource(arguments.path, options, &notes, arguments.scene));
   for (const std::string& note : notes) spdlog::info(note);
   return source;
 }

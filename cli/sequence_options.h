@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/frame_source.h"
+#include "eval/run/open_source.h"
 #include "sequence/background_masks.h"
 
 namespace tsdfpp {
@@ -18,6 +19,7 @@ struct SequenceArguments {
   double depth_units = 0;   // --depth-units
   bool fixed_camera = false;
   bool unchecked = false;
+  SceneOptions scene;  // --sensor, --seed
 };
 
 // Adds the positional argument `name` and the options; returns the argument, which is required.

@@ -4,13 +4,15 @@
 #include <iterator>
 
 #include "sequence/open_sequence.h"
+#include "sim/config/sensor_config.h"
+#include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 
 namespace tsdfpp {
 
 Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& scene_or_sequence,
                                                   const SequenceOptions& options,
-                                                  SequenceNotes* notes) {
+                                                  SequenceNotes* notes, const SceneOptions& scene) {
   std::error_code code;
   if (scene_or_sequence.extension() == ".toml") {
     if (options.format || options.intrinsics || options.depth_units_per_m || options.fixed_camera) {
@@ -19,10 +21,19 @@ Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& s
           "sequences on disk",
           scene_or_sequence.string());
     }
-    return OpenScene(scene_or_sequence);
+    TSDFPP_ASSIGN(SceneConfig config, LoadSceneConfig(scene_or_sequence, scene.seed));
+    if (!scene.sensor.empty()) {
+      TSDFPP_ASSIGN(config.sensor, SensorPresetNamed(scene.sensor));
+    }
+    TSDFPP_ASSIGN(std::unique_ptr<SimulatedSource> source, SimulatedSource::Open(config, {}));
+    return source;
   }
   if (!std::filesystem::exists(scene_or_sequence, code)) {
     return UsageError("{}: no such scene (a .toml file) or sequence (a folder)",
+                      scene_or_sequence.string());
+  }
+  if (scene.IsAny()) {
+    return UsageError("{}: is a sequence; a sensor and a seed are for scenes (.toml)",
                       scene_or_sequence.string());
   }
   return OpenSequence(scene_or_sequence, options, notes);

@@ -33,9 +33,9 @@ struct NetworkConfig {
   double mask_share = 0.5;     // a pixel with less of a mask is not the instance's
   int every = 1;               // the network sees every n-th frame
   // Of kFull (mapper/segment/joined_segments.h):
-  double join_overlap = 0.8;       // tau_overlap of paper III-B
-  double join_iou = 0.5;           // 1: never by this
-  double mask_score = 0.8;         // an instance that is less sure needs segments
+  double join_overlap = 0.8;     // tau_overlap of paper III-B
+  double join_iou = 0.5;         // 1: never by this
+  double mask_score = 0.8;       // an instance that is less sure needs segments
   bool unknown_objects = false;  // segments that no instance claims are objects, as in III-B
 
   // Errors: kUsage, naming the field, what was found and what was expected.

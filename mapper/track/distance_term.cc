@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 
 namespace tsdfpp {
@@ -25,11 +26,6 @@ constexpr double kFarthest_hubers = 10;
 // The 4x4x4 voxels around a point, of which the middle eight are its corners.
 class Neighbourhood {
  public:
-  struct Value {
-    float distance = 0;
-    int weight = 0;  // 0 where unobserved
-  };
-
   Neighbourhood(const VoxelReader& voxels, const Eigen::Vector3d& q) {
     const Index3 base = FloorOf(q);
     fraction_ = {static_cast<float>(q.x() - base.x), static_cast<float>(q.y() - base.y),
@@ -53,56 +49,64 @@ class Neighbourhood {
     }
   }
 
-  // 0 to 3 along each axis; 1 and 2 are the corners.
-  Value At(int x, int y, int z) const {
-    const auto i = static_cast<std::size_t>(x);
-    const auto j = static_cast<std::size_t>(y);
-    const auto k = static_cast<std::size_t>(z);
-    const TsdfBlock* block =
-        blocks_[static_cast<std::size_t>(which_[0][i] | which_[1][j] | which_[2][k])];
-    if (block == nullptr) return {};
-    const auto place = static_cast<std::size_t>(place_[0][i] | place_[1][j] | place_[2][k]);
-    return {block->distance[place], block->weight[place]};
-  }
-
   // SurfaceReader::SagAt().
   float Sag() const {
+    // What the lines need: the corners (1 and 2 along each axis), and one voxel more on each side
+    // of one axis.
+    std::array<float, 64> distance{};
+    std::array<std::uint8_t, 64> weight{};
+    const auto read = [&](int x, int y, int z) {
+      const auto i = static_cast<std::size_t>(x);
+      const auto j = static_cast<std::size_t>(y);
+      const auto k = static_cast<std::size_t>(z);
+      const TsdfBlock* block =
+          blocks_[static_cast<std::size_t>(which_[0][i] | which_[1][j] | which_[2][k])];
+      if (block == nullptr) return false;
+      const auto place = static_cast<std::size_t>(place_[0][i] | place_[1][j] | place_[2][k]);
+      const std::size_t to = i + 4 * j + 16 * k;
+      distance[to] = block->distance[place];
+      weight[to] = block->weight[place];
+      return weight[to] != 0;
+    };
     for (int i = 0; i < 8; ++i) {
-      if (At(1 + (i & 1), 1 + ((i >> 1) & 1), 1 + (i >> 2)).weight == 0) return 0;
+      if (!read(1 + (i & 1), 1 + ((i >> 1) & 1), 1 + (i >> 2))) return 0;
     }
+    for (int line = 0; line < 4; ++line) {
+      const int second = 1 + (line & 1);
+      const int third = 1 + (line >> 1);
+      for (const int end : {0, 3}) {
+        read(end, second, third);
+        read(third, end, second);
+        read(second, third, end);
+      }
+    }
+    constexpr std::array<std::size_t, 3> kStep{1, 4, 16};
     float sag = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float f = Fraction(axis);
-      for (int line = 0; line < 4; ++line) sag += f * (1 - f) / 2 * LineSag(axis, line);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t second = (axis + 1) % 3;
+      const std::size_t third = (axis + 2) % 3;
+      const float f = fraction_[axis];
+      for (std::size_t line = 0; line < 4; ++line) {
+        const std::size_t at = (1 + (line & 1)) * kStep[second] + (1 + (line >> 1)) * kStep[third];
+        // The second difference at the point, of one of the four lines of voxels along an axis that
+        // pass through the corners, times the line's share.
+        const std::size_t step = kStep[axis];
+        const float inner = distance[at + step];
+        const float outer = distance[at + 2 * step];
+        float low = distance[at] - 2 * inner + outer;
+        float high = inner - 2 * outer + distance[at + 3 * step];
+        const bool goes_on_up = weight[at + 3 * step] != 0;
+        if (weight[at] == 0) low = goes_on_up ? high : 0;
+        if (!goes_on_up) high = low;
+        const float share = ((line & 1) != 0 ? fraction_[second] : 1 - fraction_[second]) *
+                            ((line >> 1) != 0 ? fraction_[third] : 1 - fraction_[third]);
+        sag += f * (1 - f) / 2 * (share * (low * (1 - f) + high * f));
+      }
     }
     return sag;
   }
 
  private:
-  float Fraction(int axis) const { return fraction_[static_cast<std::size_t>(axis)]; }
-
-  // The second difference at the point, of one of the four lines of voxels along an axis that pass
-  // through the corners (bits 0 and 1 say which, of the next two axes), times the line's share.
-  float LineSag(int axis, int line) const {
-    const int second = (axis + 1) % 3;
-    const int third = (axis + 2) % 3;
-    std::array<int, 3> at{};
-    at[static_cast<std::size_t>(second)] = 1 + (line & 1);
-    at[static_cast<std::size_t>(third)] = 1 + (line >> 1);
-    std::array<Value, 4> values;
-    for (int i = 0; i < 4; ++i) {
-      at[static_cast<std::size_t>(axis)] = i;
-      values[static_cast<std::size_t>(i)] = At(at[0], at[1], at[2]);
-    }
-    float low = values[0].distance - 2 * values[1].distance + values[2].distance;
-    float high = values[1].distance - 2 * values[2].distance + values[3].distance;
-    if (values[0].weight == 0) low = values[3].weight == 0 ? 0 : high;
-    if (values[3].weight == 0) high = low;
-    const float share = ((line & 1) != 0 ? Fraction(second) : 1 - Fraction(second)) *
-                        ((line >> 1) != 0 ? Fraction(third) : 1 - Fraction(third));
-    return share * (low * (1 - Fraction(axis)) + high * Fraction(axis));
-  }
-
   std::array<std::array<int, 4>, 3> which_{};  // bit of the block along each axis
   std::array<std::array<int, 4>, 3> place_{};  // its part of the place in a block
   std::array<const TsdfBlock*, 8> blocks_{};
@@ -123,25 +127,33 @@ double RobustDeviation(std::vector<float> sizes) {
 SurfaceReader::SurfaceReader(const TsdfGrid& grid, double voxel_m)
     : voxels_(grid), per_voxel_(1 / voxel_m), voxel_m_(static_cast<float>(voxel_m)) {}
 
-SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m) const {
-  SurfaceSample sample;
-  const Eigen::Vector3d q = p_L * per_voxel_;
-  if (voxels_.empty() || !(q.cwiseAbs().maxCoeff() < kFurthestVoxel)) return sample;
-  const Corners corners = FindCorners(voxels_, q);
-  std::array<float, 8> d{};
+void SurfaceReader::Read(const Index3& base, VoxelCube& cube) const {
+  cube.base = base;
+  cube.least_weight = 0;
+  const Corners corners = FindCorners(voxels_, base);
   int least = 255;
   for (std::size_t i = 0; i < 8; ++i) {
     const TsdfBlock* block = corners.block[i];
-    if (block == nullptr) return sample;
+    if (block == nullptr) return;
     const auto place = static_cast<std::size_t>(corners.place[i]);
-    d[i] = block->distance[place];
+    cube.distance[i] = block->distance[place];
     least = std::min<int>(least, block->weight[place]);
   }
-  if (least == 0) return sample;
-  sample.is_observed = true;
-  sample.weight = static_cast<float>(least);
-  const auto [fx, fy, fz] = corners.fraction;
+  cube.least_weight = least;
+}
+
+bool SurfaceReader::LinearAt(const Eigen::Vector3d& p_L, float sag_m, VoxelCube& cube,
+                             Linear& linear) const {
+  const Eigen::Vector3d q = p_L * per_voxel_;
+  if (voxels_.empty() || !(q.cwiseAbs().maxCoeff() < kFurthestVoxel)) return false;
+  const Index3 base = FloorOf(q);
+  if (cube.base != base) Read(base, cube);
+  if (cube.least_weight == 0) return false;
+  const auto fx = static_cast<float>(q.x() - base.x);
+  const auto fy = static_cast<float>(q.y() - base.y);
+  const auto fz = static_cast<float>(q.z() - base.z);
   // Along x, then y, then z, with the slopes on the way.
+  const std::array<float, 8>& d = cube.distance;
   const float x00 = d[1] - d[0];
   const float x10 = d[3] - d[2];
   const float x01 = d[5] - d[4];
@@ -156,11 +168,27 @@ SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m) const {
   const float x1 = x01 + (x11 - x01) * fy;
   const Eigen::Vector3f slope(x0 + (x1 - x0) * fz, (c10 - c00) + ((c11 - c01) - (c10 - c00)) * fz,
                               c1 - c0);
-  sample.value_m = c0 + (c1 - c0) * fz - sag_m;
-  sample.gradient_L = slope / voxel_m_;
+  linear.value_m = c0 + (c1 - c0) * fz - sag_m;
+  linear.gradient_L = slope / voxel_m_;
+  return true;
+}
+
+SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m, VoxelCube& cube) const {
+  SurfaceSample sample;
+  Linear linear;
+  if (!LinearAt(p_L, sag_m, cube, linear)) return sample;
+  sample.is_observed = true;
+  sample.weight = static_cast<float>(cube.least_weight);
+  sample.value_m = linear.value_m;
+  sample.gradient_L = linear.gradient_L;
   sample.slope = sample.gradient_L.norm();
   sample.has_slope = sample.slope >= kLeastSlope;
   return sample;
+}
+
+SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m) const {
+  VoxelCube cube;
+  return At(p_L, sag_m, cube);
 }
 
 float SurfaceReader::SagAt(const Eigen::Vector3d& p_L) const {
@@ -197,6 +225,7 @@ double DistanceTerm::WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_
 
 void DistanceTerm::KeepAt(const Pose& T_LC) {
   kept_.assign(points_.size(), {});
+  cubes_.resize(points_.size());
   const Eigen::Vector3d camera_L = T_LC.translation();
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, Taken(), kPointsPerTask),
@@ -207,7 +236,7 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
           const Eigen::Vector3d y = T_LC * p_C;
           Kept& kept = kept_[i];
           if (config_.curved) kept.sag_m = model_->SagAt(y);
-          const SurfaceSample at = model_->At(y, kept.sag_m);
+          const SurfaceSample at = model_->At(y, kept.sag_m, cubes_[i]);
           if (!at.has_slope) continue;
           kept.per_slope = 1 / at.slope;
           kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
@@ -219,32 +248,54 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
 
 void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end,
                             NormalEquations& sums) const {
+  // Rows are written here and added up later: a vector that is read right after its numbers were
+  // written one by one waits for them.
+  struct Row {
+    Vector6 J;
+    double r;
+    double weight;
+  };
+  constexpr std::size_t kRows = 64;
+  std::array<Row, kRows> rows;
+  std::size_t count = 0;
+  const auto add_up = [&] {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Row& row = rows[i];
+      const Vector6 weighted = row.weight * row.J;
+      sums.g += weighted * row.r;
+      for (int column = 0; column < 6; ++column) {
+        sums.H.col(column) += weighted * row.J[column];
+      }
+    }
+    count = 0;
+  };
   const double farthest_m = kFarthest_hubers * huber_m_;
   for (std::size_t k = begin; k < end; ++k) {
     const std::size_t i = k * stride_;
-    const Eigen::Vector3d p_C = points_[i].p_C.cast<double>();
-    const Eigen::Vector3d y = T_LC * p_C;
-    const SurfaceSample at = SampleAt(T_LC, i);
     const Kept& kept = kept_[i];
     if (!(kept.per_slope > 0)) {
       sums.cost += huber_m_ * huber_m_ / 2;
       continue;
     }
+    const Eigen::Vector3d y = T_LC * points_[i].p_C.cast<double>();
+    SurfaceReader::Linear at;
+    const bool is_observed = model_->LinearAt(y, kept.sag_m, cubes_[i], at);
     const double weight = kept.weight;
-    const double r = at.is_observed ? double{kept.per_slope * at.value_m} : kept.distance_m;
+    const double r = is_observed ? double{kept.per_slope * at.value_m} : kept.distance_m;
     const double size = std::min(std::abs(r), farthest_m);
     const bool is_far = size > huber_m_;
     sums.cost += weight * (is_far ? huber_m_ * (size - huber_m_ / 2) : r * r / 2);
-    if (!at.is_observed || size >= farthest_m) continue;
+    if (!is_observed || size >= farthest_m) continue;
     const double slack = is_far ? huber_m_ / size : 1;
     const Eigen::Vector3d g = kept.per_slope * at.gradient_L.cast<double>();
-    Vector6 J;
-    J.head<3>() = g;
-    J.tail<3>() = (y - frame_.centre).cross(g) / frame_.radius_m;
-    const Vector6 weighted = weight * slack * J;
-    sums.g += weighted * r;
-    sums.H.noalias() += weighted * J.transpose();
+    Row& row = rows[count++];
+    row.J.head<3>() = g;
+    row.J.tail<3>() = (y - frame_.centre).cross(g) / frame_.radius_m;
+    row.r = r;
+    row.weight = weight * slack;
+    if (count == kRows) add_up();
   }
+  add_up();
 }
 
 NormalEquations DistanceTerm::Sums(const Pose& T_LC) const {

@@ -2,6 +2,8 @@
 // (docs/tracking.md; after Bylow et al., RSS 2013).
 #pragma once
 
+#include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -27,6 +29,14 @@ struct SurfaceSample {
   Eigen::Vector3f normal_L() const { return gradient_L / slope; }
 };
 
+// The eight voxels around a point as they were read last, for points that are asked for again and
+// again and hardly move.
+struct VoxelCube {
+  Index3 base{std::numeric_limits<int>::max(), 0, 0};  // of none at first
+  std::array<float, 8> distance{};                     // corner x + 2 y + 4 z
+  int least_weight = 0;                                // 0 where one is unobserved
+};
+
 // Reads an object's distances. The grid must not change meanwhile.
 class SurfaceReader {
  public:
@@ -35,6 +45,15 @@ class SurfaceReader {
   // At a point of the lattice's frame, metres; any point that is not finite is unobserved. `sag_m`
   // is taken off the distance first.
   SurfaceSample At(const Eigen::Vector3d& p_L, float sag_m = 0) const;
+  // The same; `cube` is this reader's, and is read anew where the point left it.
+  SurfaceSample At(const Eigen::Vector3d& p_L, float sag_m, VoxelCube& cube) const;
+
+  // What At() has of a point without its slope's length: false where it is unobserved.
+  struct Linear {
+    float value_m = 0;
+    Eigen::Vector3f gradient_L = Eigen::Vector3f::Zero();
+  };
+  bool LinearAt(const Eigen::Vector3d& p_L, float sag_m, VoxelCube& cube, Linear& linear) const;
 
   // By how much the trilinear interpolation of the voxels around a point lies above a function
   // whose second differences along the axes are those of the voxels: f (1 - f) / 2 times each, f
@@ -46,6 +65,8 @@ class SurfaceReader {
   float SagAt(const Eigen::Vector3d& p_L) const;
 
  private:
+  void Read(const Index3& base, VoxelCube& cube) const;
+
   VoxelReader voxels_;
   double per_voxel_;
   float voxel_m_;
@@ -115,6 +136,8 @@ class DistanceTerm {
   std::size_t stride_;
   double huber_m_;
   std::vector<Kept> kept_;  // a point each, or empty
+  // A point each, once points were kept. A point is looked at by one thread at a time.
+  mutable std::vector<VoxelCube> cubes_;
 };
 
 }  // namespace tsdfpp

@@ -1,8 +1,11 @@
 #include "mapper/track/sdf_tracker.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 namespace tsdfpp {
 namespace {
@@ -56,34 +59,46 @@ Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double 
 
 TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
                                const MapRepresentation& map, const ObjectPoses& before) {
+  std::vector<Turn> turns;
+  for (auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
+    turns.push_back({id, std::move(pixels), &memory_[id]});
+  }
+  // Each turn is its own object's alone.
+  tbb::parallel_for(std::size_t{0}, turns.size(),
+                    [&](std::size_t i) { Take(frame, map, before, turns[i]); });
   TrackedPoses after{before};
-  const double voxel_m = map.config().voxel_m;
-  for (const auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
-    const auto points = SegmentPointsOf(frame, pixels, voxel_m, config_);
-    TrackStatus& status = after.seen[id];
-    status = TrackStatus::kFrozen;
-    if (points.size() < static_cast<std::size_t>(config_.min_points)) continue;
-    Memory& memory = memory_[id];
-    const auto known = before.find(id);
-    const std::optional<ObjectModel> model = models_(map, id);
-    // Its pixels may have waited until now, so that the map has nothing of it.
-    if (known == before.end() || !model) {
-      status = TrackStatus::kBegun;
-      after.T_WO.try_emplace(id, Pose::Identity());
-      memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}};
-      if (config_.keyframe_turn_rad > 0) {
-        memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
-      }
-      continue;
-    }
-    const auto registered = Register(frame, points, *model, voxel_m, known->second, memory);
-    if (!registered) continue;
-    status = TrackStatus::kTracked;
-    after.motions[id] = registered->motion;
-    if (SameNumbers(registered->T_WL, model->T_WL)) continue;  // at rest
-    after.T_WO[id] = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
+  for (const Turn& turn : turns) {
+    after.seen[turn.id] = turn.status;
+    if (turn.motion) after.motions[turn.id] = *turn.motion;
+    if (turn.status == TrackStatus::kBegun) after.T_WO.try_emplace(turn.id, Pose::Identity());
+    if (turn.T_WO) after.T_WO[turn.id] = *turn.T_WO;
   }
   return after;
+}
+
+void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const ObjectPoses& before,
+                      Turn& turn) const {
+  const double voxel_m = map.config().voxel_m;
+  const auto points = SegmentPointsOf(frame, turn.pixels, voxel_m, config_);
+  if (points.size() < static_cast<std::size_t>(config_.min_points)) return;
+  Memory& memory = *turn.memory;
+  const auto known = before.find(turn.id);
+  const std::optional<ObjectModel> model = models_(map, turn.id);
+  // Its pixels may have waited until now, so that the map has nothing of it.
+  if (known == before.end() || !model) {
+    turn.status = TrackStatus::kBegun;
+    memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}};
+    if (config_.keyframe_turn_rad > 0) {
+      memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
+    }
+    return;
+  }
+  const auto registered = Register(frame, points, *model, voxel_m, known->second, memory);
+  if (!registered) return;
+  turn.status = TrackStatus::kTracked;
+  turn.motion = registered->motion;
+  if (SameNumbers(registered->T_WL, model->T_WL)) return;  // at rest
+  turn.T_WO = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
 }
 
 std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,

@@ -14,7 +14,8 @@
 
 namespace tsdfpp {
 
-// Where a tracker gets an object's model from, as ModelOf() does.
+// Where a tracker gets an object's model from, as ModelOf() does. Called by several threads at a
+// time.
 using ModelSource = std::function<std::optional<ObjectModel>(const MapRepresentation&, InstanceId)>;
 
 class SdfTracker : public Tracker {
@@ -64,6 +65,19 @@ class SdfTracker : public Tracker {
     MotionUncertainty motion;
   };
 
+  // One object of a frame, and what became of it.
+  struct Turn {
+    InstanceId id = kNoInstance;
+    std::vector<int> pixels;  // of its segment, without the outline
+    Memory* memory = nullptr;
+    TrackStatus status = TrackStatus::kFrozen;
+    std::optional<MotionUncertainty> motion{};
+    std::optional<Pose> T_WO{};  // nothing where it stays where it was
+  };
+
+  // May run beside the turns of other objects.
+  void Take(const Frame& frame, const MapRepresentation& map, const ObjectPoses& before,
+            Turn& turn) const;
   // Nothing where the object is frozen. T_WO is that before the frame.
   std::optional<Registered> Register(const Frame& frame, const std::vector<SegmentPoint>& points,
                                      const ObjectModel& model, double voxel_m, const Pose& T_WO,

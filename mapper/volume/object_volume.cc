@@ -89,12 +89,16 @@ VoxelReader::VoxelReader(const TsdfGrid& grid) : grid_(&grid) {
 }
 
 Corners FindCorners(const VoxelReader& reader, const Eigen::Vector3d& q) {
+  const Index3 base = FloorOf(q);
+  Corners corners = FindCorners(reader, base);
+  corners.fraction = {static_cast<float>(q.x() - base.x), static_cast<float>(q.y() - base.y),
+                      static_cast<float>(q.z() - base.z)};
+  return corners;
+}
+
+Corners FindCorners(const VoxelReader& reader, const Index3& base) {
   Corners corners;
-  corners.base = FloorOf(q);
-  corners.fraction = {static_cast<float>(q.x() - corners.base.x),
-                      static_cast<float>(q.y() - corners.base.y),
-                      static_cast<float>(q.z() - corners.base.z)};
-  const Index3& base = corners.base;
+  corners.base = base;
   const TsdfBlock* inner = nullptr;
   const bool one_block = (base.x & 7) != 7 && (base.y & 7) != 7 && (base.z & 7) != 7;
   if (one_block) {

@@ -111,6 +111,8 @@ inline Index3 FloorOf(const Eigen::Vector3d& q) {
 
 // Corners of the point q, in voxels of the lattice.
 Corners FindCorners(const VoxelReader& reader, const Eigen::Vector3d& q);
+// Of the voxel itself: fractions are 0.
+Corners FindCorners(const VoxelReader& reader, const Index3& base);
 
 // The order of operations of docs/map.md, "Resampling".
 float Trilinear(const std::array<float, 8>& corner, const std::array<float, 3>& fraction);
