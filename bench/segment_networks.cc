@@ -41,7 +41,8 @@ Expected<std::string> RowOf(const fs::path& file, int frames,
     for (std::size_t way = 0; way < kWays.size(); ++way) {
       const auto segmenter = MakeSegmenter(kWays[way], {}, {.finder = finder});
       TSDFPP_ASSIGN(const Segments segments, segmenter->Segment(frame));
-      TSDFPP_RETURN_IF_ERROR(scorers[way].Observe(truth.mask, segments.IdsOfObjects(), frame.depth));
+      TSDFPP_RETURN_IF_ERROR(
+          scorers[way].Observe(truth.mask, segments.IdsOfObjects(), frame.depth));
     }
   }
   std::string row = info.name;

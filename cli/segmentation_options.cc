@@ -1,7 +1,9 @@
 #include "cli/segmentation_options.h"
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "cli/command.h"
@@ -25,6 +27,18 @@ Expected<std::shared_ptr<InstanceFinder>> FinderOf(const SegmentationOptions& op
   }
   TSDFPP_ASSIGN(std::shared_ptr<InstanceFinder> loaded, LoadInstanceNetwork(options.model, config));
   return loaded;
+}
+
+// Masks on disk are there already: what a network's settings say of finding them is of no use.
+Expected<void> CheckSettingsOfMasks(const toml::table& settings, const std::string& where) {
+  constexpr std::array kOfMasks{"every", "join_overlap", "join_iou", "mask_score",
+                                "unknown_objects"};
+  for (const auto& [key, value] : settings) {
+    if (std::find(kOfMasks.begin(), kOfMasks.end(), key.str()) != kOfMasks.end()) continue;
+    return UsageError("{}: '{}' is a setting of networks, expected with --masks: {}", where,
+                      key.str(), fmt::join(kOfMasks, ", "));
+  }
+  return {};
 }
 
 }  // namespace
@@ -93,6 +107,9 @@ Expected<SegmenterParts> ReadSegmenterParts(const SegmentationOptions& options,
   if (!options.network_config.empty()) {
     TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.network_config));
     TSDFPP_ASSIGN(parts.network, NetworkConfig::FromToml(table, options.network_config));
+    if (!options.masks.empty()) {
+      TSDFPP_RETURN_IF_ERROR(CheckSettingsOfMasks(table, options.network_config));
+    }
   }
   TSDFPP_ASSIGN(parts.finder, FinderOf(options, parts.network));
   return parts;

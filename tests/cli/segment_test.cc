@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "core/files.h"
@@ -24,6 +25,7 @@ using test::CommandOutput;
 using test::kData;
 using test::kUsage;
 
+const std::string kScene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
 const std::string kNetwork = TSDFPP_SOURCE_DIR "/tests/data/networks/centres.onnx";
 
 class SegmentCommand : public testing::Test {
@@ -79,19 +81,61 @@ TEST_F(SegmentCommand, DepthLeavesSegmentsPicturesAndNoOtherRunsFiles) {
 }
 
 // The network says "thing" where it is red; joined, surfaces of depth that are mostly red are one.
+// The network of the tests calls red a thing: here object 3 of the first frame. Depth has segments
+// of both objects, of which the network knows one.
 TEST_F(SegmentCommand, ANetworkAloneAndJoined) {
   const fs::path recording = Recording();
-  ASSERT_TRUE(WriteFile(folder_ / "network.toml", "width = 64\n").has_value());
-  for (const std::string way : {"network", "full"}) {
+  const Frame frame = test::BoxSource(4).Read(0).value();
+  const cv::Mat is_thing = frame.mask == 3;
+  cv::Mat painted(frame.mask.size(), CV_8UC3, cv::Scalar(0, 0, 0));
+  painted.setTo(cv::Scalar(128, 0, 255), is_thing);
+  const cv::Rect box = cv::boundingRect(is_thing);
+  const cv::Point centre = (box.tl() + box.br()) / 2;
+  painted.at<cv::Vec3b>(centre)[1] = 255;
+  const std::set<fs::path> pictures(fs::directory_iterator(recording / "rgb"), {});
+  ASSERT_TRUE(cv::imwrite(pictures.begin()->string(), painted));
+
+  const auto ids_of = [&](const std::string& way, const std::string& settings) {
+    EXPECT_TRUE(WriteFile(folder_ / "network.toml", settings).has_value());
     const CommandOutput run = Run({"--segmentation", way, "--model", kNetwork, "--network-config",
                                    folder_ / "network.toml", "--score", "--json"},
                                   recording);
-    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err.find("ERROR"), std::string::npos) << run.err;
     EXPECT_EQ(nlohmann::json::parse(run.out).at("segmentation"), way);
-    const cv::Mat ids = cv::imread((folder_ / "out/000000.png").string(), cv::IMREAD_UNCHANGED);
-    ASSERT_EQ(ids.type(), CV_16UC1);
+    return cv::imread((folder_ / "out/000000.png").string(), cv::IMREAD_UNCHANGED);
+  };
+  const std::string width = fmt::format("width = {}\n", frame.mask.cols);
+  EXPECT_EQ(cv::countNonZero((ids_of("network", width) == 1) != is_thing), 0);
+  const cv::Mat joined = ids_of("full", width);
+  ASSERT_EQ(joined.type(), CV_16UC1);
+  const auto share_of = [&](const cv::Mat& ids, int object) {
+    const cv::Mat there = frame.mask == object;
+    return static_cast<double>(cv::countNonZero((ids != 0) & (ids != kNoInstance) & there)) /
+           cv::countNonZero(there);
+  };
+  EXPECT_GT(share_of(joined, 3), 0.8);
+  EXPECT_EQ(share_of(joined, 8), 0) << "no network knows it";
+  const cv::Mat all = ids_of("full", width + "unknown_objects = true\n");
+  EXPECT_GT(share_of(all, 3), 0.8);
+  EXPECT_GT(share_of(all, 8), 0.8);
+}
+
+// Of a scene: another sensor and another seed are other images, and so other segments.
+TEST_F(SegmentCommand, SensorAndSeedOfAScene) {
+  std::set<std::string> images;
+  const std::vector<std::vector<std::string>> ways{{},
+                                                   {"--sensor", "nguyen2012"},
+                                                   {"--sensor", "nguyen2012", "--seed", "7"},
+                                                   {"--sensor", "nguyen2012", "--seed", "7"}};
+  for (const auto& way : ways) {
+    std::vector<std::string> more{"--every", "1000"};
+    more.insert(more.end(), way.begin(), way.end());
+    const CommandOutput run = Run(more, kScene);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    images.insert(ReadFile(folder_ / "out/000001.png").value());
   }
+  EXPECT_EQ(images.size(), 3U) << "and the same once more is the same";
 }
 
 // What one run wrote is another's masks, under other ids.
@@ -160,6 +204,15 @@ TEST_F(SegmentCommand, RefusesWithOneSentence) {
   ASSERT_TRUE(WriteFile(folder_ / "network.toml", "every = 0\n").has_value());
   refused({"--segmentation", "full", "--network-config", folder_ / "network.toml"}, kUsage,
           "'every' is 0, expected 1 to 1000", recording);
+  ASSERT_TRUE(WriteFile(folder_ / "network.toml", "width = 64\n").has_value());
+  refused({"--segmentation", "full", "--masks", recording / "rgb", "--network-config",
+           folder_ / "network.toml"},
+          kUsage, "'width' is a setting of networks, expected with --masks: every, join_overlap",
+          recording);
+  refused({"--sensor", "nguyen2012"}, kUsage, "is a sequence; a sensor and a seed are for scenes",
+          recording);
+  refused({"--seed", "3"}, kUsage, "is a sequence; a sensor and a seed are for scenes", recording);
+  refused({"--sensor", "none_such"}, kUsage, "none_such", kScene);
   ASSERT_TRUE(WriteFile(folder_ / "bad.toml", "sigmas = 0.0\n").has_value());
   refused({"--settings", folder_ / "bad.toml"}, kUsage, "'sigmas' is 0", recording);
   const fs::path unmasked = folder_ / "unmasked";
