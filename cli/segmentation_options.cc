@@ -31,8 +31,8 @@ Expected<std::shared_ptr<InstanceFinder>> FinderOf(const SegmentationOptions& op
 
 // Masks on disk are there already: what a network's settings say of finding them is of no use.
 Expected<void> CheckSettingsOfMasks(const toml::table& settings, const std::string& where) {
-  constexpr std::array kOfMasks{"every", "join_overlap", "join_iou", "mask_score",
-                                "unknown_objects"};
+  constexpr std::array kOfMasks{"every",    "latency",    "join_overlap",
+                                "join_iou", "mask_score", "unknown_objects"};
   for (const auto& [key, value] : settings) {
     if (std::find(kOfMasks.begin(), kOfMasks.end(), key.str()) != kOfMasks.end()) continue;
     return UsageError("{}: '{}' is a setting of networks, expected with --masks: {}", where,
@@ -107,6 +107,10 @@ Expected<SegmenterParts> ReadSegmenterParts(const SegmentationOptions& options,
   if (!options.network_config.empty()) {
     TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.network_config));
     TSDFPP_ASSIGN(parts.network, NetworkConfig::FromToml(table, options.network_config));
+    if (parts.network.latency > 0 && !uses_depth) {
+      return UsageError("{}: 'latency' is {}, expected 0 for --segmentation network",
+                        options.network_config, parts.network.latency);
+    }
     if (!options.masks.empty()) {
       TSDFPP_RETURN_IF_ERROR(CheckSettingsOfMasks(table, options.network_config));
     }

@@ -9,6 +9,8 @@
 namespace tsdfpp {
 namespace {
 
+constexpr double kCarriedOverlap = 0.5;
+
 // A segment's pixels on each instance (by place in the list and 1; 0: on none), where there are
 // any.
 using Overlaps = std::map<std::size_t, std::int64_t>;
@@ -64,7 +66,8 @@ cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size) {
 }
 
 Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
-                      std::span<const Instance> instances, const NetworkConfig& config) {
+                      std::span<const Instance> instances, const NetworkConfig& config,
+                      std::vector<InstanceId>* of_masks) {
   const auto overlaps = CountOverlaps(depth, painted);
   // By place and 1: pixels of an instance, of them those on segments that are its, and those that
   // no instance's segment has.
@@ -99,6 +102,7 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
   for (std::size_t i = 1; i <= instances.size(); ++i) {
     if (!is_found[i] && !keeps_mask[i]) continue;
     joined.classes[next] = instances[i - 1].semantic_class;
+    if (keeps_mask[i] && of_masks != nullptr) of_masks->push_back(next);
     id_of_instance[i] = next++;
   }
   std::vector<InstanceId> id_of(overlaps.size(), kBackground);
@@ -143,14 +147,68 @@ Expected<Segments> InstanceSegments::Segment(const Frame& frame) {
   return segments;
 }
 
-Expected<Segments> JoinedSegments::Segment(const Frame& frame) {
-  TSDFPP_ASSIGN(const Segments segments, depth_.Segment(frame));
-  if (frames_++ % config_.every != 0) {
-    return JoinSegments(segments.ids, PaintInstances({}, frame.depth.size()), {}, config_);
+const Segments& KnownSegments::Set(const cv::Mat& depth, std::span<const Instance> instances) {
+  of_masks_.clear();
+  last_ =
+      JoinSegments(depth, PaintInstances(instances, depth.size()), instances, config_, &of_masks_);
+  return last_;
+}
+
+const Segments& KnownSegments::Carry(const cv::Mat& depth) {
+  // Those of instances have the first ids, so that an id is an instance's place and 1.
+  std::vector<Instance> instances;
+  for (const auto& [id, name] : last_.classes) {
+    const bool is_mask = std::binary_search(of_masks_.begin(), of_masks_.end(), id);
+    instances.push_back({{}, {}, name, is_mask ? 1.F : -1.F});
   }
-  TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
-  const cv::Mat painted = PaintInstances(instances, frame.depth.size());
-  return JoinSegments(segments.ids, painted, instances, config_);
+  cv::Mat painted = last_.ids.clone();
+  painted.setTo(cv::Scalar(0), painted > static_cast<double>(instances.size()));
+  of_masks_.clear();
+  // What moved on lies half beside itself at worst.
+  NetworkConfig config = config_;
+  config.join_overlap = kCarriedOverlap;
+  last_ = JoinSegments(depth, painted, instances, config, &of_masks_);
+  return last_;
+}
+
+JoinedSegments::Search JoinedSegments::Begin(const Frame& frame) const {
+  // Its images are its own: who gave the frame may write into them.
+  Frame copy = frame;
+  copy.depth = frame.depth.clone();
+  copy.colour = frame.colour.clone();
+  Search search;
+  search.frame = frames_;
+  search.found = std::async(std::launch::async, [finder = finder_, copy = std::move(copy)] {
+    return finder->Find(copy);
+  });
+  return search;
+}
+
+Expected<void> JoinedSegments::Take(Search search) {
+  TSDFPP_ASSIGN(const std::vector<Instance> instances, search.found.get());
+  known_.Set(search.depth.front(), instances);
+  for (std::size_t i = 1; i < search.depth.size(); ++i) known_.Carry(search.depth[i]);
+  return {};
+}
+
+Expected<Segments> JoinedSegments::Segment(const Frame& frame) {
+  TSDFPP_ASSIGN(const Segments depth, depth_.Segment(frame));
+  const bool is_asked = frames_ % config_.every == 0;
+  if (is_asked && (config_.latency == 0 || frames_ == 0)) {
+    TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
+    ++frames_;
+    return known_.Set(depth.ids, instances);
+  }
+  if (search_ && frames_ == search_->frame + config_.latency) {
+    Search search = std::move(*search_);
+    search_.reset();
+    TSDFPP_RETURN_IF_ERROR(Take(std::move(search)));
+  }
+  known_.Carry(depth.ids);
+  if (is_asked) search_ = Begin(frame);
+  if (search_) search_->depth.push_back(depth.ids);
+  ++frames_;
+  return known_.last();
 }
 
 }  // namespace tsdfpp

@@ -46,6 +46,7 @@ Expected<void> NetworkConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("most_overlap", most_overlap, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_share", mask_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("every", every, 1, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("latency", latency, 0, every));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_overlap", join_overlap, 0.5, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_iou", join_iou, 0.5, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_score", mask_score, 0, 1));
@@ -73,6 +74,7 @@ Expected<NetworkConfig> NetworkConfig::FromToml(const toml::table& table,
       .Get("most_overlap", config.most_overlap)
       .Get("mask_share", config.mask_share)
       .Get("every", config.every)
+      .Get("latency", config.latency)
       .Get("join_overlap", config.join_overlap)
       .Get("join_iou", config.join_iou)
       .Get("mask_score", config.mask_score)
@@ -99,6 +101,7 @@ toml::table NetworkConfig::ToToml() const {
                      {"most_overlap", most_overlap},
                      {"mask_share", mask_share},
                      {"every", every},
+                     {"latency", latency},
                      {"join_overlap", join_overlap},
                      {"join_iou", join_iou},
                      {"mask_score", mask_score},

@@ -33,6 +33,8 @@ struct NetworkConfig {
   double mask_share = 0.5;     // a pixel with less of a mask is not the instance's
   int every = 1;               // the network sees every n-th frame
   // Of kFull (mapper/segment/joined_segments.h):
+  int latency = 0;  // frames after which instances are known, while the network runs beside them;
+                    // 0: the frame waits for it; at most `every`
   double join_overlap = 0.8;     // tau_overlap of paper III-B
   double join_iou = 0.5;         // 1: never by this
   double mask_score = 0.8;       // an instance that is less sure needs segments

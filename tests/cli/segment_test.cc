@@ -207,8 +207,11 @@ TEST_F(SegmentCommand, RefusesWithOneSentence) {
   ASSERT_TRUE(WriteFile(folder_ / "network.toml", "width = 64\n").has_value());
   refused({"--segmentation", "full", "--masks", recording / "rgb", "--network-config",
            folder_ / "network.toml"},
-          kUsage, "'width' is a setting of networks, expected with --masks: every, join_overlap",
+          kUsage, "'width' is a setting of networks, expected with --masks: every, latency",
           recording);
+  ASSERT_TRUE(WriteFile(folder_ / "network.toml", "every = 3\nlatency = 2\n").has_value());
+  refused({"--segmentation", "network", "--network-config", folder_ / "network.toml"}, kUsage,
+          "'latency' is 2, expected 0 for --segmentation network", recording);
   refused({"--sensor", "nguyen2012"}, kUsage, "is a sequence; a sensor and a seed are for scenes",
           recording);
   refused({"--seed", "3"}, kUsage, "is a sequence; a sensor and a seed are for scenes", recording);

@@ -2,13 +2,16 @@
 // pixel by pixel.
 #include "mapper/segment/joined_segments.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <random>
 #include <set>
 #include <string>
+#include <thread>
 
 namespace tsdfpp {
 namespace {
@@ -251,30 +254,105 @@ TEST(InstanceSegments, FramesBetweenHaveNone) {
   EXPECT_EQ(finder->asked, 3);
 }
 
-// They are still segments, of which the network says nothing.
-TEST(JoinedSegments, FramesBetweenHaveThoseOfDepthUnknown) {
-  const auto finder = std::make_shared<BoxFinder>();
-  NetworkConfig config;
-  config.every = 2;
-  JoinedSegments segmenter(finder, config, {});
-  DepthSegments depth;
+// A thing of two segments that moves by a pixel a frame, a cube that no network knows, and a book
+// that is a mask alone.
+TEST(KnownSegments, AreCarriedWithTheSegments) {
+  const auto frame = [](int at) {
+    cv::Mat ids(1, 24, CV_16UC1, cv::Scalar(0));
+    ids(cv::Rect(at, 0, 4, 1)) = 2;
+    ids(cv::Rect(at + 4, 0, 3, 1)) = 1;
+    ids(cv::Rect(18, 0, 5, 1)) = 3;
+    return ids;
+  };
+  KnownSegments known(NetworkConfig{});
+  known.Set(frame(2), std::vector<Instance>{BoxOf({2, 0, 7, 1}, "mug", 0.9F),
+                                            BoxOf({13, 0, 3, 1}, "book", 0.9F)});
+  for (int at = 3; at < 6; ++at) {
+    const Segments& carried = known.Carry(frame(at));
+    cv::Mat expected(1, 24, CV_16UC1, cv::Scalar(0));
+    expected(cv::Rect(at, 0, 7, 1)) = 1;
+    expected(cv::Rect(13, 0, 3, 1)) = 2;
+    expected(cv::Rect(18, 0, 5, 1)) = 3;
+    EXPECT_EQ(cv::countNonZero(carried.ids != expected), 0) << carried.ids;
+    EXPECT_EQ(carried.classes, (std::map<InstanceId, std::string>{{1, "mug"}, {2, "book"}}));
+    EXPECT_EQ(carried.unknown, std::vector<InstanceId>{3});
+  }
+  // It is gone: what shows itself there is not it.
+  cv::Mat others(1, 24, CV_16UC1, cv::Scalar(0));
+  others(cv::Rect(18, 0, 5, 1)) = 1;
+  EXPECT_EQ(known.Carry(others).classes, (std::map<InstanceId, std::string>{{1, "book"}}));
+}
+
+// A box of depth that moves, and finders that see it where it is.
+Frame BoxFrame(int index) {
   Frame frame;
+  frame.index = index;
   frame.intrinsics = {64, 48, 60, 60, 31.5, 23.5};
   frame.depth = cv::Mat(48, 64, CV_32FC1, cv::Scalar(1));
-  frame.depth(cv::Rect(10, 10, 20, 20)) = 0.7F;
-  const cv::Mat ids = depth.Segment(frame).value().ids;
-  for (int i = 0; i < 3; ++i) {
-    const Segments segments = segmenter.Segment(frame).value();
-    if (i == 1) {
-      EXPECT_EQ(cv::countNonZero(segments.ids != ids), 0);
-      EXPECT_TRUE(segments.classes.empty());
-      EXPECT_FALSE(segments.unknown.empty());
-      EXPECT_EQ(cv::countNonZero(segments.IdsOfObjects()), cv::countNonZero(ids == kNoInstance));
-    } else {
-      EXPECT_EQ(segments.classes.at(1), "box");
+  frame.depth(cv::Rect(4 + index, 10, 20, 20)) = 0.7F;
+  return frame;
+}
+
+class MovingBoxFinder : public InstanceFinder {
+ public:
+  Expected<std::vector<Instance>> Find(const Frame& frame) override {
+    asked.push_back(frame.index);
+    // The second box is not there, and is another one every time.
+    std::this_thread::sleep_for(std::chrono::milliseconds(7 * (frame.index % 3)));
+    if (frame.index == fails_at) return DataError("frame {}: no", frame.index);
+    return std::vector<Instance>{
+        BoxOf({4 + frame.index, 10, 20, 20}, fmt::format("seen at {}", frame.index), 1),
+        BoxOf({50, 2 * frame.index, 4, 4}, "book", 1)};
+  }
+  std::vector<int> asked;
+  int fails_at = -1;
+};
+
+TEST(JoinedSegments, WhatIsFoundBecomesKnownWithItsLatency) {
+  constexpr int kFrames = 14;
+  for (const int every : {1, 2, 4}) {
+    for (int latency = 0; latency <= every; ++latency) {
+      SCOPED_TRACE(testing::Message() << "every " << every << ", latency " << latency);
+      NetworkConfig config;
+      config.every = every;
+      config.latency = latency;
+      const auto finder = std::make_shared<MovingBoxFinder>();
+      JoinedSegments segmenter(finder, config, {});
+      std::vector<int> asked;
+      for (int i = 0; i < kFrames; ++i) {
+        if (i % every == 0) asked.push_back(i);
+        // From the last frame whose instances are known by now on.
+        const int begin = std::max(0, i - latency) / every * every;
+        DepthSegments depth;
+        MovingBoxFinder again;
+        KnownSegments known(config);
+        known.Set(depth.Segment(BoxFrame(begin)).value().ids, again.Find(BoxFrame(begin)).value());
+        for (int k = begin + 1; k <= i; ++k) known.Carry(depth.Segment(BoxFrame(k)).value().ids);
+        const Segments found = segmenter.Segment(BoxFrame(i)).value();
+        ASSERT_EQ(cv::countNonZero(found.ids != known.last().ids), 0) << "frame " << i;
+        ASSERT_EQ(found.classes, known.last().classes);
+        ASSERT_EQ(found.unknown, known.last().unknown);
+        EXPECT_EQ(found.classes.at(1), fmt::format("seen at {}", begin));
+      }
+      // The last ones may still be on the way.
+      finder->asked.resize(std::min(finder->asked.size(), asked.size()));
+      asked.resize(finder->asked.size());
+      EXPECT_EQ(finder->asked, asked);
     }
   }
-  EXPECT_EQ(finder->asked, 2);
+}
+
+TEST(JoinedSegments, AnErrorOfTheFinderComesWithItsLatency) {
+  NetworkConfig config;
+  config.every = 3;
+  config.latency = 2;
+  const auto finder = std::make_shared<MovingBoxFinder>();
+  finder->fails_at = 3;
+  JoinedSegments segmenter(finder, config, {});
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(segmenter.Segment(BoxFrame(i)).has_value()) << i;
+  const auto wrong = segmenter.Segment(BoxFrame(5));
+  ASSERT_FALSE(wrong.has_value());
+  EXPECT_EQ(wrong.error().message, "frame 3: no");
 }
 
 TEST(NetworkConfig, ComesBackFromToml) {
@@ -288,6 +366,7 @@ TEST(NetworkConfig, ComesBackFromToml) {
   config.most_overlap = 0.6;
   config.mask_share = 0.4;
   config.every = 5;
+  config.latency = 4;
   config.join_overlap = 0.7;
   config.join_iou = 0.6;
   config.mask_score = 0.9;
@@ -296,6 +375,7 @@ TEST(NetworkConfig, ComesBackFromToml) {
   const auto refused = [](NetworkConfig wrong) { return !wrong.Validate().has_value(); };
   EXPECT_TRUE(refused({.width = -1}));
   EXPECT_TRUE(refused({.every = 0}));
+  EXPECT_TRUE(refused({.every = 2, .latency = 3}));
   EXPECT_TRUE(refused({.join_overlap = 0.4}));
   EXPECT_TRUE(refused({.join_iou = 0.4}));
   EXPECT_TRUE(refused({.mask_score = 1.1}));
