@@ -1,10 +1,14 @@
 #include "mapper/segment/background.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
 
 namespace tsdfpp {
 namespace {
@@ -23,15 +27,15 @@ constexpr double kBehindShare = 0.05;
 constexpr int kThinning = 16;  // of the samples that are asked whether they are behind
 
 struct Sample {
-  std::int32_t label = 0;
   double x = 0;  // the ray is (x, y, 1)
   double y = 0;
-  double q = 0;  // inverse depth
-  double sigma_m = 0;
+  double q = 0;       // inverse depth
+  double near_m = 0;  // NearPlane_m
 };
 
 template <typename OfSample>
-void ForEachSample(const SurfaceMaps& maps, const cv::Mat& labels, const OfSample& of_sample) {
+void ForEachSample(const SurfaceMaps& maps, const cv::Mat& labels,
+                   const DepthSegmentsConfig& config, const OfSample& of_sample) {
   for (int v = 0; v < labels.rows; v += kStride) {
     const auto* label = labels.ptr<std::int32_t>(v);
     const auto* q = maps.inverse_depth.ptr<float>(v);
@@ -39,10 +43,46 @@ void ForEachSample(const SurfaceMaps& maps, const cv::Mat& labels, const OfSampl
     const double y = maps.rays.y[static_cast<std::size_t>(v)];
     for (int u = 0; u < labels.cols; u += kStride) {
       if (label[u] == 0 || q[u] == 0) continue;
-      of_sample(Sample{label[u], maps.rays.x[static_cast<std::size_t>(u)], y, q[u], sigma[u]});
+      of_sample(label[u], [&] {
+        return Sample{maps.rays.x[static_cast<std::size_t>(u)], y, q[u],
+                      NearPlane_m(sigma[u], 1 / double{q[u]}, maps.rays, config)};
+      });
     }
   }
 }
+
+// Samples by label, each label's by rows: what is summed over them does not depend on threads.
+class SamplesByLabel {
+ public:
+  SamplesByLabel(const SurfaceMaps& maps, const cv::Mat& labels, std::int32_t end,
+                 const DepthSegmentsConfig& config)
+      : begin_(static_cast<std::size_t>(end) + 1) {
+    ForEachSample(maps, labels, config, [&](std::int32_t label, const auto&) {
+      ++begin_[static_cast<std::size_t>(label) + 1];
+    });
+    for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
+    samples_.resize(begin_.back());
+    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+    ForEachSample(maps, labels, config, [&](std::int32_t label, const auto& sample) {
+      samples_[next[static_cast<std::size_t>(label)]++] = sample();
+    });
+  }
+
+  std::size_t labels() const { return begin_.size() - 1; }
+  std::span<const Sample> Of(std::size_t label) const {
+    return std::span(samples_).subspan(begin_[label], begin_[label + 1] - begin_[label]);
+  }
+
+  // In parallel.
+  template <typename OfLabel>
+  void ForEachLabel(const OfLabel& of_label) const {
+    tbb::parallel_for(std::size_t{0}, labels(), of_label);
+  }
+
+ private:
+  std::vector<std::size_t> begin_;  // by label, and the end of the last
+  std::vector<Sample> samples_;
+};
 
 // Normal equations of q = a x + b y + c, and the solution.
 struct InversePlane {
@@ -77,23 +117,22 @@ struct InversePlane {
   double Off_m(const Sample& s) const { return (a * s.x + b * s.y + c - s.q) / (s.q * s.q); }
 };
 
-std::vector<InversePlane> FitInverse(const SurfaceMaps& maps, const cv::Mat& labels,
-                                     std::int32_t end, const DepthSegmentsConfig& config) {
-  std::vector<InversePlane> planes(static_cast<std::size_t>(end));
-  for (const double within : {std::numeric_limits<double>::infinity(), 8.0, 4.0, 2.0, 1.0, 1.0}) {
-    std::vector<InversePlane> next(planes.size());
-    ForEachSample(maps, labels, [&](const Sample& s) {
-      const auto label = static_cast<std::size_t>(s.label);
-      if (std::isfinite(within)) {
-        const InversePlane& plane = planes[label];
-        const double near_m = NearPlane_m(s.sigma_m, 1 / s.q, maps.rays, config);
-        if (!plane.is_solved || std::abs(plane.Off_m(s)) > within * near_m) return;
+std::vector<InversePlane> FitInverse(const SamplesByLabel& samples) {
+  std::vector<InversePlane> planes(samples.labels());
+  samples.ForEachLabel([&](std::size_t label) {
+    InversePlane& plane = planes[label];
+    for (const double within : {std::numeric_limits<double>::infinity(), 8.0, 4.0, 2.0, 1.0, 1.0}) {
+      InversePlane next;
+      for (const Sample& s : samples.Of(label)) {
+        if (std::isfinite(within)) {
+          if (!plane.is_solved || std::abs(plane.Off_m(s)) > within * s.near_m) continue;
+        }
+        next.Add(s);
       }
-      next[label].Add(s);
-    });
-    for (InversePlane& plane : next) plane.Solve();
-    planes = std::move(next);
-  }
+      next.Solve();
+      plane = next;
+    }
+  });
   return planes;
 }
 
@@ -108,30 +147,25 @@ SegmentPlane AsPlane(const InversePlane& fitted) {
 }
 
 // Areas, and shares of the segments, near their planes.
-std::vector<SegmentPlane> Measure(const SurfaceMaps& maps, const cv::Mat& labels,
-                                  const std::vector<InversePlane>& fitted,
-                                  const DepthSegmentsConfig& config) {
+std::vector<SegmentPlane> Measure(const SurfaceMaps& maps, const SamplesByLabel& samples,
+                                  const std::vector<InversePlane>& fitted) {
   // A plane that is seen from its side covers a pixel with much; no more than at this cosine.
   constexpr double kLeastCosine = 0.05;
-  std::vector<SegmentPlane> planes;
-  planes.reserve(fitted.size());
-  for (const InversePlane& plane : fitted) planes.push_back(AsPlane(plane));
-  std::vector<double> all(fitted.size());
-  std::vector<double> on(fitted.size());
   const double pixel_area = kStride * kStride / double{maps.rays.per_x} / double{maps.rays.per_y};
-  ForEachSample(maps, labels, [&](const Sample& s) {
-    const auto label = static_cast<std::size_t>(s.label);
+  std::vector<SegmentPlane> planes(fitted.size());
+  samples.ForEachLabel([&](std::size_t label) {
     SegmentPlane& plane = planes[label];
-    all[label] += 1;
-    const double near_m = NearPlane_m(s.sigma_m, 1 / s.q, maps.rays, config);
-    if (!plane.is_plane || std::abs(fitted[label].Off_m(s)) > near_m) return;
-    on[label] += 1;
-    const double facing = -(plane.normal.x() * s.x + plane.normal.y() * s.y + plane.normal.z());
-    plane.area_m2 += pixel_area / (s.q * s.q) / std::max(facing, kLeastCosine);
+    plane = AsPlane(fitted[label]);
+    double on = 0;
+    for (const Sample& s : samples.Of(label)) {
+      if (!plane.is_plane || std::abs(fitted[label].Off_m(s)) > s.near_m) continue;
+      on += 1;
+      const double facing = -(plane.normal.x() * s.x + plane.normal.y() * s.y + plane.normal.z());
+      plane.area_m2 += pixel_area / (s.q * s.q) / std::max(facing, kLeastCosine);
+    }
+    const auto all = static_cast<double>(samples.Of(label).size());
+    if (all > 0) plane.on_share = on / all;
   });
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    if (all[i] > 0) planes[i].on_share = on[i] / all[i];
-  }
   return planes;
 }
 
@@ -150,12 +184,12 @@ std::vector<std::size_t> FindWalls(const SurfaceMaps& maps, const cv::Mat& label
   std::vector<double> behind(candidates.size());
   double all = 0;
   int count = 0;
-  ForEachSample(maps, labels, [&](const Sample& s) {
+  ForEachSample(maps, labels, config, [&](std::int32_t, const auto& sample) {
     if (count++ % kThinning != 0) return;
     all += 1;
-    const double near_m = NearPlane_m(s.sigma_m, 1 / s.q, maps.rays, config);
+    const Sample s = sample();
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-      if (fitted[candidates[i]].Off_m(s) > kOff * near_m) behind[i] += 1;
+      if (fitted[candidates[i]].Off_m(s) > kOff * s.near_m) behind[i] += 1;
     }
   });
   std::vector<std::size_t> walls;
@@ -165,27 +199,23 @@ std::vector<std::size_t> FindWalls(const SurfaceMaps& maps, const cv::Mat& label
   return walls;
 }
 
-// Whether nine tenths of each label's samples are near one of the large planes.
-std::vector<bool> FindWithin(const SurfaceMaps& maps, const cv::Mat& labels,
-                             const std::vector<InversePlane>& fitted,
-                             const std::vector<std::size_t>& large,
-                             const DepthSegmentsConfig& config) {
-  std::vector<double> all(fitted.size());
-  std::vector<std::vector<double>> near(fitted.size(), std::vector<double>(large.size()));
-  ForEachSample(maps, labels, [&](const Sample& s) {
-    const auto label = static_cast<std::size_t>(s.label);
-    all[label] += 1;
-    const double near_m = NearPlane_m(s.sigma_m, 1 / s.q, maps.rays, config);
-    for (std::size_t i = 0; i < large.size(); ++i) {
-      if (std::abs(fitted[large[i]].Off_m(s)) <= near_m) near[label][i] += 1;
+// Whether nine tenths of each label's samples are near one of the large planes. A byte a label, as
+// threads write them side by side.
+std::vector<std::uint8_t> FindWithin(const SamplesByLabel& samples,
+                                     const std::vector<InversePlane>& fitted,
+                                     const std::vector<std::size_t>& large) {
+  std::vector<std::uint8_t> is_within(fitted.size());
+  samples.ForEachLabel([&](std::size_t label) {
+    const std::span<const Sample> of_label = samples.Of(label);
+    if (label == 0 || of_label.empty()) return;
+    for (const std::size_t plane : large) {
+      const auto near = std::count_if(of_label.begin(), of_label.end(), [&](const Sample& s) {
+        return std::abs(fitted[plane].Off_m(s)) <= s.near_m;
+      });
+      const auto all = static_cast<double>(of_label.size());
+      if (static_cast<double>(near) >= kWithinShare * all) is_within[label] = 1;
     }
   });
-  std::vector<bool> is_within(fitted.size());
-  for (std::size_t label = 1; label < fitted.size(); ++label) {
-    for (const double samples : near[label]) {
-      if (all[label] > 0 && samples >= kWithinShare * all[label]) is_within[label] = true;
-    }
-  }
   return is_within;
 }
 
@@ -193,13 +223,15 @@ std::vector<bool> FindWithin(const SurfaceMaps& maps, const cv::Mat& labels,
 
 std::vector<SegmentPlane> FitPlanes(const SurfaceMaps& maps, const cv::Mat& labels,
                                     std::int32_t end, const DepthSegmentsConfig& config) {
-  return Measure(maps, labels, FitInverse(maps, labels, end, config), config);
+  const SamplesByLabel samples(maps, labels, end, config);
+  return Measure(maps, samples, FitInverse(samples));
 }
 
 std::int32_t PartBackground(const SurfaceMaps& maps, const PixelLinks& links, const PartSize& least,
                             std::int32_t end, const DepthSegmentsConfig& config, cv::Mat& labels) {
-  const std::vector<InversePlane> fitted = FitInverse(maps, labels, end, config);
-  const std::vector<SegmentPlane> planes = Measure(maps, labels, fitted, config);
+  const SamplesByLabel samples(maps, labels, end, config);
+  const std::vector<InversePlane> fitted = FitInverse(samples);
+  const std::vector<SegmentPlane> planes = Measure(maps, samples, fitted);
   std::vector<std::size_t> large;
   std::vector<bool> is_large(planes.size());
   for (std::size_t label = 1; label < planes.size(); ++label) {
@@ -214,7 +246,7 @@ std::int32_t PartBackground(const SurfaceMaps& maps, const PixelLinks& links, co
     if (is_large[label]) large.push_back(label);
   }
   if (large.empty()) return end;
-  const std::vector<bool> is_within = FindWithin(maps, labels, fitted, large, config);
+  const std::vector<std::uint8_t> is_within = FindWithin(samples, fitted, large);
   cv::Mat off(labels.size(), CV_8UC1);
   ForEachRow(labels.rows, [&](int v) {
     auto* row = labels.ptr<std::int32_t>(v);
@@ -225,12 +257,12 @@ std::int32_t PartBackground(const SurfaceMaps& maps, const PixelLinks& links, co
     for (int u = 0; u < labels.cols; ++u) {
       is_off[u] = 0;
       const auto label = static_cast<std::size_t>(row[u]);
-      if (label == 0 || !(is_large[label] || is_within[label])) continue;
+      if (label == 0 || !(is_large[label] || is_within[label] != 0)) continue;
       row[u] = kBackgroundLabel;
       if (!is_large[label]) continue;
-      const Sample s{row[u], maps.rays.x[static_cast<std::size_t>(u)], y, q[u], sigma[u]};
-      const double near_m = NearPlane_m(s.sigma_m, 1 / s.q, maps.rays, config);
-      if (std::abs(fitted[label].Off_m(s)) > kOff * near_m) is_off[u] = 255;
+      const Sample s{maps.rays.x[static_cast<std::size_t>(u)], y, q[u],
+                     NearPlane_m(sigma[u], 1 / double{q[u]}, maps.rays, config)};
+      if (std::abs(fitted[label].Off_m(s)) > kOff * s.near_m) is_off[u] = 255;
     }
   });
   cv::Mat parts = cv::Mat::zeros(labels.size(), CV_32SC1);

@@ -21,10 +21,13 @@ std::vector<Overlaps> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted
   for (int v = 0; v < depth.rows; ++v) {
     const auto* segment = depth.ptr<InstanceId>(v);
     const auto* instance = painted.ptr<std::uint16_t>(v);
-    for (int u = 0; u < depth.cols; ++u) {
-      if (segment[u] == kNoInstance) continue;
-      if (segment[u] >= overlaps.size()) overlaps.resize(segment[u] + std::size_t{1});
-      ++overlaps[segment[u]][instance[u]];
+    for (int u = 0; u < depth.cols;) {
+      const int begin = u;
+      while (u < depth.cols && segment[u] == segment[begin] && instance[u] == instance[begin]) ++u;
+      const std::size_t of = segment[begin];
+      if (of == kNoInstance) continue;
+      if (of >= overlaps.size()) overlaps.resize(of + 1);
+      overlaps[of][instance[begin]] += u - begin;
     }
   }
   return overlaps;
@@ -120,14 +123,10 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
     auto* id = joined.ids.ptr<InstanceId>(v);
     const auto* instance = painted.ptr<std::uint16_t>(v);
     for (int u = 0; u < joined.ids.cols; ++u) {
-      if (id[u] == kNoInstance) {
-        // No segment's: an instance that is there has it.
-        id[u] = id_of_instance[instance[u]];
-      } else if (keeps_mask[instance[u]] && instance_of[id[u]] == 0) {
-        id[u] = id_of_instance[instance[u]];
-      } else {
-        id[u] = id_of[id[u]];
-      }
+      // An instance that is there has what is no segment's, and what its mask keeps of others.
+      const bool is_mask =
+          id[u] == kNoInstance || (keeps_mask[instance[u]] && instance_of[id[u]] == 0);
+      id[u] = is_mask ? id_of_instance[instance[u]] : id_of[id[u]];
     }
   }
   return joined;
