@@ -93,10 +93,15 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
       held[instance] += on.at(instance);
     }
   }
+  // Ids are as many as segments at most, and masks get what is left of them.
+  std::size_t ids = overlaps.size();
   std::vector<bool> keeps_mask(instances.size() + 1, false);
   for (std::size_t i = 1; i <= instances.size(); ++i) {
-    keeps_mask[i] =
-        instances[i - 1].score >= config.mask_score && 2 * held[i] < areas[i] && free[i] > 0;
+    const bool is_bare = 2 * held[i] < areas[i] && free[i] > 0;
+    if (instances[i - 1].score < config.mask_score || !is_bare) continue;
+    if (!is_found[i] && ids + 1 > kNoInstance) continue;
+    keeps_mask[i] = true;
+    ids += is_found[i] ? 0 : 1;
   }
 
   Segments joined;

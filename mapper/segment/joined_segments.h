@@ -27,10 +27,10 @@ cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size);
 // A segment's pixels that are `painted` (PaintInstances) as an instance's lie on it. Pixels of such
 // an instance that belong to no segment (kNoInstance) become its, too. An instance of at least
 // mask_score of which such segments hold less than half, as no segment lies on what is flat or
-// thin, has all its pixels but those that became another's. Segments that became no instance's are
-// unknown, or objects of their own with unknown_objects. Ids are numbered anew, those of
-// instances first, each in the order that it had. `of_masks`, where given, gets the ids of
-// instances that kept their masks.
+// thin, has all its pixels but those that became another's; where ids run out, the later ones are
+// left out. Segments that became no instance's are unknown, or objects of their own with
+// unknown_objects. Ids are numbered anew, those of instances first, each in the order that it had.
+// `of_masks`, where given, gets the ids of instances that kept their masks.
 Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
                       std::span<const Instance> instances, const NetworkConfig& config,
                       std::vector<InstanceId>* of_masks = nullptr);

@@ -98,6 +98,25 @@ TEST(JoinSegments, ASureInstanceWithoutSegmentsKeepsItsMask) {
   }
 }
 
+// Segments of two pixels, of each of which an instance has one: together more than there are ids.
+TEST(JoinSegments, IdsDoNotWrap) {
+  constexpr int kSegments = 40000;
+  cv::Mat depth(200, 2 * kSegments / 200, CV_16UC1);
+  std::vector<Instance> instances;
+  for (int i = 0; i < kSegments; ++i) {
+    const cv::Rect pair(2 * i % depth.cols, 2 * i / depth.cols, 2, 1);
+    depth(pair) = i + 1;
+    instances.push_back(BoxOf({pair.x, pair.y, 1, 1}, "cup", 1));
+  }
+  const Segments joined = Join(depth, instances);
+  EXPECT_EQ(joined.classes.size(), std::size_t{kNoInstance - 1 - kSegments});
+  EXPECT_EQ(joined.unknown.size(), std::size_t{kSegments});
+  EXPECT_EQ(joined.unknown.front(), joined.classes.size() + 1);
+  EXPECT_EQ(joined.unknown.back(), kNoInstance - 1);
+  EXPECT_EQ(joined.ids.at<InstanceId>(0, 0), 1);
+  EXPECT_EQ(joined.ids.at<InstanceId>(depth.rows - 1, depth.cols - 2), kNoInstance - 1);
+}
+
 // The rule for one segment, counted afresh for each pixel that asks.
 std::size_t InstanceByRule(const cv::Mat& depth, const cv::Mat& painted, InstanceId segment,
                            const NetworkConfig& config) {

@@ -1,0 +1,80 @@
+#!/usr/bin/python3
+"""The whole pipeline from pixels: scenes mapped with a Kinect's noise, segments of depth and our own network joined, ids by
+votes, objects tracked; beside it the same with the true masks.
+
+    /usr/bin/python3 scripts/pixels.py --out out/pixels [--scenes toycar3,tumble] [--program build/release/tsdfpp]
+
+Runs `tsdfpp compare` twice a scene and writes OUT/pixels.csv, a row a scene, of tsdf++/anchored at the examined frame:
+objects of the map that are true ones, of how many true ones, and those that are nobody's; the hidden table kept and the
+completion of the moving objects, from pixels and with true masks; the greatest unaligned ATE and rotation error of the objects
+that moved and were found.
+"""
+import argparse
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+
+SCENES = "contact,fast,handheld,reentry,stack,thin,toycar3"
+SENSOR = "nguyen2012+colour_noise"
+LONG = 1_000_000  # frames between evaluations: the examined frame alone
+
+
+def compare(program, scene, out, options):
+    command = [program, "compare", f"scenes/{scene}.toml", "--sensor", SENSOR, "--methods", "tsdf++/anchored", "--profiles",
+               "close", "--poses", "track", "--every", str(LONG), "--out", str(out), *options]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    run = json.loads((out / "summary.json").read_text())["runs"][0]
+    with open(out / "frames.csv", newline="") as file:
+        return run, list(csv.DictReader(file))[-1]
+
+
+def text(value, digits):
+    return "-" if value in (None, "") else f"{float(value):.{digits}f}"
+
+
+def worst(run, key, factor, digits):
+    """Of the objects that moved and were found, the greatest."""
+    values = [factor * track[key] for track in (run["trajectories"] or {}).values() if track.get(key) is not None]
+    return text(max(values), digits) if values else "-"
+
+
+def row_of(program, scene, out):
+    pixels, at_pixels = compare(program, scene, out / f"{scene}-pixels", ["--segmentation", "full"])
+    masks, at_masks = compare(program, scene, out / f"{scene}-masks", [])
+    matched = pixels["matched_ids"]
+    true = {entry["object"] for entry in matched if entry["object"] is not None}
+    objects = [entry for entry in pixels["examined"]["objects"] if entry["id"] != 0]
+    row = {"scene": scene, "objects found": f"{len(true)} of {len(objects)}",
+           "nobody's": str(sum(entry["object"] is None for entry in matched))}
+    for title, column in (("hidden table kept", "table_preservation_behind_other"), ("movers' completion", "movers_completion")):
+        row[f"{title}: from pixels"] = text(at_pixels[column], 3)
+        row[f"{title}: true masks"] = text(at_masks[column], 3)
+    for title, key, factor, digits in (("worst ATE, mm", "ate_rmse_m", 1e3, 1), ("worst rotation, deg", "rotation_rmse_deg", 1, 2)):
+        row[f"{title}: from pixels"] = worst(pixels, key, factor, digits)
+        row[f"{title}: true masks"] = worst(masks, key, factor, digits)
+    return row
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--scenes", default=SCENES)
+    parser.add_argument("--program", default="build/release/tsdfpp")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for scene in options.scenes.split(","):
+        rows.append(row_of(options.program, scene, options.out))
+        print(", ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
+    part = options.out / "pixels.csv.part"
+    with open(part, "w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    part.rename(options.out / "pixels.csv")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
