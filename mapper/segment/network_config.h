@@ -37,7 +37,7 @@ struct NetworkConfig {
                     // 0: the frame waits for it; at most `every`
   double join_overlap = 0.8;     // tau_overlap of paper III-B
   double join_iou = 0.5;         // 1: never by this
-  double mask_score = 0.8;       // an instance that is less sure needs segments
+  double mask_score = 0.7;       // an instance that is less sure needs segments
   bool unknown_objects = false;  // segments that no instance claims are objects, as in III-B
 
   // Errors: kUsage, naming the field, what was found and what was expected.
