@@ -190,6 +190,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     }
   } else if (until >= 0) {
     return UsageError("--until {} needs a sequence to map", until);
+  } else if (source.scene.IsAny()) {
+    return UsageError("{} needs a scene to map", source.scene.seed ? "--seed" : "--sensor");
   } else if (wishes.track.tracked != TrackChoice::kAuto || wishes.track.config) {
     return UsageError("{} needs a sequence to map",
                       wishes.track.config ? "--track-config" : "--track");

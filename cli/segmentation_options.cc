@@ -29,14 +29,24 @@ Expected<std::shared_ptr<InstanceFinder>> FinderOf(const SegmentationOptions& op
   return loaded;
 }
 
-// Masks on disk are there already: what a network's settings say of finding them is of no use.
-Expected<void> CheckSettingsOfMasks(const toml::table& settings, const std::string& where) {
-  constexpr std::array kOfMasks{"every",    "latency",    "join_overlap",
-                                "join_iou", "mask_score", "unknown_objects"};
+constexpr std::array kOfFull{"latency", "join_overlap", "join_iou", "mask_score",
+                             "unknown_objects"};
+
+bool IsOfFull(std::string_view key) {
+  return std::find(kOfFull.begin(), kOfFull.end(), key) != kOfFull.end();
+}
+
+// Those that are of no use: of joining where nothing is joined, and of finding masks that are there
+// already.
+Expected<void> CheckSettings(const toml::table& settings, const std::string& where, bool is_full,
+                             bool is_of_masks) {
   for (const auto& [key, value] : settings) {
-    if (std::find(kOfMasks.begin(), kOfMasks.end(), key.str()) != kOfMasks.end()) continue;
-    return UsageError("{}: '{}' is a setting of networks, expected with --masks: {}", where,
-                      key.str(), fmt::join(kOfMasks, ", "));
+    if (!is_full && IsOfFull(key.str())) {
+      return UsageError("{}: '{}' is a setting of --segmentation full", where, key.str());
+    }
+    if (!is_of_masks || key.str() == "every" || IsOfFull(key.str())) continue;
+    return UsageError("{}: '{}' is a setting of networks, expected with --masks: every, {}", where,
+                      key.str(), fmt::join(kOfFull, ", "));
   }
   return {};
 }
@@ -107,13 +117,8 @@ Expected<SegmenterParts> ReadSegmenterParts(const SegmentationOptions& options,
   if (!options.network_config.empty()) {
     TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.network_config));
     TSDFPP_ASSIGN(parts.network, NetworkConfig::FromToml(table, options.network_config));
-    if (parts.network.latency > 0 && !uses_depth) {
-      return UsageError("{}: 'latency' is {}, expected 0 for --segmentation network",
-                        options.network_config, parts.network.latency);
-    }
-    if (!options.masks.empty()) {
-      TSDFPP_RETURN_IF_ERROR(CheckSettingsOfMasks(table, options.network_config));
-    }
+    TSDFPP_RETURN_IF_ERROR(
+        CheckSettings(table, options.network_config, uses_depth, !options.masks.empty()));
   }
   TSDFPP_ASSIGN(parts.finder, FinderOf(options, parts.network));
   return parts;

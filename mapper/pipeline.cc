@@ -154,7 +154,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   StopWatch watch;
   TSDFPP_ASSIGN(const Segments segments, Segment(given));
   times.segment_s = watch.Lap();
-  const std::optional<Frame> frame = camera_->Locate(given, segments.ids, *map_);
+  const std::optional<Frame> frame = camera_->Locate(given, segments.IdsOfObjects(), *map_);
   times.locate_s = watch.Lap();
   if (!frame) return times;
   const AssociatedObjects association = associator_->Associate(*frame, segments, *map_);

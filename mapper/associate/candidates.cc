@@ -118,7 +118,7 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
     } else {
       --room;
     }
-    candidate.seen.push_back(frame_);
+    if (may_begin[s]) candidate.seen.push_back(frame_);
     while (candidate.seen.front() <= frame_ - config_.confirm_window) candidate.seen.pop_front();
     if (static_cast<int>(candidate.seen.size()) >= config_.confirm_frames) {
       candidacies[s] = Candidacy::kIsConfirmed;
@@ -126,12 +126,10 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
     }
     candidacies[s] = Candidacy::kWaits;
     candidate.cells = CellsOf(segments_W[s]);
-    left.push_back(std::move(candidate));
+    if (!IsOver(candidate)) left.push_back(std::move(candidate));
   }
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
-    // The next frame's window does not reach back to it.
-    if (is_taken[c] || candidates_[c].seen.back() <= frame_ - config_.confirm_window + 1) continue;
-    left.push_back(std::move(candidates_[c]));
+    if (!is_taken[c] && !IsOver(candidates_[c])) left.push_back(std::move(candidates_[c]));
   }
   candidates_ = std::move(left);
   return candidacies;

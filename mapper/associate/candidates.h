@@ -31,13 +31,14 @@ class Candidates {
   };
 
   // Takes in the unclaimed segments of the next frame, each the points that it shows in the world's
-  // frame, and whether it may begin a candidate; the others can but be one that there is. Says what
-  // each is. It is confirmed where it and its candidate were there, with min_points or more, in
-  // confirm_frames of the last confirm_window frames. Who is confirmed is a candidate no longer,
-  // and who cannot be any more is forgotten. A candidate is one segment of a frame at most: pairs
-  // with the greatest overlap (that share times the share of the candidate's cells that are near
-  // the segment's) are made first, and of a segment's only the kMostPairs greatest are looked at.
-  // While there are kMostCandidates, no segment becomes a further one.
+  // frame, and whether it may begin a candidate; the others can but be one that there is, which
+  // waits on, and are not counted. Says what each is. It is confirmed where it and its candidate
+  // were there, with min_points or more, in confirm_frames of the last confirm_window frames. Who
+  // is confirmed is a candidate no longer, and who cannot be any more is forgotten. A candidate is
+  // one segment of a frame at most: pairs with the greatest overlap (that share times the share of
+  // the candidate's cells that are near the segment's) are made first, and of a segment's only the
+  // kMostPairs greatest are looked at. While there are kMostCandidates, no segment becomes a
+  // further one.
   std::vector<Candidacy> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
                                  const std::vector<bool>& may_begin);
 
@@ -61,6 +62,10 @@ class Candidates {
     std::size_t candidate = 0;
   };
   static bool OverlapsMore(const Pair& a, const Pair& b) { return a.overlap > b.overlap; }
+  // Whether the next frame's window does not reach back to it.
+  bool IsOver(const Candidate& candidate) const {
+    return candidate.seen.back() <= frame_ - config_.confirm_window + 1;
+  }
   std::vector<Index3> CellsOf(const std::vector<Eigen::Vector3d>& points_W) const;
   // The candidates that a segment can be, at most kMostPairs; `index` has all cells, sorted.
   std::vector<Pair> PairsOf(std::size_t segment, const std::vector<Eigen::Vector3d>& points_W,

@@ -157,6 +157,12 @@ void VoxelVotes::FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segm
   }
 }
 
+bool VoxelVotes::IsPartlyAnObject(const Segment& segment) const {
+  return std::any_of(segment.votes.begin(), segment.votes.end(), [&](const Votes& votes) {
+    return IsShare(votes.at, config_.cut_share, segment.points_W.size());
+  });
+}
+
 void VoxelVotes::GiveBirth(std::vector<Segment>& segments, double voxel_m) {
   std::vector<Segment*> unclaimed;
   std::vector<std::vector<Eigen::Vector3d>> points_W;
@@ -171,7 +177,9 @@ void VoxelVotes::GiveBirth(std::vector<Segment>& segments, double voxel_m) {
   using enum Candidates::Candidacy;
   const auto candidacies = next_.candidates->Confirm(points_W, is_known);
   for (std::size_t i = 0; i < unclaimed.size(); ++i) {
-    if (candidacies[i] == kNone && !is_known[i]) unclaimed[i]->label = kBackground;
+    if (candidacies[i] == kNone && !is_known[i] && !IsPartlyAnObject(*unclaimed[i])) {
+      unclaimed[i]->label = kBackground;
+    }
     if (candidacies[i] != kIsConfirmed) continue;
     if (next_.next_id >= kNoInstance) {
       next_.refused_birth = true;

@@ -36,8 +36,9 @@ class VoxelVotes : public Associator {
   //     segment enters the map) until Candidates confirm it, and then a new object. Ids count up
   //     and are never used again; after the last one, kNoInstance - 1, nothing is born any more,
   //     and Remarks() says so.
-  //     Segments that are unknown (Segments::unknown) may become the candidate that a known one was
-  //     before, but begin none: else they are background.
+  //     Segments that are unknown (Segments::unknown) may be the candidate that a known one was
+  //     before, which waits on, but begin none. Else they are background, or held back where
+  //     cut_share of their points vote for one object.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
@@ -72,6 +73,8 @@ class VoxelVotes : public Associator {
   void Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   void ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   void FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
+  // Whether cut_share of its points vote for one object.
+  bool IsPartlyAnObject(const Segment& segment) const;
   void GiveBirth(std::vector<Segment>& segments, double voxel_m);
   void Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
            cv::Mat& labels) const;

@@ -14,6 +14,7 @@
 #include "mapper/network/coco_classes.h"
 #include "mapper/network/mask_rcnn.h"
 #include "mapper/network/own_network.h"
+#include "mapper/network/quiet_opencv.h"
 #include "mapper/network/yolo_masks.h"
 
 namespace tsdfpp {
@@ -32,11 +33,11 @@ constexpr int kYoloSide_px = 640;
 constexpr double kYoloGrey = 114;
 constexpr const char* kOwnClass = "thing";
 
-// What OpenCV throws, as words.
-template <typename Function>
+// What OpenCV throws, as words; it also prints that, which is kept from whoever reads stderr by
+// `Quiet`: QuietOpenCv, or QuietStderr where libraries below OpenCV print, too.
+template <typename Quiet, typename Function>
 Expected<void> InOpenCv(std::string_view what, const Function& function) {
-  // It also prints what it throws.
-  const QuietStderr quiet;
+  const Quiet quiet;
   try {
     function();
   } catch (const cv::Exception& error) {
@@ -90,7 +91,7 @@ class NetworkFinder : public InstanceFinder {
   Expected<std::vector<cv::Mat>> Run(const Frame& frame, const cv::Mat& blob,
                                      const std::vector<std::string>& names) {
     std::vector<cv::Mat> outputs;
-    TSDFPP_RETURN_IF_ERROR(InOpenCv(
+    TSDFPP_RETURN_IF_ERROR(InOpenCv<QuietOpenCv>(
         fmt::format("frame {}: OpenCV cannot run the network {}", frame.index, loaded_.name), [&] {
           loaded_.net.setInput(blob);
           loaded_.net.forward(outputs, names);
@@ -275,11 +276,11 @@ Expected<std::unique_ptr<InstanceFinder>> LoadInstanceNetwork(const fs::path& fi
     const fs::path graph =
         config.graph.empty() ? fs::path(file).replace_extension(".pbtxt") : fs::path(config.graph);
     TSDFPP_RETURN_IF_ERROR(CheckNetworkFile(graph));
-    TSDFPP_RETURN_IF_ERROR(InOpenCv(
+    TSDFPP_RETURN_IF_ERROR(InOpenCv<QuietStderr>(
         what, [&] { loaded.net = cv::dnn::readNetFromTensorflow(file.string(), graph.string()); }));
   } else {
     TSDFPP_RETURN_IF_ERROR(
-        InOpenCv(what, [&] { loaded.net = cv::dnn::readNetFromONNX(file.string()); }));
+        InOpenCv<QuietStderr>(what, [&] { loaded.net = cv::dnn::readNetFromONNX(file.string()); }));
   }
   if (loaded.net.empty()) return DataError("{}: the network has no layers", file.string());
   return MakeFinder(std::move(loaded), std::move(config));
@@ -295,7 +296,7 @@ Expected<std::unique_ptr<InstanceFinder>> OwnInstanceNetwork(const NetworkConfig
   config.format = NetworkFormat::kCentres;
   const auto bytes = OwnNetworkFile();
   LoadedNet loaded{{}, "of tsdfpp", {}};
-  TSDFPP_RETURN_IF_ERROR(InOpenCv("OpenCV cannot read our own network", [&] {
+  TSDFPP_RETURN_IF_ERROR(InOpenCv<QuietStderr>("OpenCV cannot read our own network", [&] {
     loaded.net =
         cv::dnn::readNetFromONNX(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }));

@@ -24,8 +24,9 @@ class InstanceFinder {
   virtual ~InstanceFinder() = default;
 
   // The instances that the frame shows, in any order, which may overlap; the same for the same
-  // frame. Segmenters that share a finder may call it at the same time, and each from any thread.
-  // Errors: kData, a sentence that begins with the frame's number.
+  // frame. It may lack its mask and the objects' poses. Segmenters that share a finder may call it
+  // at the same time, and each from any thread. Errors: kData, a sentence that begins with the
+  // frame's number.
   virtual Expected<std::vector<Instance>> Find(const Frame& frame) = 0;
 };
 

@@ -33,6 +33,19 @@ std::vector<Overlaps> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted
   return overlaps;
 }
 
+// By place and 1: painted instances of which `areas` knows no pixel, as all are of parts too small
+// to be segments.
+std::vector<bool> FindLone(const cv::Mat& painted, std::span<const std::int64_t> areas) {
+  std::vector<bool> is_lone(areas.size(), false);
+  for (int v = 0; v < painted.rows; ++v) {
+    const auto* row = painted.ptr<std::uint16_t>(v);
+    for (int u = 0; u < painted.cols; ++u) {
+      if (row[u] != 0 && areas[row[u]] == 0) is_lone[row[u]] = true;
+    }
+  }
+  return is_lone;
+}
+
 // The instance that has more than join_overlap of a segment, or that with it has more than join_iou
 // in common; 0 where there is none. `areas` are the instances' pixels by place and 1.
 std::size_t InstanceOf(const Overlaps& overlaps, std::span<const std::int64_t> areas,
@@ -80,6 +93,7 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
   for (const Overlaps& on : overlaps) {
     for (const auto& [instance, count] : on) areas[instance] += count;
   }
+  const std::vector<bool> is_lone = FindLone(painted, areas);
   std::vector<std::size_t> instance_of(overlaps.size(), 0);
   std::vector<bool> is_found(instances.size() + 1, false);
   for (std::size_t segment = kBackground; segment < overlaps.size(); ++segment) {
@@ -97,7 +111,7 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
   std::size_t ids = overlaps.size();
   std::vector<bool> keeps_mask(instances.size() + 1, false);
   for (std::size_t i = 1; i <= instances.size(); ++i) {
-    const bool is_bare = 2 * held[i] < areas[i] && free[i] > 0;
+    const bool is_bare = is_lone[i] || (2 * held[i] < areas[i] && free[i] > 0);
     if (instances[i - 1].score < config.mask_score || !is_bare) continue;
     if (!is_found[i] && ids + 1 > kNoInstance) continue;
     keeps_mask[i] = true;
@@ -139,11 +153,13 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
 
 Expected<Segments> InstanceSegments::Segment(const Frame& frame) {
   Segments segments;
-  if (frames_++ % config_.every != 0) {
+  if (frames_ % config_.every != 0) {
+    ++frames_;
     segments.ids = cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(kNoInstance));
     return segments;
   }
   TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
+  ++frames_;
   segments.ids = PaintInstances(instances, frame.depth.size());
   for (std::size_t i = 0; i < instances.size(); ++i) {
     segments.classes[static_cast<InstanceId>(i + 1)] = instances[i].semantic_class;
@@ -152,32 +168,49 @@ Expected<Segments> InstanceSegments::Segment(const Frame& frame) {
 }
 
 const Segments& KnownSegments::Set(const cv::Mat& depth, std::span<const Instance> instances) {
-  of_masks_.clear();
-  last_ =
-      JoinSegments(depth, PaintInstances(instances, depth.size()), instances, config_, &of_masks_);
-  return last_;
+  return Join(depth, PaintInstances(instances, depth.size()), instances, config_);
 }
 
 const Segments& KnownSegments::Carry(const cv::Mat& depth) {
+  if (depth.size() != last_depth_.size()) return Set(depth, {});
   // Those of instances have the first ids, so that an id is an instance's place and 1.
   std::vector<Instance> instances;
+  std::vector<bool> is_mask{false};
   for (const auto& [id, name] : last_.classes) {
-    const bool is_mask = std::binary_search(of_masks_.begin(), of_masks_.end(), id);
-    instances.push_back({{}, {}, name, is_mask ? 1.F : -1.F});
+    is_mask.push_back(std::binary_search(of_masks_.begin(), of_masks_.end(), id));
+    instances.push_back({{}, {}, name, is_mask.back() ? 1.F : -1.F});
   }
+  // What is no instance's is left out, and what was filled up, as it moves with nothing.
   cv::Mat painted = last_.ids.clone();
-  painted.setTo(cv::Scalar(0), painted > static_cast<double>(instances.size()));
-  of_masks_.clear();
+  for (int v = 0; v < painted.rows; ++v) {
+    auto* id = painted.ptr<InstanceId>(v);
+    const auto* before = last_depth_.ptr<InstanceId>(v);
+    for (int u = 0; u < painted.cols; ++u) {
+      if (id[u] > instances.size() || (before[u] == kNoInstance && !is_mask[id[u]])) id[u] = 0;
+    }
+  }
   // What moved on lies half beside itself at worst.
   NetworkConfig config = config_;
   config.join_overlap = kCarriedOverlap;
+  return Join(depth, painted, instances, config);
+}
+
+const Segments& KnownSegments::Join(const cv::Mat& depth, const cv::Mat& painted,
+                                    std::span<const Instance> instances,
+                                    const NetworkConfig& config) {
+  of_masks_.clear();
   last_ = JoinSegments(depth, painted, instances, config, &of_masks_);
+  last_depth_ = depth;
   return last_;
 }
 
 JoinedSegments::Search JoinedSegments::Begin(const Frame& frame) const {
-  // Its images are its own: who gave the frame may write into them.
-  Frame copy = frame;
+  // What a network sees, in images of its own: who gave the frame may write into them.
+  Frame copy;
+  copy.index = frame.index;
+  copy.time_s = frame.time_s;
+  copy.intrinsics = frame.intrinsics;
+  copy.T_WC = frame.T_WC;
   copy.depth = frame.depth.clone();
   copy.colour = frame.colour.clone();
   Search search;
@@ -197,8 +230,11 @@ Expected<void> JoinedSegments::Take(Search search) {
 
 Expected<Segments> JoinedSegments::Segment(const Frame& frame) {
   TSDFPP_ASSIGN(const Segments depth, depth_.Segment(frame));
-  const bool is_asked = frames_ % config_.every == 0;
-  if (is_asked && (config_.latency == 0 || frames_ == 0)) {
+  // Nothing is known of the first image, nor is it carried to one of another size.
+  const bool is_first = depth.ids.size() != known_.last().ids.size();
+  const bool is_asked = is_first || frames_ % config_.every == 0;
+  if (is_first) search_.reset();
+  if (is_first || (is_asked && config_.latency == 0)) {
     TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
     ++frames_;
     return known_.Set(depth.ids, instances);

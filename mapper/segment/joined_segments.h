@@ -24,8 +24,9 @@ cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size);
 //    that a thing in parts becomes one;
 //  - or where the two have more than join_iou in common, pixels of both by pixels of either: then
 //    they are the same thing, whatever the mask lacks.
-// A segment's pixels that are `painted` (PaintInstances) as an instance's lie on it. Pixels of such
-// an instance that belong to no segment (kNoInstance) become its, too. An instance of at least
+// A segment's pixels that are `painted` (PaintInstances) as an instance's lie on it. Counted are
+// pixels that a segment or the background has; the others of such an instance (kNoInstance) become
+// its, too. An instance of at least
 // mask_score of which such segments hold less than half, as no segment lies on what is flat or
 // thin, has all its pixels but those that became another's; where ids run out, the later ones are
 // left out. Segments that became no instance's are unknown, or objects of their own with
@@ -62,14 +63,19 @@ class KnownSegments {
   const Segments& Set(const cv::Mat& depth, std::span<const Instance> instances);
   // Those of the next frame, of which no instances are known: as if the segments that the last one
   // had of instances were instances of this one, which are joined with the segments of this one's
-  // depth that lie on them by more than half. A mask stays where it was.
+  // depth that lie on them by more than half. A mask stays where it was. Nothing is known where the
+  // last one was of another size, or there was none.
   const Segments& Carry(const cv::Mat& depth);
 
   const Segments& last() const { return last_; }
 
  private:
+  const Segments& Join(const cv::Mat& depth, const cv::Mat& painted,
+                       std::span<const Instance> instances, const NetworkConfig& config);
+
   NetworkConfig config_;
   Segments last_;
+  cv::Mat last_depth_;
   std::vector<InstanceId> of_masks_;
 };
 
@@ -84,7 +90,8 @@ class JoinedSegments : public Segmenter {
   // With config.every above 1 what is known is carried over the frames between (KnownSegments).
   // With config.latency above 0 the finder runs beside them on a thread of its own, and what it
   // found in a frame becomes known so many frames later, carried up to there; whoever comes early
-  // waits for it. In the first frame all wait. Errors: those of DepthSegments and of the finder,
+  // waits for it. The first frame waits, and one of another size than the last, where all begins
+  // anew. Errors: those of DepthSegments and of the finder,
   // whose error comes with the frame in which its instances would.
   Expected<Segments> Segment(const Frame& frame) override;
 

@@ -18,13 +18,13 @@ namespace tsdfpp {
 struct Segments {
   // The segment of each pixel: CV_16UC1 of the depth image's size; kBackground is what the room is
   // made of, kNoInstance what belongs to no segment and is not fused. May share its pixels with the
-  // frame.
+  // frame, or with what the segmenter remembers: nobody writes into them.
   cv::Mat ids;
   // The semantic class of those segments of which it is known, never an empty one; perhaps of
   // segments that the frame lacks, too.
   std::map<InstanceId, std::string> classes{};
-  // Segments, in ascending order, that make no object, since a network knows none there: they
-  // belong to one that the map has, or are background.
+  // Segments, in ascending order, that begin no object, since a network knows none there: they
+  // belong to one that the map has or will have, or are background.
   std::vector<InstanceId> unknown{};
 
   // The ids with the background in the place of those that are unknown; may be `ids` itself.
@@ -35,7 +35,8 @@ class Segmenter {
  public:
   virtual ~Segmenter() = default;
 
-  // Errors: kData, a sentence that begins with the frame's number.
+  // Frames come in order; one counts whether or not what follows accepts it. Errors: kData, a
+  // sentence that begins with the frame's number.
   virtual Expected<Segments> Segment(const Frame& frame) = 0;
 };
 

@@ -71,7 +71,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     after.seen[turn.id] = turn.status;
     if (turn.motion) after.motions[turn.id] = *turn.motion;
     if (turn.status == TrackStatus::kBegun) after.T_WO.try_emplace(turn.id, Pose::Identity());
-    if (turn.T_WO) after.T_WO[turn.id] = *turn.T_WO;
+    if (turn.moved_to) after.T_WO[turn.id] = *turn.moved_to;
   }
   return after;
 }
@@ -98,7 +98,7 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
   turn.status = TrackStatus::kTracked;
   turn.motion = registered->motion;
   if (SameNumbers(registered->T_WL, model->T_WL)) return;  // at rest
-  turn.T_WO = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
+  turn.moved_to = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
 }
 
 std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,

@@ -72,7 +72,7 @@ class SdfTracker : public Tracker {
     Memory* memory = nullptr;
     TrackStatus status = TrackStatus::kFrozen;
     std::optional<MotionUncertainty> motion{};
-    std::optional<Pose> T_WO{};  // nothing where it stays where it was
+    std::optional<Pose> moved_to{};  // its pose T_WO; nothing where it stays where it was
   };
 
   // May run beside the turns of other objects.

@@ -211,7 +211,7 @@ TEST_F(SegmentCommand, RefusesWithOneSentence) {
           recording);
   ASSERT_TRUE(WriteFile(folder_ / "network.toml", "every = 3\nlatency = 2\n").has_value());
   refused({"--segmentation", "network", "--network-config", folder_ / "network.toml"}, kUsage,
-          "'latency' is 2, expected 0 for --segmentation network", recording);
+          "'latency' is a setting of --segmentation full", recording);
   refused({"--sensor", "nguyen2012"}, kUsage, "is a sequence; a sensor and a seed are for scenes",
           recording);
   refused({"--seed", "3"}, kUsage, "is a sequence; a sensor and a seed are for scenes", recording);

@@ -57,18 +57,16 @@ class PlainCandidates {
       if (!candidate_of.contains(s) && !may_begin[s]) continue;
       Candidate candidate;
       if (candidate_of.contains(s)) candidate = candidates_[candidate_of[s]];
-      candidate.seen.push_back(frame_);
+      if (may_begin[s]) candidate.seen.push_back(frame_);
       candidate.points_W = segments_W[s];
       const bool is_confirmed =
           SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames;
       candidacies[s] = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
-      if (!is_confirmed) left.push_back(candidate);
+      if (!is_confirmed && IsInNextWindow(candidate)) left.push_back(candidate);
     }
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (taken.contains(c)) continue;
-      if (SeenSince(candidates_[c], frame_ + 1 - config_.confirm_window + 1) > 0) {
-        left.push_back(candidates_[c]);
-      }
+      if (IsInNextWindow(candidates_[c])) left.push_back(candidates_[c]);
     }
     candidates_ = left;
     return candidacies;
@@ -83,6 +81,9 @@ class PlainCandidates {
   };
   bool IsLarge(const Points& points_W) const {
     return points_W.size() >= static_cast<std::size_t>(config_.min_points);
+  }
+  bool IsInNextWindow(const Candidate& candidate) const {
+    return SeenSince(candidate, frame_ + 1 - config_.confirm_window + 1) > 0;
   }
   static std::ptrdiff_t SeenSince(const Candidate& candidate, int frame) {
     return std::count_if(candidate.seen.begin(), candidate.seen.end(),

@@ -1,5 +1,6 @@
 // Association by votes (paper III-C) in analytic worlds: one id for each object whatever the masks
 // call it, merged and split masks, objects that leave and come back, and what is hardly there.
+// Longer than most files: one world, and every rule of one class.
 #include "mapper/associate/voxel_votes.h"
 
 #include <gtest/gtest.h>
@@ -266,15 +267,16 @@ TEST(VoxelVotes, UnknownSegmentsMakeNoObject) {
   EXPECT_TRUE(MapToBytes(world.map()).value() == MapToBytes(without.map()).value());
 }
 
-// A network that looks at every second frame: what waits to be an object is not fused between.
+// A network that finds a thing in every second frame: what waits to be an object is not fused
+// between, nor do those frames count.
 TEST(VoxelVotes, AnUnknownSegmentOfACandidateWaitsWithIt) {
   ToyVotes world;
-  for (int i = 0; i < kConfirmed; ++i) {
+  for (int i = 0; i < 2 * kConfirmed - 1; ++i) {
     const Frame frame = RenderToys(TableWithToys(), 0.3, i);
     const std::vector<InstanceId> all{1, 2, 3};
     const cv::Mat labels =
         world.Map(frame, {frame.mask, {}, i % 2 == 0 ? std::vector<InstanceId>{} : all});
-    const bool is_born = i + 1 == kConfirmed;
+    const bool is_born = i == 2 * (kConfirmed - 1);
     EXPECT_EQ(CountOf(labels, kNoInstance), is_born ? 0 : cv::countNonZero(frame.mask)) << i;
   }
   EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
