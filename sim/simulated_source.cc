@@ -116,11 +116,4 @@ Expected<Frame> SimulatedSource::ReadTrue(int index) {
   return TrueFrame(sensed);
 }
 
-Expected<std::unique_ptr<FrameSource>> OpenScene(const std::filesystem::path& toml,
-                                                 const SimOptions& options) {
-  TSDFPP_ASSIGN(const SceneConfig config, LoadSceneConfig(toml));
-  TSDFPP_ASSIGN(std::unique_ptr<SimulatedSource> source, SimulatedSource::Open(config, options));
-  return source;
-}
-
 }  // namespace tsdfpp

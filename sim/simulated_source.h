@@ -71,10 +71,4 @@ class SimulatedSource final : public FrameSource {
   std::optional<Frame> last_true_;  // of the frame that Read() gave last, where it differs
 };
 
-// Opens scenes/<name>.toml (with a seed of the caller's: LoadSceneConfig, then Open). Errors:
-// kUsage where the file is missing or wrong (scene_config.h), kEnvironment where the machine cannot
-// render (gl_context.h).
-Expected<std::unique_ptr<FrameSource>> OpenScene(const std::filesystem::path& toml,
-                                                 const SimOptions& options = {});
-
 }  // namespace tsdfpp

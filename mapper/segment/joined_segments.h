@@ -26,12 +26,12 @@ cv::Mat PaintInstances(std::span<const Instance> instances, cv::Size size);
 //    they are the same thing, whatever the mask lacks.
 // A segment's pixels that are `painted` (PaintInstances) as an instance's lie on it. Counted are
 // pixels that a segment or the background has; the others of such an instance (kNoInstance) become
-// its, too. An instance of at least
-// mask_score of which such segments hold less than half, as no segment lies on what is flat or
-// thin, has all its pixels but those that became another's; where ids run out, the later ones are
-// left out. Segments that became no instance's are unknown, or objects of their own with
-// unknown_objects. Ids are numbered anew, those of instances first, each in the order that it had.
-// `of_masks`, where given, gets the ids of instances that kept their masks.
+// its, too. An instance of at least mask_score of which such segments hold less than half, as no
+// segment lies on what is flat or thin, or which has no pixel that is counted, has all its pixels
+// but those that became another's; where ids run out, the later ones are left out. Segments that
+// became no instance's are unknown, or objects of their own with unknown_objects. Ids are numbered
+// anew, those of instances first, each in the order that it had. `of_masks`, where given, gets the
+// ids of instances that kept their masks.
 Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
                       std::span<const Instance> instances, const NetworkConfig& config,
                       std::vector<InstanceId>* of_masks = nullptr);
@@ -91,8 +91,8 @@ class JoinedSegments : public Segmenter {
   // With config.latency above 0 the finder runs beside them on a thread of its own, and what it
   // found in a frame becomes known so many frames later, carried up to there; whoever comes early
   // waits for it. The first frame waits, and one of another size than the last, where all begins
-  // anew. Errors: those of DepthSegments and of the finder,
-  // whose error comes with the frame in which its instances would.
+  // anew. Errors: those of DepthSegments and of the finder, whose error comes with the frame in
+  // which its instances would.
   Expected<Segments> Segment(const Frame& frame) override;
 
  private:

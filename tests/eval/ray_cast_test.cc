@@ -8,11 +8,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "eval/picture/map_views.h"
+#include "eval/run/open_source.h"
 #include "eval/score/scene_sanity.h"
 #include "eval/score/scene_seams.h"
 #include "eval/tools/rasteriser.h"
 #include "mapper/map_representation.h"
-#include "sim/simulated_source.h"
 #include "tests/core/temp_folder.h"
 #include "tests/reference/analytic_scene.h"
 
@@ -36,7 +36,7 @@ class ToyCarRays : public ::testing::Test {
   static void SetUpTestSuite() {
     const std::filesystem::path scene =
         std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes" / "toycar3.toml";
-    auto source = OpenScene(scene);
+    auto source = OpenSource(scene);
     if (!source) return;
     frames_ = new std::deque<Frame>;
     for (int i = 0; i < kFrames; ++i) {

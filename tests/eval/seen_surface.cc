@@ -3,13 +3,13 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "eval/run/open_source.h"
 #include "metrics/visibility.h"
-#include "sim/simulated_source.h"
 
 namespace tsdfpp {
 Expected<FrameSet> ReadFrames(const std::string& scene, int step, int last) {
   const auto path = std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes" / (scene + ".toml");
-  TSDFPP_ASSIGN(auto source, OpenScene(path));
+  TSDFPP_ASSIGN(auto source, OpenSource(path));
   FrameSet set;
   set.info = source->info();
   const int end = last > 0 ? last : set.info.first_index + set.info.frame_count - 1;

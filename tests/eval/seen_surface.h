@@ -18,7 +18,7 @@ struct FrameSet {
 };
 
 // Frames `first`, `first + step`, ... up to `last` at most (the sequence's last where `last` is 0)
-// of scenes/<scene>.toml. Errors: those of OpenScene and of the source.
+// of scenes/<scene>.toml. Errors: those of OpenSource and of the source.
 Expected<FrameSet> ReadFrames(const std::string& scene, int step, int last = 0);
 
 // Samples of `mesh_W`, one a square centimetre, that three frames at least saw from the front and

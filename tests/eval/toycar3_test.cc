@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "eval/compare/compare.h"
-#include "sim/simulated_source.h"
+#include "eval/run/open_source.h"
 
 namespace tsdfpp {
 namespace {
@@ -20,7 +20,7 @@ constexpr int kEvery = 128;  // frames between evaluations, the last one at the 
 TEST(ToyCar3, LayeredMapsKeepTheTableUnderTheCars) {
   const std::filesystem::path scene =
       std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes" / "toycar3.toml";
-  auto source = OpenScene(scene);
+  auto source = OpenSource(scene);
   ASSERT_TRUE(source.has_value()) << source.error().message;
   const std::filesystem::path out =
       std::filesystem::path(testing::TempDir()) / fmt::format("tsdfpp-toycar3-{}", getpid());
