@@ -18,6 +18,7 @@
 #include "bench/rays.h"
 #include "bench/released.h"
 #include "bench/render.h"
+#include "bench/returns.h"
 #include "bench/scaling.h"
 #include "bench/segment.h"
 #include "bench/side_by_side.h"
@@ -167,6 +168,21 @@ void AddTrack(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunTrackBench(*options); }; });
 }
 
+void AddReturns(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<ReturnBenchOptions>();
+  CLI::App* command = app.add_subcommand(
+      "returns", "Whether objects that go out of sight come back under their ids, as CSV");
+  command->add_option("--out", options->out, "Output folder")->required();
+  AddCount(command, "--cases", options->cases, "In which objects come back", 1, 100000);
+  AddCount(command, "--first-seed", options->first_seed, "Of the first case", 0, 1000000);
+  command->add_option("--depth", options->depth, "exact or noise")
+      ->check(CLI::IsMember({"exact", "noise"}))
+      ->capture_default_str();
+  command->add_option("--method", options->method, "The map")->capture_default_str();
+  command->add_option("--track-config", options->settings, "Settings of the tracker, TOML");
+  command->callback([=, &chosen] { chosen = [=] { return RunReturnBench(*options); }; });
+}
+
 void AddCamera(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<CameraBenchOptions>();
   CLI::App* command =
@@ -238,6 +254,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddReleased(app, chosen);
   tsdfpp::AddSegment(app, chosen);
   tsdfpp::AddTrack(app, chosen);
+  tsdfpp::AddReturns(app, chosen);
   tsdfpp::AddCamera(app, chosen);
   tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });

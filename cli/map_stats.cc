@@ -23,7 +23,10 @@ nlohmann::json TrackingJson(const MapStart& start) {
                        {"last_frame", span.last},
                        {"tracked_frames", span.tracked},
                        {"stayed_frames", span.stayed},
-                       {"frozen_frames", span.frozen}});
+                       {"frozen_frames", span.frozen},
+                       {"times_lost", span.lost},
+                       {"times_found", span.found},
+                       {"times_begun_anew", span.begun_anew}});
   }
   return {{"which", TrackChoiceName(pipeline.tracked().choice())}, {"objects", objects}};
 }

@@ -13,6 +13,7 @@
 #include "mapper/track/camera_tracker.h"
 #include "mapper/track/frozen_pixels.h"
 #include "mapper/track/given_poses.h"
+#include "mapper/track/lost_objects.h"
 #include "mapper/track/pcl_icp.h"
 #include "mapper/track/sdf_tracker.h"
 
@@ -137,6 +138,11 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
       trajectories_(std::move(trajectories)),
       objects_(config.associate == AssociationMode::kGiven ? objects : born),
       tracked_(config.tracked, objects_) {
+  // One field cannot do without the values that an object has in it.
+  if (config.poses == PoseSource::kTrack && map_->editing() != nullptr &&
+      !IsOneField(config.method)) {
+    lost_ = std::make_unique<LostObjects>(config.track);
+  }
   is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
@@ -157,13 +163,21 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   const std::optional<Frame> frame = camera_->Locate(given, segments.IdsOfObjects(), *map_);
   times.locate_s = watch.Lap();
   if (!frame) return times;
-  const AssociatedObjects association = associator_->Associate(*frame, segments, *map_);
+  if (lost_ != nullptr) associator_->ExpectReturns(lost_->Awaited(*frame, *map_));
+  AssociatedObjects association = associator_->Associate(*frame, segments, *map_);
+  associator_->ExpectReturns({});
   times.associate_s = watch.Lap();
-  TSDFPP_ASSIGN(TrackedFrame tracked, Track(*frame, association));
+  const std::vector<InstanceId> found = FindAgain(*frame, association);
+  Expected<TrackedFrame> tracked = Track(*frame, association);
+  if (!tracked) {
+    if (lost_ != nullptr) lost_->Undo(found, *map_, T_WO_);
+    return tl::unexpected(tracked.error());
+  }
+  TakeOutLost(*frame, association, found, *tracked);
   times.track_s = watch.Lap();
-  UpdatePoses(frame->index, std::move(tracked.T_WO));
+  UpdatePoses(frame->index, std::move(tracked->T_WO));
   times.update_poses_s = watch.Lap();
-  const cv::Mat labels = RepairMasks(*frame, tracked.labels);
+  const cv::Mat labels = RepairMasks(*frame, tracked->labels);
   times.repair_s = watch.Lap();
   Fuse(*frame, labels);
   times.fuse_s = watch.Lap();
@@ -193,7 +207,54 @@ Expected<Pipeline::TrackedFrame> Pipeline::Track(const Frame& frame,
   associator_->Accept();
   tracked_ = std::move(chosen);
   if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);
-  return TrackedFrame{std::move(tracked.T_WO), labels};
+  return TrackedFrame{std::move(tracked.T_WO), labels, std::move(tracked.seen)};
+}
+
+std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObjects& association) {
+  std::vector<InstanceId> found;
+  if (lost_ == nullptr) return found;
+  auto pixels_of = PixelsByLabel(association.labels, 0);
+  std::map<InstanceId, TrackStatus> seen;
+  for (const auto& [id, pixels] : pixels_of) seen[id] = TrackStatus::kTracked;
+  for (const InstanceId id : lost_->NotInPlace(frame, *map_, T_WO_, seen, association.unclaimed)) {
+    lost_->Keep(id, *map_, T_WO_.at(id));
+  }
+  if (lost_->empty()) return found;
+  std::vector<LoosePixels> segments = association.unclaimed;
+  std::vector<InstanceId> id_of(segments.size(), kNoInstance);
+  cv::Mat labels = association.labels.clone();
+  for (auto& [id, pixels] : pixels_of) {
+    if (!lost_->Has(id)) continue;
+    labels.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
+    segments.push_back(std::move(pixels));
+    id_of.push_back(id);
+  }
+  for (const LostObjects::Return& of : lost_->FindAgain(frame, segments, id_of)) {
+    if (!lost_->PutBack(of, *map_, T_WO_)) continue;
+    associator_->Found(of.id);
+    tracker_->Place(of.id, frame.index);
+    found.push_back(of.id);
+    if (of.begins_anew) track_log_.AddBegunAnew(of.id);
+    for (const int pixel : segments[of.segment]) {
+      labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) = of.id;
+    }
+  }
+  association.labels = labels;
+  return found;
+}
+
+void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& association,
+                           const std::vector<InstanceId>& found, TrackedFrame& tracked) {
+  if (lost_ == nullptr) return;
+  std::vector<InstanceId> lost = lost_->TakeOut(found, *map_, tracked.T_WO);
+  // Those that the frame shows, but not where they could be registered.
+  for (const InstanceId id :
+       lost_->NotInPlace(frame, *map_, tracked.T_WO, tracked.seen, association.unclaimed)) {
+    lost_->Keep(id, *map_, tracked.T_WO.at(id));
+  }
+  for (const InstanceId id : lost_->TakeOut({}, *map_, tracked.T_WO)) lost.push_back(id);
+  for (const InstanceId id : lost) track_log_.AddLost(id);
+  for (const InstanceId id : found) track_log_.AddFound(id);
 }
 
 void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
@@ -240,6 +301,15 @@ std::vector<std::string> Pipeline::Remarks() const {
         seen == 0 ? fmt::format("no frame shows an object {}", which)
                   : fmt::format("frames show {} objects {}, of which none could be registered",
                                 seen, which)));
+  }
+  if (lost_ != nullptr && !lost_->empty()) {
+    std::vector<std::string> names;
+    for (const ObjectInfo& object : Objects()) {
+      if (lost_->Has(object.id)) names.push_back(object.name);
+    }
+    remarks.push_back(fmt::format(
+        "where {} of the tracked objects went is not known, so the map has nothing of them: {}",
+        lost_->Ids().size(), fmt::join(names, ", ")));
   }
   const CameraLog& camera = camera_->log();
   if (camera.lost > 0 || camera.carried_on > 0) {

@@ -26,6 +26,7 @@
 namespace tsdfpp {
 
 class CameraTracker;
+class LostObjects;
 class MaskRepair;
 
 // All that a pipeline is told.
@@ -95,7 +96,7 @@ class Pipeline {
 
   // What whoever asked for the map should know, a sentence each: that no frame has put anything
   // into it, with counts of what the frames held; that it is so far from the origin that rounding
-  // shows; that objects were to be tracked and none was; those of the association.
+  // shows; that objects were to be tracked and none was; which are lost; those of the association.
   std::vector<std::string> Remarks() const;
 
   // The objects of the pixels of the frame mapped last, as associated; empty before the first.
@@ -126,11 +127,18 @@ class Pipeline {
   struct TrackedFrame {
     ObjectPoses T_WO;
     cv::Mat labels;
+    std::map<InstanceId, TrackStatus> seen;
   };
   // Errors: the segmenter's, and those of CheckFrameForm.
   Expected<Segments> Segment(const Frame& frame);
   // Nothing of the frame counts before the map is known to take it. Errors: those of CheckReach.
   Expected<TrackedFrame> Track(const Frame& frame, const AssociatedObjects& association);
+  // Puts lost objects whose segments are found into the map, and returns them; takes the labels off
+  // the segments of those that are not.
+  std::vector<InstanceId> FindAgain(const Frame& frame, AssociatedObjects& association);
+  // Takes those out of the map that the frame shows not to be in their place.
+  void TakeOutLost(const Frame& frame, const AssociatedObjects& association,
+                   const std::vector<InstanceId>& found, TrackedFrame& tracked);
   // Moves the objects to where they are after the frame, and writes it down.
   void UpdatePoses(int frame, ObjectPoses T_WO);
   // The labels to fuse, where the objects are now.
@@ -144,6 +152,7 @@ class Pipeline {
   std::unique_ptr<CameraTracker> camera_;
   std::unique_ptr<Associator> associator_;
   std::unique_ptr<Tracker> tracker_;
+  std::unique_ptr<LostObjects> lost_;   // nullptr where none can be
   std::unique_ptr<MaskRepair> repair_;  // nullptr where masks are not repaired
   std::unique_ptr<MapRepresentation> map_;
   ObjectPoses T_WO_;

@@ -1,6 +1,7 @@
 // Which object of the map each segment is (paper III-C): the second verb of the pipeline.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -19,6 +20,8 @@ struct AssociatedObjects {
   cv::Mat labels;
   // The semantic class of those objects for which a segment of the frame brought one.
   std::map<InstanceId, std::string> classes{};
+  // The pixels, with valid depth, of each segment that is none of the map's objects.
+  std::vector<std::vector<int>> unclaimed{};
 };
 
 class Associator {
@@ -29,6 +32,17 @@ class Associator {
   // (mapper/map_reach.h). Frames come in order.
   virtual AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                                       const MapRepresentation& map) = 0;
+
+  // Whether a segment, the pixels of it with valid depth, may be of an object that is missing, or
+  // of one of the map's that the frame does not show, `unseen`.
+  using MayBeMissing =
+      std::function<bool(const std::vector<int>& pixels, const std::vector<InstanceId>& unseen)>;
+  // Called before Associate(), of that frame: a segment that may be one of those is not to be a new
+  // object at once. Nothing after it.
+  virtual void ExpectReturns(const MayBeMissing& /*may_be*/) {}
+
+  // Called after Associate(), of that frame: others found an object of the map in it.
+  virtual void Found(InstanceId /*id*/) {}
 
   // Called where the frame associated last was mapped; one that was refused leaves no trace.
   virtual void Accept() {}

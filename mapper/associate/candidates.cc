@@ -80,8 +80,8 @@ std::vector<Candidates::Pair> Candidates::PairsOf(std::size_t segment,
 }
 
 std::vector<Candidates::Candidacy> Candidates::Confirm(
-    const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
-    const std::vector<bool>& may_begin) {
+    const std::vector<std::vector<Eigen::Vector3d>>& segments_W, const std::vector<bool>& may_begin,
+    const std::vector<bool>& is_held) {
   ++frame_;
   std::vector<CellOfCandidate> index;
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
@@ -117,10 +117,12 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
       continue;
     } else {
       --room;
+      candidate.first = frame_;
     }
     if (may_begin[s]) candidate.seen.push_back(frame_);
     while (candidate.seen.front() <= frame_ - config_.confirm_window) candidate.seen.pop_front();
-    if (static_cast<int>(candidate.seen.size()) >= config_.confirm_frames) {
+    if (static_cast<int>(candidate.seen.size()) >= config_.confirm_frames &&
+        (!is_held[s] || frame_ - candidate.first >= config_.return_frames)) {
       candidacies[s] = Candidacy::kIsConfirmed;
       continue;
     }

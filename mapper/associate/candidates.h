@@ -33,19 +33,22 @@ class Candidates {
   // Takes in the unclaimed segments of the next frame, each the points that it shows in the world's
   // frame, and whether it may begin a candidate; the others can but be one that there is, which
   // waits on, and are not counted. Says what each is. It is confirmed where it and its candidate
-  // were there, with min_points or more, in confirm_frames of the last confirm_window frames. Who
-  // is confirmed is a candidate no longer, and who cannot be any more is forgotten. A candidate is
-  // one segment of a frame at most: pairs with the greatest overlap (that share times the share of
-  // the candidate's cells that are near the segment's) are made first, and of a segment's only the
-  // kMostPairs greatest are looked at. While there are kMostCandidates, no segment becomes a
+  // were there, with min_points or more, in confirm_frames of the last confirm_window frames, but
+  // if it is held, not in the first return_frames frames after that in which it was first there.
+  // Who is confirmed is a candidate no longer, and who cannot be any more is forgotten. A candidate
+  // is one segment of a frame at most: pairs with the greatest overlap (that share times the share
+  // of the candidate's cells that are near the segment's) are made first, and of a segment's only
+  // the kMostPairs greatest are looked at. While there are kMostCandidates, no segment becomes a
   // further one.
   std::vector<Candidacy> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
-                                 const std::vector<bool>& may_begin);
+                                 const std::vector<bool>& may_begin,
+                                 const std::vector<bool>& is_held);
 
   std::size_t size() const { return candidates_.size(); }
 
  private:
   struct Candidate {
+    int first = 0;              // the frame that it was first there
     std::deque<int> seen;       // frames, within the window
     std::vector<Index3> cells;  // of the points that it showed last, sorted
   };

@@ -163,19 +163,38 @@ bool VoxelVotes::IsPartlyAnObject(const Segment& segment) const {
   });
 }
 
-void VoxelVotes::GiveBirth(std::vector<Segment>& segments, double voxel_m) {
+std::vector<InstanceId> VoxelVotes::UnseenOf(const ObjectLookup& lookup,
+                                             const std::vector<Segment>& segments) {
+  std::vector<bool> is_seen(lookup.ids().size());
+  for (const Segment& segment : segments) {
+    if (segment.object) is_seen[*segment.object] = true;
+    for (const std::size_t object : segment.shared_with) is_seen[object] = true;
+  }
+  std::vector<InstanceId> unseen;
+  for (std::size_t i = 0; i < is_seen.size(); ++i) {
+    if (!is_seen[i] && lookup.ids()[i] != kBackground) unseen.push_back(lookup.ids()[i]);
+  }
+  return unseen;
+}
+
+void VoxelVotes::GiveBirth(const ObjectLookup& lookup, std::vector<Segment>& segments,
+                           double voxel_m) {
+  const std::vector<InstanceId> unseen = UnseenOf(lookup, segments);
+
   std::vector<Segment*> unclaimed;
   std::vector<std::vector<Eigen::Vector3d>> points_W;
   std::vector<bool> is_known;
+  std::vector<bool> is_held;
   for (Segment& segment : segments) {
     if (segment.object || segment.points_W.empty()) continue;
     unclaimed.push_back(&segment);
     points_W.push_back(segment.points_W);
     is_known.push_back(segment.is_known);
+    is_held.push_back(may_be_missing_ && may_be_missing_(segment.pixels, unseen));
   }
   if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
   using enum Candidates::Candidacy;
-  const auto candidacies = next_.candidates->Confirm(points_W, is_known);
+  const auto candidacies = next_.candidates->Confirm(points_W, is_known, is_held);
   for (std::size_t i = 0; i < unclaimed.size(); ++i) {
     if (candidacies[i] == kNone && !is_known[i] && !IsPartlyAnObject(*unclaimed[i])) {
       unclaimed[i]->label = kBackground;
@@ -221,7 +240,7 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   Claim(lookup, found);
   ClaimMoved(lookup, found);
   FindCuts(lookup, found);
-  GiveBirth(found, map.config().voxel_m);
+  GiveBirth(lookup, found, map.config().voxel_m);
 
   AssociatedObjects association;
   std::vector<InstanceId> label_of(kIds, kNoInstance);
@@ -241,6 +260,10 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
     const auto* from = segments.ids.ptr<InstanceId>(v);
     auto* to = association.labels.ptr<InstanceId>(v);
     for (int u = 0; u < segments.ids.cols; ++u) to[u] = label_of[from[u]];
+  }
+  for (Segment& segment : found) {
+    const bool is_born = segment.label != kNoInstance && segment.label != kBackground;
+    if (!is_born) association.unclaimed.push_back(std::move(segment.pixels));
   }
   for (const Segment& segment : found) {
     if (segment.shared_with.empty()) continue;

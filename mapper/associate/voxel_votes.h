@@ -33,15 +33,21 @@ class VoxelVotes : public Associator {
   //     segment, the mask has merged the two: each pixel is then the nearest one's of those, and
   //     nobody's beyond near_voxels.
   //  5. *Births.* What is left is held back (kNoInstance: not fused, so that nothing of a false
-  //     segment enters the map) until Candidates confirm it, and then a new object. Ids count up
-  //     and are never used again; after the last one, kNoInstance - 1, nothing is born any more,
-  //     and Remarks() says so.
+  //     segment enters the map) until Candidates confirm it, and then a new object. One that may be
+  //     an object that is missing (ExpectReturns()) is held back until it is found to be that
+  //     (mapper/track/lost_objects.h), for return_frames frames at most. Ids count up and are never
+  //     used again; after the last one, kNoInstance - 1, nothing is born any more, and Remarks()
+  //     says so.
   //     Segments that are unknown (Segments::unknown) may be the candidate that a known one was
   //     before, which waits on, but begin none. Else they are background, or held back where
   //     cut_share of their points vote for one object.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
+
+  void ExpectReturns(const MayBeMissing& may_be) override { may_be_missing_ = may_be; }
+
+  void Found(InstanceId id) override { next_.last_seen[id] = next_.frame; }
 
   void Accept() override { state_ = next_; }
 
@@ -75,7 +81,10 @@ class VoxelVotes : public Associator {
   void FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   // Whether cut_share of its points vote for one object.
   bool IsPartlyAnObject(const Segment& segment) const;
-  void GiveBirth(std::vector<Segment>& segments, double voxel_m);
+  void GiveBirth(const ObjectLookup& lookup, std::vector<Segment>& segments, double voxel_m);
+  // The objects without a segment.
+  static std::vector<InstanceId> UnseenOf(const ObjectLookup& lookup,
+                                          const std::vector<Segment>& segments);
   void Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
            cv::Mat& labels) const;
 
@@ -89,6 +98,7 @@ class VoxelVotes : public Associator {
   };
 
   VoteConfig config_;
+  MayBeMissing may_be_missing_;
   State state_;  // after the frame accepted last
   State next_;   // after the frame associated last
 };

@@ -37,6 +37,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("min_observed_share", min_observed_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("max_translation_voxels", max_translation_voxels, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_rotation_rad", max_rotation_rad, 0, EIGEN_PI));
+  TSDFPP_RETURN_IF_ERROR(InRange("return_frames", return_frames, 0, 10000));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
   return {};
 }
@@ -68,6 +69,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("min_observed_share", config.min_observed_share)
       .Get("max_translation_voxels", config.max_translation_voxels)
       .Get("max_rotation_rad", config.max_rotation_rad)
+      .Get("return_frames", config.return_frames)
       .Get("rest_voxels", config.rest_voxels);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
@@ -100,6 +102,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"min_observed_share", min_observed_share},
                      {"max_translation_voxels", max_translation_voxels},
                      {"max_rotation_rad", max_rotation_rad},
+                     {"return_frames", return_frames},
                      {"rest_voxels", rest_voxels}};
 }
 

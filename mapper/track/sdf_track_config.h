@@ -55,6 +55,10 @@ struct SdfTrackConfig {
   double max_translation_voxels = 10;  // of the segment's centre, for each frame since the last
   double max_rotation_rad = 0.35;      // for each frame since the last
 
+  // An object that was out of sight and comes back is looked for all around its model
+  // (lost_objects.h). After so many frames its model is begun anew where it was not found.
+  int return_frames = 15;
+
   // A motion that moves no point by more than this is none: the pose keeps its numbers, so that a
   // map that resamples what moves does not blur what stands still.
   double rest_voxels = 0.02;

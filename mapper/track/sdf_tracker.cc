@@ -101,6 +101,13 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
   turn.moved_to = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
 }
 
+void SdfTracker::Place(InstanceId id, int frame) {
+  Memory& memory = memory_[id];
+  memory.frame = frame - 1;
+  memory.motion_L = Pose::Identity();
+  memory.centre_L.reset();
+}
+
 std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
                                                            const std::vector<SegmentPoint>& points,
                                                            const ObjectModel& model, double voxel_m,

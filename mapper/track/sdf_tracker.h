@@ -30,6 +30,8 @@ class SdfTracker : public Tracker {
   TrackedPoses Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
                      const ObjectPoses& before) override;
 
+  void Place(InstanceId id, int frame) override;
+
  private:
   // A segment whose place on the object is known: how far off it is when it is registered to the
   // model as it is now says how far off the model makes others.

@@ -8,7 +8,7 @@ void TrackLog::Add(int frame, const TrackedPoses& tracked) {
   ++frames_;
   for (const auto& [id, motion] : tracked.motions) motions_[id][frame] = motion;
   for (const auto& [id, status] : tracked.seen) {
-    TrackSpan& span = objects_.try_emplace(id, TrackSpan{frame, frame, 0, 0, 0}).first->second;
+    TrackSpan& span = objects_.try_emplace(id, TrackSpan{frame, frame}).first->second;
     switch (status) {
       case TrackStatus::kBegun:
         span.first = span.last = frame;

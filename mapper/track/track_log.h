@@ -14,12 +14,19 @@ struct TrackSpan {
   int tracked = 0;  // frames at which it was registered
   int stayed = 0;   // that showed it, but not where it is, and were fused
   int frozen = 0;   // and were not
+  int lost = 0;     // times that it was seen not to be in its place (mapper/track/lost_objects.h)
+  int found = 0;    // times that it was found again
+  int begun_anew = 0;  // times that it came back and its place on the model was not found
   bool operator==(const TrackSpan&) const = default;
 };
 
 class TrackLog {
  public:
   void Add(int frame, const TrackedPoses& tracked);
+
+  void AddLost(InstanceId id) { ++objects_[id].lost; }
+  void AddFound(InstanceId id) { ++objects_[id].found; }
+  void AddBegunAnew(InstanceId id) { ++objects_[id].begun_anew; }
 
   // Frames that were added.
   int frames() const { return frames_; }

@@ -39,6 +39,10 @@ class Tracker {
   // associated with the map, which holds what was fused before the frame; the rest is kBackground.
   virtual TrackedPoses Track(const Frame& frame, const cv::Mat& labels,
                              const MapRepresentation& map, const ObjectPoses& before) = 0;
+
+  // Called before Track() where an object was put where it is in that frame, by others: how it
+  // moved before says nothing any more.
+  virtual void Place(InstanceId /*id*/, int /*frame*/) {}
 };
 
 enum class PoseSource {

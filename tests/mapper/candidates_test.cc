@@ -24,7 +24,8 @@ class PlainCandidates {
   explicit PlainCandidates(const VoteConfig& config) : config_(config) {}
 
   std::vector<Candidacy> Confirm(const std::vector<Points>& segments_W,
-                                 const std::vector<bool>& may_begin) {
+                                 const std::vector<bool>& may_begin,
+                                 const std::vector<bool>& is_held) {
     ++frame_;
     struct Pair {
       double overlap;
@@ -56,11 +57,13 @@ class PlainCandidates {
       if (!IsLarge(segments_W[s])) continue;
       if (!candidate_of.contains(s) && !may_begin[s]) continue;
       Candidate candidate;
+      candidate.first = frame_;
       if (candidate_of.contains(s)) candidate = candidates_[candidate_of[s]];
       if (may_begin[s]) candidate.seen.push_back(frame_);
       candidate.points_W = segments_W[s];
       const bool is_confirmed =
-          SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames;
+          SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames &&
+          (!is_held[s] || frame_ >= candidate.first + config_.return_frames);
       candidacies[s] = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
       if (!is_confirmed && IsInNextWindow(candidate)) left.push_back(candidate);
     }
@@ -76,6 +79,7 @@ class PlainCandidates {
 
  private:
   struct Candidate {
+    int first = 0;
     std::vector<int> seen;
     Points points_W;
   };
@@ -136,6 +140,7 @@ class Clouds {
 TEST(Candidates, AreThoseOfPlainPairs) {
   VoteConfig config;
   config.min_points = 5;
+  config.return_frames = 6;
   Clouds clouds;
   for (int trial = 0; trial < 20; ++trial) {
     Candidates candidates(config, kVoxel_m);
@@ -143,15 +148,18 @@ TEST(Candidates, AreThoseOfPlainPairs) {
     for (int frame = 0; frame < 12; ++frame) {
       std::vector<Points> segments_W;
       std::vector<bool> may_begin;
+      std::vector<bool> is_held;
       const int count = static_cast<int>(clouds.Between(0, 10));
       for (int s = 0; s < count; ++s) {
         const Eigen::Vector3d centre_W(clouds.Between(0, 0.2), clouds.Between(0, 0.2), 1);
         segments_W.push_back(clouds.Around(centre_W, clouds.Between(0.01, 0.1),
                                            static_cast<int>(clouds.Between(3, 30))));
         may_begin.push_back(clouds.Between(0, 1) < 0.6);
+        is_held.push_back(clouds.Between(0, 1) < 0.5);
       }
       SCOPED_TRACE(testing::Message() << "trial " << trial << ", frame " << frame);
-      ASSERT_EQ(candidates.Confirm(segments_W, may_begin), plain.Confirm(segments_W, may_begin));
+      ASSERT_EQ(candidates.Confirm(segments_W, may_begin, is_held),
+                plain.Confirm(segments_W, may_begin, is_held));
       ASSERT_EQ(candidates.size(), plain.size());
     }
   }
@@ -173,7 +181,8 @@ TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
   while (!segments_W.empty() && frames < 100) {
     ++frames;
     const auto candidacies =
-        candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true));
+        candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true),
+                           std::vector<bool>(segments_W.size()));
     ASSERT_LE(candidates.size(), Candidates::kMostCandidates);
     std::vector<Points> rest;
     for (std::size_t s = 0; s < segments_W.size(); ++s) {
@@ -196,7 +205,8 @@ TEST(Candidates, VeryManySegmentsAtOnePlaceAreBounded) {
   std::vector<Points> segments_W(6000, clouds.Around({0, 0, 1}, 0.02, 50));
   for (int frame = 1; frame < config.confirm_frames; ++frame) {
     for (const Candidacy candidacy :
-         candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true))) {
+         candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true),
+                            std::vector<bool>(segments_W.size()))) {
       ASSERT_NE(candidacy, Candidacy::kIsConfirmed);
     }
     EXPECT_EQ(candidates.size(), Candidates::kMostCandidates);

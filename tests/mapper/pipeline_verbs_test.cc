@@ -104,6 +104,8 @@ const std::map<std::string, std::string>& AllowedReaders() {
       {"mapper/store/volume_store.cc volume.T_WO", "the map's own pose of an object"},
       {"mapper/volume/object_volume.h volume.T_WO", "the map's own pose of an object"},
       {"mapper/pipeline.cc tracked.T_WO", "what the tracker answered"},
+      {"mapper/track/lost_objects.cc found.T_WO", "where a lost object was found"},
+      {"mapper/track/lost_objects.cc kept.T_WO", "where the map had a lost object"},
       {"mapper/track/camera_tracker.cc after.T_WO", "the tracker's answer"},
       {"mapper/track/given_poses.cc after.T_WO", "the tracker's answer"},
       {"mapper/track/pcl_icp.cc after.T_WO", "the tracker's answer"},

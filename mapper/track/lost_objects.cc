@@ -1,0 +1,316 @@
+#include "mapper/track/lost_objects.h"
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "mapper/map_editing.h"
+#include "mapper/map_reach.h"
+#include "mapper/track/model_sight.h"
+#include "mapper/track/object_model.h"
+
+namespace tsdfpp {
+namespace {
+
+// Depth that is off by less than so many voxels is that of the surface, or of what is in contact.
+constexpr double kMargin_voxels = 3;
+// An object is not in its place where so many of its voxels are seen not to be there, and more of
+// them than are matched.
+constexpr int kLeastGone = 20;
+// A segment that comes nearer to the picture's edge goes on outside.
+constexpr int kEdge_px = 3;
+// So much of a segment's outline may be beside something nearer.
+constexpr double kMostCovered = 0.1;
+// What a segment has of an object's colours to be looked at as it, and to be it by its looks alone,
+// which it must have by so much more than others have of it.
+constexpr double kLeastAlike = 0.3;
+constexpr double kLeastLikeness = 0.5;
+constexpr double kLeastLead = 0.1;
+constexpr int kEvery_frames = 3;
+constexpr int kMostPoints = 1500;  // of a segment, to say where it is
+
+// A segment's pixels within the rectangle around them and a margin; 255, else 0.
+struct CutOut {
+  cv::Mat inside;
+  cv::Point corner;  // in the image, or beside it
+};
+constexpr int kBeyond_px = 2;
+
+CutOut CutOutOf(const LoosePixels& pixels, int columns) {
+  cv::Rect around;
+  if (!pixels.empty()) {
+    int left = columns;
+    int right = 0;
+    for (const int pixel : pixels) {
+      left = std::min(left, pixel % columns);
+      right = std::max(right, pixel % columns);
+    }
+    const int top = pixels.front() / columns;
+    around = {left, top, right - left + 1, pixels.back() / columns - top + 1};
+  }
+  const cv::Point margin(kBeyond_px, kBeyond_px);
+  CutOut cut{cv::Mat::zeros(around.size() + cv::Size(2 * margin), CV_8UC1), around.tl() - margin};
+  for (const int pixel : pixels) {
+    cut.inside.at<std::uint8_t>(cv::Point(pixel % columns, pixel / columns) - cut.corner) = 255;
+  }
+  return cut;
+}
+
+// Whether its outline comes near the picture's edge, beyond which the rest of it may be.
+bool ReachesTheEdge(const CutOut& cut, const cv::Size& size) {
+  const cv::Rect around(cut.corner + cv::Point(kBeyond_px, kBeyond_px),
+                        cut.inside.size() - cv::Size(2 * kBeyond_px, 2 * kBeyond_px));
+  return std::min({around.x, around.y, size.width - around.br().x, size.height - around.br().y}) <
+         kEdge_px;
+}
+
+// Whether much of its outline is beside something nearer.
+bool IsCovered(const Frame& frame, const CutOut& cut, double voxel_m) {
+  const cv::Rect image(cv::Point(), frame.depth.size());
+  int outline = 0;
+  int covered = 0;
+  for (int v = kBeyond_px; v < cut.inside.rows - kBeyond_px; ++v) {
+    for (int u = kBeyond_px; u < cut.inside.cols - kBeyond_px; ++u) {
+      const cv::Point own(u, v);
+      if (cut.inside.at<std::uint8_t>(own) == 0) continue;
+      const float z = frame.depth.at<float>(own + cut.corner);
+      for (const cv::Point step : {cv::Point(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
+        if (cut.inside.at<std::uint8_t>(own + step) != 0) continue;
+        ++outline;
+        const cv::Point beyond = own + kBeyond_px * step + cut.corner;
+        if (!image.contains(beyond)) continue;
+        const float beside = frame.depth.at<float>(beyond);
+        if (IsValidDepth(beside) && double{beside} < double{z} - kMargin_voxels * voxel_m) {
+          ++covered;
+        }
+      }
+    }
+  }
+  return covered > kMostCovered * outline;
+}
+
+// 255 at the pixels, else 0.
+cv::Mat MaskOf(const LoosePixels& pixels, const cv::Size& size) {
+  cv::Mat mask = cv::Mat::zeros(size, CV_8UC1);
+  for (const int pixel : pixels)
+    mask.at<std::uint8_t>(pixel / size.width, pixel % size.width) = 255;
+  return mask;
+}
+
+bool IsAlike(const Appearance& segment, const Appearance& model, double voxel_m) {
+  return IsOfSize(segment, model, voxel_m) && ColoursInCommon(segment, model) >= kLeastAlike;
+}
+
+}  // namespace
+
+struct LostObjects::Look {
+  std::vector<SegmentPoint> points;
+  Appearance appearance;
+  bool is_large = false;
+  bool is_at_edge = false;
+  bool is_covered = false;
+  bool IsWhole() const { return is_large && !is_at_edge && !is_covered; }
+};
+
+LostObjects::Look LostObjects::LookAt(const Frame& frame, const LoosePixels& pixels,
+                                      double voxel_m) const {
+  Look look;
+  SdfTrackConfig config = config_;
+  config.max_points = std::min(config.max_points, kMostPoints);
+  look.points = SegmentPointsOf(frame, pixels, voxel_m, config);
+  look.is_large = look.points.size() >= static_cast<std::size_t>(config_.min_points);
+  if (!look.is_large) return look;
+  look.appearance = AppearanceOf(frame, look.points);
+  const CutOut cut = CutOutOf(pixels, frame.depth.cols);
+  look.is_at_edge = ReachesTheEdge(cut, frame.depth.size());
+  look.is_covered = IsCovered(frame, cut, voxel_m);
+  return look;
+}
+
+std::vector<InstanceId> LostObjects::NotInPlace(const Frame& frame, const MapRepresentation& map,
+                                                const ObjectPoses& T_WO,
+                                                const std::map<InstanceId, TrackStatus>& seen,
+                                                std::span<const LoosePixels> loose) const {
+  std::vector<InstanceId> lost;
+  const double voxel_m = map.config().voxel_m;
+  cv::Mat may_be(frame.depth.size(), CV_8UC1, cv::Scalar(255));
+  for (const LoosePixels& pixels : loose) {
+    for (const int pixel : pixels) {
+      may_be.at<std::uint8_t>(pixel / may_be.cols, pixel % may_be.cols) = 0;
+    }
+  }
+  for (const auto& [id, pose] : T_WO) {
+    const auto status = seen.find(id);
+    if (status != seen.end() && status->second != TrackStatus::kFrozen) continue;
+    const std::optional<ObjectModel> model = ModelOf(map, id);
+    if (!model) continue;
+    const ModelSight sight =
+        LookAtModel(frame, *model->grid, model->T_WL, voxel_m, kMargin_voxels * voxel_m, may_be);
+    const int gone = sight.through + sight.beside;
+    if (gone >= kLeastGone && gone > sight.matched) lost.push_back(id);
+  }
+  return lost;
+}
+
+void LostObjects::Keep(InstanceId id, const MapRepresentation& map, const Pose& T_WO) {
+  const std::optional<ObjectModel> model = ModelOf(map, id);
+  if (!model) return;
+  const double voxel_m = map.config().voxel_m;
+  kept_.insert_or_assign(
+      id, Kept{*model->grid, AppearanceOf(*model->grid, voxel_m), model->T_WL, T_WO, voxel_m});
+}
+
+std::vector<InstanceId> LostObjects::Ids() const {
+  std::vector<InstanceId> ids;
+  ids.reserve(kept_.size());
+  for (const auto& [id, kept] : kept_) ids.push_back(id);
+  return ids;
+}
+
+Associator::MayBeMissing LostObjects::Awaited(const Frame& frame,
+                                              const MapRepresentation& map) const {
+  // Of the map's objects, as soon as one is asked for.
+  const auto of_map = std::make_shared<std::map<InstanceId, Appearance>>();
+  return [this, &frame, &map, of_map](const LoosePixels& pixels,
+                                      const std::vector<InstanceId>& unseen) {
+    if (kept_.empty() && unseen.empty()) return false;
+    const double voxel_m = map.config().voxel_m;
+    const Look look = LookAt(frame, pixels, voxel_m);
+    if (!look.is_large) return false;
+    const auto may_be = [&](const Appearance& model) {
+      return look.IsWhole() ? IsAlike(look.appearance, model, voxel_m)
+                            : ColoursInCommon(look.appearance, model) >= kLeastAlike;
+    };
+    const auto is_kept = [&](const auto& entry) { return may_be(entry.second.appearance); };
+    if (std::ranges::any_of(kept_, is_kept)) return true;
+    return std::ranges::any_of(unseen, [&](InstanceId id) {
+      const auto [appearance, is_new] = of_map->try_emplace(id);
+      const std::optional<ObjectModel> model = is_new ? ModelOf(map, id) : std::nullopt;
+      if (model) appearance->second = AppearanceOf(*model->grid, voxel_m);
+      return appearance->second.points > 0 && may_be(appearance->second);
+    });
+  };
+}
+
+std::optional<LostObjects::Return> LostObjects::Find(InstanceId id, const Frame& frame,
+                                                     const LoosePixels& pixels, const Look& look,
+                                                     std::size_t segment) const {
+  const Kept& kept = kept_.at(id);
+  const ModelSearch search{&frame,       &look.points, MaskOf(pixels, frame.depth.size()),
+                           &kept.volume, kept.T_WL,    kept.voxel_m};
+  const auto found = FindModel(search, config_);
+  if (!found) return std::nullopt;
+  return Return{id, segment, frame.T_WC * found->T_LC.inverse() * kept.T_WL.inverse() * kept.T_WO,
+                !IsCertain(*found)};
+}
+
+std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
+                                                        std::span<const LoosePixels> segments,
+                                                        std::span<const InstanceId> id_of) {
+  std::vector<Return> returns;
+  if (kept_.empty()) return returns;
+  std::vector<Look> looks;
+  for (const LoosePixels& pixels : segments) {
+    looks.push_back(LookAt(frame, pixels, kept_.begin()->second.voxel_m));
+  }
+  // Who is like whom, the most alike first.
+  struct Pair {
+    double alike = 0;
+    InstanceId id = kNoInstance;
+    std::size_t segment = 0;
+    bool is_given = false;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    if (!looks[s].is_large || looks[s].is_at_edge) continue;
+    for (const auto& [id, kept] : kept_) {
+      if (id_of[s] != kNoInstance && id_of[s] != id) continue;
+      const bool is_given = id_of[s] == id;
+      if (!is_given && !IsAlike(looks[s].appearance, kept.appearance, kept.voxel_m)) continue;
+      pairs.push_back(
+          {is_given ? 2 : ColoursInCommon(looks[s].appearance, kept.appearance), id, s, is_given});
+    }
+  }
+  std::ranges::stable_sort(pairs, [](const Pair& a, const Pair& b) { return a.alike > b.alike; });
+  std::set<InstanceId> taken_ids;
+  std::set<std::size_t> taken_segments;
+  const auto take = [&](const Return& found) {
+    taken_ids.insert(found.id);
+    taken_segments.insert(found.segment);
+    returns.push_back(found);
+  };
+  for (const Pair& pair : pairs) {
+    const Kept& kept = kept_.at(pair.id);
+    if (taken_ids.contains(pair.id) || taken_segments.contains(pair.segment)) continue;
+    if (kept.frames_in_sight % kEvery_frames != 0) continue;
+    const auto found =
+        Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
+    if (found && !found->begins_anew) take(*found);
+  }
+  // Of the others, by their looks.
+  std::set<InstanceId> waited;
+  for (const Pair& pair : pairs) {
+    Kept& kept = kept_.at(pair.id);
+    if (taken_ids.contains(pair.id) || !waited.insert(pair.id).second) continue;
+    ++kept.frames_in_sight;
+    const int wait = config_.return_frames * (looks[pair.segment].is_covered ? 2 : 1);
+    if (kept.frames_in_sight <= wait) continue;
+    if (taken_segments.contains(pair.segment)) continue;
+    const bool is_clear = std::ranges::none_of(pairs, [&](const Pair& other) {
+      const bool is_rival = (other.id == pair.id) != (other.segment == pair.segment);
+      return is_rival && !taken_ids.contains(other.id) && !taken_segments.contains(other.segment) &&
+             other.alike > pair.alike - kLeastLead;
+    });
+    if (pair.alike < kLeastLikeness || !is_clear) continue;
+    const auto found =
+        Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
+    if (found) take(*found);
+  }
+  return returns;
+}
+
+Expected<void> LostObjects::PutBack(const Return& found, MapRepresentation& map,
+                                    ObjectPoses& T_WO) const {
+  const Kept& kept = kept_.at(found.id);
+  const Pose T_WL = found.T_WO * kept.T_WO.inverse() * kept.T_WL;
+  if (found.begins_anew) {
+    if (kept.is_in_map) map.Remove(found.id);
+  } else if (kept.is_in_map) {
+    TSDFPP_RETURN_IF_ERROR(CheckAddition(map.config(), found.id, kept.volume, T_WL, found.T_WO));
+    map.SetObjectPose(found.id, found.T_WO);
+  } else {
+    TSDFPP_RETURN_IF_ERROR(EditingOf(map).Add(found.id, kept.volume, T_WL, found.T_WO));
+  }
+  T_WO[found.id] = found.T_WO;
+  return {};
+}
+
+std::vector<InstanceId> LostObjects::TakeOut(const std::vector<InstanceId>& found,
+                                             MapRepresentation& map, ObjectPoses& T_WO) {
+  for (const InstanceId id : found) kept_.erase(id);
+  std::vector<InstanceId> lost;
+  for (auto& [id, kept] : kept_) {
+    if (!kept.is_in_map) continue;
+    kept.is_in_map = false;
+    map.Remove(id);
+    T_WO.erase(id);
+    lost.push_back(id);
+  }
+  return lost;
+}
+
+void LostObjects::Undo(const std::vector<InstanceId>& found, MapRepresentation& map,
+                       ObjectPoses& T_WO) {
+  for (const InstanceId id : found) {
+    const Kept& kept = kept_.at(id);
+    map.Remove(id);
+    T_WO.erase(id);
+    if (!kept.is_in_map) continue;
+    // A place that it had, and that the map took before.
+    if (EditingOf(map).Add(id, kept.volume, kept.T_WL, kept.T_WO)) T_WO[id] = kept.T_WO;
+  }
+  std::erase_if(kept_, [](const auto& entry) { return entry.second.is_in_map; });
+}
+
+}  // namespace tsdfpp

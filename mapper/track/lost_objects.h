@@ -1,0 +1,95 @@
+// Objects that are not where the map has them: kept apart until a segment is found to be theirs.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "mapper/associate/associator.h"
+#include "mapper/map_representation.h"
+#include "mapper/track/appearance.h"
+#include "mapper/track/model_search.h"
+#include "mapper/track/sdf_track_config.h"
+#include "mapper/track/tracker.h"
+
+namespace tsdfpp {
+
+// Pixels of one segment that has no object of the map, by rows (PixelsByLabel()).
+using LoosePixels = std::vector<int>;
+
+class LostObjects {
+ public:
+  // The config must be valid.
+  explicit LostObjects(const SdfTrackConfig& config) : config_(config) {}
+
+  // Of the objects with a pose in `T_WO` which the frame does not show (`seen` has none), or not
+  // where they could be registered: those that it shows not to be where they were. What `loose`
+  // segments show is not that object in its place. Of a map with volumes.
+  std::vector<InstanceId> NotInPlace(const Frame& frame, const MapRepresentation& map,
+                                     const ObjectPoses& T_WO,
+                                     const std::map<InstanceId, TrackStatus>& seen,
+                                     std::span<const LoosePixels> loose) const;
+
+  // Keeps the object's volume, as the map has it, and has.
+  void Keep(InstanceId id, const MapRepresentation& map, const Pose& T_WO);
+
+  // Ends a frame: of those found then (FindAgain()) nothing is kept any more; the others are taken
+  // out of the map and of `T_WO`.
+  std::vector<InstanceId> TakeOut(const std::vector<InstanceId>& found, MapRepresentation& map,
+                                  ObjectPoses& T_WO);
+  // Undoes PutBack() and, for those that the map had, Keep().
+  void Undo(const std::vector<InstanceId>& found, MapRepresentation& map, ObjectPoses& T_WO);
+
+  bool empty() const { return kept_.empty(); }
+  bool Has(InstanceId id) const { return kept_.contains(id); }
+  std::vector<InstanceId> Ids() const;
+
+  // Whether a segment of the frame may be one of the kept objects, or one of those of the map that
+  // the frame does not show: it has some of their colours, and about their size where it is seen
+  // whole. To be asked while frame, map and this are as they are.
+  Associator::MayBeMissing Awaited(const Frame& frame, const MapRepresentation& map) const;
+
+  // A segment that is a kept object's.
+  struct Return {
+    InstanceId id = kNoInstance;
+    std::size_t segment = 0;
+    Pose T_WO = Pose::Identity();
+    // Nothing says where the segment is on the model, but it has been there for return_frames
+    // frames: the model is to be begun anew, at the best place that there is.
+    bool begins_anew = false;
+  };
+  // Which of the segments are whose: `id_of` is that of each, or kNoInstance where it is to be
+  // found, too. A segment is an object's where FindModel() is certain of its place. Where it is
+  // not, but the segment looks like the object, and like no other that is missing, the object waits
+  // for return_frames frames in which such a segment is in sight, twice as many where something
+  // covers it. A segment at the picture's edge is left alone. Looks for an object in every third
+  // of these frames.
+  std::vector<Return> FindAgain(const Frame& frame, std::span<const LoosePixels> segments,
+                                std::span<const InstanceId> id_of);
+
+  // Puts a kept object where it was found, into the map and `T_WO`; one that begins anew into
+  // `T_WO` alone. Errors: MapEditing::Add's.
+  Expected<void> PutBack(const Return& found, MapRepresentation& map, ObjectPoses& T_WO) const;
+
+ private:
+  struct Kept {
+    TsdfGrid volume;
+    Appearance appearance;
+    Pose T_WL = Pose::Identity();
+    Pose T_WO = Pose::Identity();
+    double voxel_m = 0;
+    bool is_in_map = true;
+    int frames_in_sight = 0;  // in which something was that may be it
+  };
+  struct Look;  // a segment as one frame shows it
+  Look LookAt(const Frame& frame, const LoosePixels& pixels, double voxel_m) const;
+  // Begins anew where it is not certain.
+  std::optional<Return> Find(InstanceId id, const Frame& frame, const LoosePixels& pixels,
+                             const Look& look, std::size_t segment) const;
+
+  SdfTrackConfig config_;
+  std::map<InstanceId, Kept> kept_;
+};
+
+}  // namespace tsdfpp

@@ -1,0 +1,69 @@
+#include "mapper/track/model_sight.h"
+
+#include <cmath>
+
+#include "mapper/volume/fusion_kernels.h"
+
+namespace tsdfpp {
+namespace {
+
+// What the depth around a pixel says of a surface at z_m there.
+void Count(const Frame& frame, int u, int v, double z_m, double margin_m, const cv::Mat& may_be,
+           ModelSight& sight) {
+  bool is_known = false;
+  bool is_matched = false;
+  bool is_own = false;
+  bool is_farther = true;
+  for (int b = v - 1; b <= v + 1; ++b) {
+    for (int a = u - 1; a <= u + 1; ++a) {
+      const float depth_m = frame.depth.at<float>(b, a);
+      if (!IsValidDepth(depth_m)) continue;
+      is_known = true;
+      if (std::abs(double{depth_m} - z_m) <= margin_m) {
+        is_matched = true;
+        is_own = is_own || may_be.empty() || may_be.at<std::uint8_t>(b, a) != 0;
+      }
+      is_farther = is_farther && double{depth_m} > z_m + margin_m;
+    }
+  }
+  if (!is_known) return;
+  if (is_own) {
+    ++sight.matched;
+  } else if (is_matched) {
+    ++sight.beside;
+  } else if (is_farther) {
+    ++sight.through;
+  } else {
+    ++sight.hidden;
+  }
+}
+
+}  // namespace
+
+ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_WL, double voxel_m,
+                       double margin_m, const cv::Mat& may_be) {
+  ModelSight sight;
+  const Pose T_CL = frame.T_WC.inverse() * T_WL;
+  const Intrinsics& camera = frame.intrinsics;
+  for (const auto& entry : model.entries()) {
+    const TsdfBlock& block = *entry.block;
+    if (!block.AnyNegative()) continue;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const auto place = static_cast<std::size_t>(i);
+      if (block.weight[place] == 0 ||
+          std::abs(float{block.distance[place]}) > kSurface_voxels * static_cast<float>(voxel_m)) {
+        continue;
+      }
+      const Index3 voxel = VoxelAt(entry.index, i);
+      const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z));
+      if (!(p_C.z() > double{kNearest_m})) continue;
+      const double u = std::floor(camera.fx * p_C.x() / p_C.z() + camera.cx + 0.5);
+      const double v = std::floor(camera.fy * p_C.y() / p_C.z() + camera.cy + 0.5);
+      if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) continue;
+      Count(frame, static_cast<int>(u), static_cast<int>(v), p_C.z(), margin_m, may_be, sight);
+    }
+  }
+  return sight;
+}
+
+}  // namespace tsdfpp

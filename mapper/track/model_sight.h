@@ -1,0 +1,28 @@
+// What a frame shows of an object's model where it is taken to be.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "core/types.h"
+#include "mapper/volume/tsdf_block.h"
+
+namespace tsdfpp {
+
+// A surface voxel of a model, to within this many voxels.
+inline constexpr float kSurface_voxels = 0.75F;
+
+// Numbers of surface voxels of a model in the picture, by the depth around their pixel (three by
+// three: outlines are a pixel off).
+struct ModelSight {
+  int matched = 0;  // a depth is theirs
+  int beside = 0;   // so it is, but of pixels that cannot be of the object
+  int through = 0;  // all depths are farther: nothing is there
+  int hidden = 0;   // depth is nearer: something is before it, the model itself perhaps
+};
+
+// `T_WL` is where the model's lattice is; depth may be off by `margin_m`. Pixels of `may_be`
+// (CV_8UC1, of the depth's size) that are 0 cannot be of the object; an empty one allows all.
+ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_WL, double voxel_m,
+                       double margin_m, const cv::Mat& may_be = {});
+
+}  // namespace tsdfpp

@@ -1,0 +1,282 @@
+// Objects that leave the picture and come back elsewhere: they keep their model and their id, and
+// nothing else is taken for them.
+#include "mapper/track/lost_objects.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <optional>
+
+#include "core/units.h"
+#include "mapper/pipeline.h"
+#include "mapper/track/model_sight.h"
+#include "mapper/voxel_inspection.h"
+#include "tests/mapper/toy_scene.h"
+#include "tests/mapper/vote_world.h"
+
+namespace tsdfpp {
+namespace {
+
+using reference::MakePose;
+
+constexpr int kLeaves = 6;    // the first frame without the brick
+constexpr int kReturns = 10;  // the first with it again
+constexpr int kFrames = 16;
+// A pixel sees some 4 mm of these scenes; a flat side is known to less than that.
+constexpr double kMost_voxels = 0.5;
+// Where half of what is seen of it is new.
+constexpr double kMostTurned_voxels = 1;
+
+Intrinsics Camera() { return {256, 192, 215.0, 215.0, 127.5, 95.5}; }
+
+// A brick with a knob, which turned by half a turn is another one.
+void AddKnobbedBrick(reference::Scene& scene, double yaw_rad, const Eigen::Vector3d& place) {
+  AddBrick(scene, yaw_rad, place);
+  scene.shapes.push_back(reference::Cuboid(
+      kBrick, {200, 30, 30}, MakePose(0, Eigen::Vector3d::UnitZ(), {0.045, 0.02, 0.075}),
+      {0.025, 0.03, 0.03}));
+}
+
+const Eigen::Vector3d kBefore(-0.12, -0.06, kTableTop_m + 0.045);
+const Eigen::Vector3d kAfter(0.12, -0.1, kTableTop_m + 0.045);
+
+// The brick is there, is gone, and comes back at another place, turned.
+Frame Coming(int index, double turn_rad) {
+  reference::Scene scene = TableOnly();
+  if (index < kLeaves) AddKnobbedBrick(scene, 0.3, kBefore);
+  if (index >= kReturns) AddKnobbedBrick(scene, 0.3 + turn_rad, kAfter);
+  AddTray(scene, -0.4, {0.05, 0.14, kTableTop_m + 0.016});
+  return reference::Render(scene, CircleCamera(0.02 * index), index, Camera());
+}
+
+PipelineConfig TrackConfig(AssociationMode associate) {
+  PipelineConfig config;
+  config.map = ToyConfig();
+  config.method = Method::kTsdfppAnchored;
+  config.associate = associate;
+  config.poses = PoseSource::kTrack;
+  config.tracked = TrackChoice::kAll;
+  return config;
+}
+
+std::vector<ObjectInfo> Toys() {
+  return {{kBackground, "background", ""}, {kBrick, "brick", ""}, {kTray, "tray", ""}};
+}
+
+std::size_t VoxelsOfBrick(const Pipeline& pipeline, InstanceId id = kBrick) {
+  return VoxelsOf(pipeline.map()).ObservedVoxels(id).size();
+}
+
+struct ReturnedBrick {
+  TrackSpan span{};
+  std::size_t before = 0;  // voxels, and at the end
+  std::size_t after = 0;
+  // Of its middle's place, voxels; nothing where it is not in the map.
+  std::optional<double> error_voxels{};
+};
+
+ReturnedBrick BrickThatReturns(double turn_rad, int frames) {
+  ReturnedBrick result;
+  Pipeline pipeline(TrackConfig(AssociationMode::kGiven), Toys());
+  for (int i = 1; i < kLeaves; ++i) EXPECT_TRUE(pipeline.Process(Coming(i, 0)));
+  result.before = VoxelsOfBrick(pipeline);
+  for (int i = kLeaves; i < kReturns; ++i) EXPECT_TRUE(pipeline.Process(Coming(i, 0)));
+  // It is known not to be where it was.
+  EXPECT_EQ(VoxelsOfBrick(pipeline), 0U);
+  EXPECT_FALSE(pipeline.trajectories().at(kBrick).contains(kReturns - 1));
+  EXPECT_EQ(pipeline.Remarks(),
+            std::vector<std::string>{"where 1 of the tracked objects went is not known, so the map "
+                                     "has nothing of them: brick"});
+  for (int i = kReturns; i <= frames; ++i) EXPECT_TRUE(pipeline.Process(Coming(i, turn_rad)));
+  result.span = pipeline.track_log().objects().at(kBrick);
+  result.after = VoxelsOfBrick(pipeline);
+  const auto& poses = pipeline.trajectories().at(kBrick);
+  if (poses.contains(frames)) {
+    const Pose truth =
+        Coming(frames, turn_rad).T_WO.at(kBrick) * Coming(1, 0).T_WO.at(kBrick).inverse();
+    const Pose error = truth.inverse() * poses.at(frames);
+    result.error_voxels = (error * kBefore - kBefore).norm() / kToyVoxel_m;
+  }
+  EXPECT_EQ(pipeline.track_log().objects().at(kTray).lost, 0);
+  return result;
+}
+
+TEST(LostObjects, AreKeptWholeAndFoundElsewhere) {
+  for (const double turn_deg : {0.0, 40.0, 110.0}) {
+    SCOPED_TRACE(turn_deg);
+    const ReturnedBrick brick = BrickThatReturns(turn_deg * kDegree, kFrames);
+    EXPECT_EQ(brick.span.lost, 1);
+    EXPECT_EQ(brick.span.found, 1);
+    EXPECT_EQ(brick.span.begun_anew, 0);
+    EXPECT_GE(brick.after, brick.before);
+    ASSERT_TRUE(brick.error_voxels);
+    EXPECT_LT(*brick.error_voxels, turn_deg > 90 ? kMostTurned_voxels : kMost_voxels);
+  }
+}
+
+// Half a turn shows what the model lacks but for its top, which would fit in more than one place.
+TEST(LostObjects, WaitWhereNothingSaysHowTheyStand) {
+  const int frames = SdfTrackConfig{}.return_frames;
+  const ReturnedBrick waiting = BrickThatReturns(-70 * kDegree, kReturns + frames - 1);
+  EXPECT_EQ(waiting.span.found, 0);
+  EXPECT_EQ(waiting.after, 0U);
+  const ReturnedBrick anew = BrickThatReturns(-70 * kDegree, kReturns + frames + 2);
+  EXPECT_EQ(anew.span.found, 1);
+  EXPECT_EQ(anew.span.begun_anew, 1);
+  EXPECT_GT(anew.after, 0U);
+}
+
+// With ids of one frame alone it is the same object, and no other is born.
+TEST(LostObjects, ComeBackWithTheirId) {
+  Pipeline pipeline(TrackConfig(AssociationMode::kVotes), {});
+  DrawnIds drawn(5);
+  const auto process = [&](int index) {
+    Frame frame = Coming(index, 40 * kDegree);
+    const cv::Mat truth = frame.mask;
+    frame.mask = drawn.Of(truth);
+    ASSERT_TRUE(pipeline.Process(frame));
+    if (index < 4 || (index >= kLeaves && index < kReturns)) return;
+    InstanceId id = kNoInstance;  // of the brick, whose pixels have no other
+    for (int v = 0; v < truth.rows; ++v) {
+      for (int u = 0; u < truth.cols; ++u) {
+        const InstanceId label = pipeline.labels().at<InstanceId>(v, u);
+        if (truth.at<InstanceId>(v, u) != kBrick || label == kNoInstance) continue;
+        if (id == kNoInstance) id = label;
+        ASSERT_EQ(label, id);
+      }
+    }
+    EXPECT_NE(id, kNoInstance) << index;
+    EXPECT_LE(id, 2);
+  };
+  for (int i = 1; i <= kFrames; ++i) process(i);
+  EXPECT_EQ(pipeline.Objects().size(), 3U);
+}
+
+// Where one is missing, another is a new object, as soon as if none were.
+TEST(LostObjects, NothingElseIsTakenForThem) {
+  Pipeline pipeline(TrackConfig(AssociationMode::kVotes), {});
+  const auto frame_of = [](int index) {
+    reference::Scene scene = TableOnly();
+    if (index < kLeaves) AddKnobbedBrick(scene, 0.3, kBefore);
+    if (index >= kReturns) AddBall(scene, {0.12, -0.1, kTableTop_m + 0.055});
+    AddTray(scene, -0.4, {0.05, 0.14, kTableTop_m + 0.016});
+    return reference::Render(scene, CircleCamera(0.02 * index), index, Camera());
+  };
+  const int born = kReturns + VoteConfig{}.confirm_frames - 1;
+  for (int i = 1; i < born; ++i) ASSERT_TRUE(pipeline.Process(frame_of(i)));
+  EXPECT_EQ(pipeline.Objects().size(), 3U);
+  for (int i = born; i <= kFrames; ++i) ASSERT_TRUE(pipeline.Process(frame_of(i)));
+  EXPECT_EQ(pipeline.Objects().size(), 4U);
+  for (const auto& [id, span] : pipeline.track_log().objects()) EXPECT_EQ(span.found, 0);
+}
+
+// Where a frame is refused, objects that it lacked, or that were found in it, are as they were.
+TEST(LostObjects, CanBeUndone) {
+  const Frame frame = Coming(1, 0);
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
+  map->SetObjectPose(kBrick, Pose::Identity());
+  map->Fuse(frame, frame.mask);
+  const auto voxels = VoxelsOf(*map).ObservedVoxels(kBrick);
+  Pose elsewhere = Pose::Identity();
+  elsewhere.translation().x() = 0.3;
+  LostObjects lost(SdfTrackConfig{});
+  for (const bool is_found : {false, true}) {
+    lost.Keep(kBrick, *map, T_WO.at(kBrick));
+    std::vector<InstanceId> found;
+    if (is_found) {
+      ASSERT_TRUE(lost.PutBack({kBrick, 0, elsewhere, false}, *map, T_WO));
+      EXPECT_EQ(T_WO.at(kBrick).translation().x(), 0.3);
+      found.push_back(kBrick);
+    }
+    lost.Undo(found, *map, T_WO);
+    EXPECT_TRUE(lost.empty());
+    EXPECT_EQ(T_WO.at(kBrick).matrix(), Pose::Identity().matrix());
+    EXPECT_EQ(VoxelsOf(*map).ObservedVoxels(kBrick).size(), voxels.size());
+  }
+  // Of one that was lost in an earlier frame nothing is in the map.
+  lost.Keep(kBrick, *map, T_WO.at(kBrick));
+  EXPECT_EQ(lost.TakeOut({}, *map, T_WO), std::vector<InstanceId>{kBrick});
+  EXPECT_FALSE(T_WO.contains(kBrick));
+  ASSERT_TRUE(lost.PutBack({kBrick, 0, elsewhere, false}, *map, T_WO));
+  EXPECT_EQ(VoxelsOf(*map).ObservedVoxels(kBrick).size(), voxels.size());
+  lost.Undo({kBrick}, *map, T_WO);
+  EXPECT_TRUE(lost.Has(kBrick));
+  EXPECT_FALSE(T_WO.contains(kBrick));
+  EXPECT_EQ(VoxelsOf(*map).ObservedVoxels(kBrick).size(), 0U);
+}
+
+// Whatever the number of threads.
+TEST(LostObjects, AreFoundAtTheSamePlaceByAnyNumberOfThreads) {
+  std::vector<std::map<int, Pose>> poses;
+  for (const std::size_t threads : {1U, 2U, 5U}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    Pipeline pipeline(TrackConfig(AssociationMode::kGiven), Toys());
+    for (int i = 1; i < kReturns + 2; ++i) {
+      ASSERT_TRUE(pipeline.Process(Coming(i, 40 * kDegree)));
+    }
+    poses.push_back(pipeline.trajectories().at(kBrick));
+  }
+  ASSERT_TRUE(poses[0].contains(kReturns + 1));
+  for (const auto& of : poses) {
+    ASSERT_EQ(of.size(), poses[0].size());
+    for (const auto& [frame, pose] : of) EXPECT_EQ(pose.matrix(), poses[0].at(frame).matrix());
+  }
+}
+
+// What something stands before is where it was.
+TEST(LostObjects, WhatIsHiddenIsNotLost) {
+  Pipeline pipeline(TrackConfig(AssociationMode::kGiven), Toys());
+  const auto frame_of = [](int index) {
+    reference::Scene scene = TableOnly();
+    AddKnobbedBrick(scene, 0.3, kBefore);
+    const Pose T_WC = CircleCamera(0);
+    if (index >= kLeaves) {
+      // A screen half way to it.
+      const Eigen::Vector3d half = (T_WC.translation() + kBefore) / 2;
+      scene.shapes.push_back(
+          reference::Cuboid(kTray, {30, 180, 30}, Pose::Identity(), {0.2, 0.2, 0.01}));
+      scene.T_WO[kTray] = T_WC;
+      scene.T_WO[kTray].translation() = half;
+    }
+    return reference::Render(scene, T_WC, index, Camera());
+  };
+  for (int i = 1; i <= kReturns; ++i) ASSERT_TRUE(pipeline.Process(frame_of(i)));
+  EXPECT_EQ(pipeline.track_log().objects().at(kBrick).lost, 0);
+  EXPECT_GT(VoxelsOfBrick(pipeline), 0U);
+}
+
+TEST(LostObjects, AModelIsMatchedSeenThroughOrHidden) {
+  Pipeline pipeline(TrackConfig(AssociationMode::kGiven), Toys());
+  const Frame with = Coming(1, 0);
+  ASSERT_TRUE(pipeline.Process(with));
+  const TsdfGrid& model = *VoxelsOf(pipeline.map()).GridOf(kBrick);
+  const double margin_m = 3 * kToyVoxel_m;
+  const auto look = [&](const Frame& frame) {
+    return LookAtModel(frame, model, Pose::Identity(), kToyVoxel_m, margin_m);
+  };
+  const ModelSight there = look(with);
+  EXPECT_GT(there.matched, 30);
+  EXPECT_EQ(there.through, 0);
+  Frame empty = with;
+  empty.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(5));
+  const ModelSight gone = look(empty);
+  // At outlines some voxels have no depth around them.
+  EXPECT_GE(gone.through, there.matched + there.hidden);
+  EXPECT_LE(0.9 * gone.through, there.matched + there.hidden);
+  EXPECT_EQ(gone.matched + gone.hidden, 0);
+  Frame covered = with;
+  covered.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(0.1));
+  EXPECT_EQ(look(covered).hidden, gone.through);
+  const ModelSight others = LookAtModel(with, model, Pose::Identity(), kToyVoxel_m, margin_m,
+                                        cv::Mat::zeros(with.depth.size(), CV_8UC1));
+  EXPECT_EQ(others.beside, there.matched);
+  EXPECT_EQ(others.matched, 0);
+  Frame unknown = with;
+  unknown.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(0));
+  const ModelSight nothing = look(unknown);
+  EXPECT_EQ(nothing.matched + nothing.through + nothing.hidden, 0);
+}
+
+}  // namespace
+}  // namespace tsdfpp
