@@ -172,6 +172,11 @@ double PlaceError_m(const Run& run, InstanceId of, InstanceId label, int before)
   return *AddSymmetricError_m(run.points_O.at(of), T_WO, truth.at(last)).value;
 }
 
+int PixelsOf(const std::map<InstanceId, Sight>& sights, InstanceId of) {
+  const auto sight = sights.find(of);
+  return sight == sights.end() ? 0 : sight->second.pixels;
+}
+
 Row Judge(const ReturnScene& drawn, const Run& run, InstanceId of) {
   Row row{drawn.kind, drawn.scene.seed};
   for (const SceneObject& object : drawn.scene.objects) {
@@ -180,13 +185,15 @@ Row Judge(const ReturnScene& drawn, const Run& run, InstanceId of) {
   const auto before = static_cast<std::size_t>(drawn.last_before - 1);
   InstanceId own = kNoInstance;  // an object may be frozen in some of the frames
   for (std::size_t i = 0; i <= before; ++i) {
-    const InstanceId label = run.sights[i].at(of).Label();
-    if (label != kNoInstance) own = label;
+    const auto sight = run.sights[i].find(of);
+    if (sight != run.sights[i].end() && sight->second.Label() != kNoInstance) {
+      own = sight->second.Label();
+    }
   }
   std::set<InstanceId> known;  // ids from before anything came back
   std::size_t gone = 0;
   std::size_t back = 0;
-  const int least = static_cast<int>(kBackShare * run.sights.back().at(of).pixels);
+  const int least = static_cast<int>(kBackShare * PixelsOf(run.sights.back(), of));
   for (std::size_t i = before; i < run.sights.size(); ++i) {
     const auto sight = run.sights[i].find(of);
     if (sight == run.sights[i].end() || sight->second.pixels < least / 20) gone = i;
@@ -201,16 +208,19 @@ Row Judge(const ReturnScene& drawn, const Run& run, InstanceId of) {
   row.outcome = "none";
   if (own == kNoInstance || back == 0) return row;
   for (std::size_t i = back; i < run.sights.size(); ++i) {
-    const InstanceId label = run.sights[i].at(of).Label();
-    if (label == kNoInstance) {
-      if (row.outcome != "wrong") row.outcome = "none";
-    } else if (label == own) {
-      if (row.outcome != "wrong") row.outcome = "right";
+    const auto sight = run.sights[i].find(of);
+    if (sight == run.sights[i].end()) continue;
+    const InstanceId label = sight->second.Label();
+    const bool is_decided = row.outcome == "wrong" || row.outcome == "new";
+    if (label == own) {
+      if (!is_decided) row.outcome = "right";
       if (row.delay < 0) row.delay = static_cast<int>(i - back);
-    } else {
-      row.outcome = label == kBackground || known.contains(label) ? "wrong"
-                    : row.outcome == "wrong"                      ? "wrong"
-                                                                  : "new";
+    } else if (label == kNoInstance) {
+      if (!is_decided) row.outcome = "none";
+    } else if (label == kBackground || known.contains(label)) {
+      row.outcome = "wrong";
+    } else if (!is_decided) {
+      row.outcome = "new";
     }
   }
   if (row.outcome == "right") {
@@ -224,8 +234,10 @@ Row Judge(const ReturnScene& drawn, const Run& run, InstanceId of) {
 Row JudgeReplaced(const ReturnScene& drawn, const Run& run) {
   Row row{drawn.kind, drawn.scene.seed, drawn.scene.objects[1].name};
   const auto before = static_cast<std::size_t>(drawn.last_before - 1);
-  std::set<InstanceId> known;
-  for (const auto& [id, seen] : run.sights[before]) known.insert(seen.Label());
+  std::set<InstanceId> known{kBackground};
+  for (std::size_t i = 0; i <= before; ++i) {
+    for (const auto& [id, seen] : run.sights[i]) known.insert(seen.Label());
+  }
   known.erase(kNoInstance);
   row.outcome = "none";
   for (std::size_t i = before + 1; i < run.sights.size(); ++i) {
@@ -233,7 +245,7 @@ Row JudgeReplaced(const ReturnScene& drawn, const Run& run) {
     if (sight == run.sights[i].end()) continue;
     const InstanceId label = sight->second.Label();
     if (known.contains(label)) row.outcome = "wrong";
-    if (label != kNoInstance && label != kBackground && row.outcome == "none") row.outcome = "new";
+    if (label != kNoInstance && row.outcome == "none") row.outcome = "new";
   }
   return row;
 }

@@ -14,6 +14,7 @@
 #include "mapper/track/frozen_pixels.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/lost_objects.h"
+#include "mapper/track/object_model.h"
 #include "mapper/track/pcl_icp.h"
 #include "mapper/track/sdf_tracker.h"
 
@@ -69,6 +70,11 @@ std::unique_ptr<Associator> MakeAssociator(
       return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories));
   }
   std::abort();
+}
+
+// Between the frames that a network looks at, labels may say nothing at all.
+bool SaysWhatIsWhere(const cv::Mat& labels) {
+  return cv::countNonZero(labels != static_cast<double>(kNoInstance)) > 0;
 }
 
 }  // namespace
@@ -145,6 +151,8 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
   }
   is_empty_ = map_->Memory().blocks == 0;
   for (const auto& [id, poses] : trajectories_) {
+    // One that was lost is nowhere.
+    if (lost_ != nullptr && !ModelOf(*map_, id)) continue;
     if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
   }
 }
@@ -216,8 +224,11 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   auto pixels_of = PixelsByLabel(association.labels, 0);
   std::map<InstanceId, TrackStatus> seen;
   for (const auto& [id, pixels] : pixels_of) seen[id] = TrackStatus::kTracked;
-  for (const InstanceId id : lost_->NotInPlace(frame, *map_, T_WO_, seen, association.unclaimed)) {
-    lost_->Keep(id, *map_, T_WO_.at(id));
+  if (SaysWhatIsWhere(association.labels)) {
+    for (const InstanceId id :
+         lost_->NotInPlace(frame, *map_, T_WO_, seen, association.unclaimed)) {
+      lost_->Keep(id, *map_, T_WO_.at(id));
+    }
   }
   if (lost_->empty()) return found;
   std::vector<LoosePixels> segments = association.unclaimed;
@@ -229,14 +240,26 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
     segments.push_back(std::move(pixels));
     id_of.push_back(id);
   }
-  for (const LostObjects::Return& of : lost_->FindAgain(frame, segments, id_of)) {
+  const std::vector<LostObjects::Return> returns = lost_->FindAgain(frame, segments, id_of);
+  for (const LostObjects::Return& of : returns) {
+    // What no network knows begins nothing.
+    const int first = segments[of.segment].front();
+    const bool is_unknown =
+        labels.at<InstanceId>(first / labels.cols, first % labels.cols) == kBackground;
+    if (of.begins_anew && is_unknown) continue;
     if (!lost_->PutBack(of, *map_, T_WO_)) continue;
     associator_->Found(of.id);
     tracker_->Place(of.id, frame.index);
     found.push_back(of.id);
-    if (of.begins_anew) track_log_.AddBegunAnew(of.id);
     for (const int pixel : segments[of.segment]) {
       labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) = of.id;
+    }
+  }
+  // Those have an object now.
+  for (const LostObjects::Return& of : returns) {
+    const bool is_found = std::ranges::count(found, of.id) > 0;
+    if (is_found && of.segment < association.unclaimed.size()) {
+      association.unclaimed[of.segment].clear();
     }
   }
   association.labels = labels;
@@ -246,15 +269,34 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
 void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& association,
                            const std::vector<InstanceId>& found, TrackedFrame& tracked) {
   if (lost_ == nullptr) return;
-  std::vector<InstanceId> lost = lost_->TakeOut(found, *map_, tracked.T_WO);
-  // Those that the frame shows, but not where they could be registered.
-  for (const InstanceId id :
-       lost_->NotInPlace(frame, *map_, tracked.T_WO, tracked.seen, association.unclaimed)) {
-    lost_->Keep(id, *map_, tracked.T_WO.at(id));
+  std::map<InstanceId, TrackStatus> seen = tracked.seen;
+  std::vector<InstanceId> settled;
+  for (const InstanceId id : found) {
+    const bool begins_anew = !ModelOf(*map_, id);
+    // Too little of it to begin with: it stays lost.
+    if (begins_anew && seen.contains(id) && seen.at(id) == TrackStatus::kFrozen) {
+      tracked.T_WO.erase(id);
+      continue;
+    }
+    settled.push_back(id);
+    if (lost_->IsInMap(id)) track_log_.AddLost(id);
+    track_log_.AddFound(id);
+    if (begins_anew) track_log_.AddBegunAnew(id);
+  }
+  std::vector<InstanceId> lost = lost_->TakeOut(settled, *map_, tracked.T_WO);
+  // Those that the frame shows, but not where they could be registered. What is not tracked is
+  // where its pixels are.
+  for (const auto& [id, pixels] : PixelsByLabel(association.labels, 0)) {
+    seen.try_emplace(id, TrackStatus::kTracked);
+  }
+  if (SaysWhatIsWhere(association.labels)) {
+    for (const InstanceId id :
+         lost_->NotInPlace(frame, *map_, tracked.T_WO, seen, association.unclaimed)) {
+      lost_->Keep(id, *map_, tracked.T_WO.at(id));
+    }
   }
   for (const InstanceId id : lost_->TakeOut({}, *map_, tracked.T_WO)) lost.push_back(id);
   for (const InstanceId id : lost) track_log_.AddLost(id);
-  for (const InstanceId id : found) track_log_.AddFound(id);
 }
 
 void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {

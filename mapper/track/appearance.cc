@@ -68,7 +68,7 @@ class Gatherer {
     appearance.colours = std::move(shares_);
     if (points_.empty()) return appearance;
     // Depth at outlines may put some of an object's points on the wall behind it.
-    Eigen::Vector3d middle;
+    Eigen::Vector3d& middle = appearance.middle;
     std::vector<double> values(points_.size());
     for (int axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < values.size(); ++i) values[i] = points_[i][axis];

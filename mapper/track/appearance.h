@@ -14,7 +14,8 @@ struct Appearance {
   // the frame has its channels) and brightness, each colour spread over the bins beside it. Sums to
   // 1; empty without colours.
   std::vector<float> colours;
-  double radius_m = 0;  // about their middle, within which four of five are
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // metres, of each axis
+  double radius_m = 0;                               // about it, within which four of five are
   int points = 0;
 };
 

@@ -18,6 +18,8 @@ constexpr double kMargin_voxels = 3;
 // An object is not in its place where so many of its voxels are seen not to be there, and more of
 // them than are matched.
 constexpr int kLeastGone = 20;
+// Of these, seen through: a segment may show the object in its place together with something else.
+constexpr double kLeastThrough = 0.1;
 // A segment that comes nearer to the picture's edge goes on outside.
 constexpr int kEdge_px = 3;
 // So much of a segment's outline may be beside something nearer.
@@ -29,6 +31,10 @@ constexpr double kLeastLikeness = 0.5;
 constexpr double kLeastLead = 0.1;
 constexpr int kEvery_frames = 3;
 constexpr int kMostPoints = 1500;  // of a segment, to say where it is
+// Searches in one frame, of the pairs of segments and objects that are the most alike.
+constexpr int kMostSearches = 8;
+// A segment whose rectangle has more pixels than so many times its own is no thing.
+constexpr double kMostSpread = 100;
 
 // A segment's pixels within the rectangle around them and a margin; 255, else 0.
 struct CutOut {
@@ -37,18 +43,19 @@ struct CutOut {
 };
 constexpr int kBeyond_px = 2;
 
-CutOut CutOutOf(const LoosePixels& pixels, int columns) {
-  cv::Rect around;
-  if (!pixels.empty()) {
-    int left = columns;
-    int right = 0;
-    for (const int pixel : pixels) {
-      left = std::min(left, pixel % columns);
-      right = std::max(right, pixel % columns);
-    }
-    const int top = pixels.front() / columns;
-    around = {left, top, right - left + 1, pixels.back() / columns - top + 1};
+cv::Rect RectangleOf(const LoosePixels& pixels, int columns) {
+  if (pixels.empty()) return {};
+  int left = columns;
+  int right = 0;
+  for (const int pixel : pixels) {
+    left = std::min(left, pixel % columns);
+    right = std::max(right, pixel % columns);
   }
+  const int top = pixels.front() / columns;
+  return {left, top, right - left + 1, pixels.back() / columns - top + 1};
+}
+
+CutOut CutOutOf(const LoosePixels& pixels, const cv::Rect& around, int columns) {
   const cv::Point margin(kBeyond_px, kBeyond_px);
   CutOut cut{cv::Mat::zeros(around.size() + cv::Size(2 * margin), CV_8UC1), around.tl() - margin};
   for (const int pixel : pixels) {
@@ -102,6 +109,13 @@ bool IsAlike(const Appearance& segment, const Appearance& model, double voxel_m)
   return IsOfSize(segment, model, voxel_m) && ColoursInCommon(segment, model) >= kLeastAlike;
 }
 
+// Whether the model would be in the picture, and most of it is not: it is hidden, or gone.
+bool IsMostlyUnseen(const Frame& frame, const ObjectModel& model, double voxel_m) {
+  const ModelSight sight =
+      LookAtModel(frame, *model.grid, model.T_WL, voxel_m, kMargin_voxels * voxel_m);
+  return sight.hidden + sight.through > sight.matched;
+}
+
 }  // namespace
 
 struct LostObjects::Look {
@@ -119,10 +133,16 @@ LostObjects::Look LostObjects::LookAt(const Frame& frame, const LoosePixels& pix
   SdfTrackConfig config = config_;
   config.max_points = std::min(config.max_points, kMostPoints);
   look.points = SegmentPointsOf(frame, pixels, voxel_m, config);
-  look.is_large = look.points.size() >= static_cast<std::size_t>(config_.min_points);
+  look.is_large =
+      look.points.size() >= static_cast<std::size_t>(std::min(config_.min_points, kMostPoints));
   if (!look.is_large) return look;
   look.appearance = AppearanceOf(frame, look.points);
-  const CutOut cut = CutOutOf(pixels, frame.depth.cols);
+  const cv::Rect around = RectangleOf(pixels, frame.depth.cols);
+  if (around.area() > kMostSpread * static_cast<double>(pixels.size())) {
+    look.is_at_edge = true;
+    return look;
+  }
+  const CutOut cut = CutOutOf(pixels, around, frame.depth.cols);
   look.is_at_edge = ReachesTheEdge(cut, frame.depth.size());
   look.is_covered = IsCovered(frame, cut, voxel_m);
   return look;
@@ -148,7 +168,9 @@ std::vector<InstanceId> LostObjects::NotInPlace(const Frame& frame, const MapRep
     const ModelSight sight =
         LookAtModel(frame, *model->grid, model->T_WL, voxel_m, kMargin_voxels * voxel_m, may_be);
     const int gone = sight.through + sight.beside;
-    if (gone >= kLeastGone && gone > sight.matched) lost.push_back(id);
+    const bool is_seen_through =
+        sight.through > 0 && sight.through >= kLeastThrough * (gone + sight.matched);
+    if (gone >= kLeastGone && gone > sight.matched && is_seen_through) lost.push_back(id);
   }
   return lost;
 }
@@ -187,22 +209,28 @@ Associator::MayBeMissing LostObjects::Awaited(const Frame& frame,
     return std::ranges::any_of(unseen, [&](InstanceId id) {
       const auto [appearance, is_new] = of_map->try_emplace(id);
       const std::optional<ObjectModel> model = is_new ? ModelOf(map, id) : std::nullopt;
-      if (model) appearance->second = AppearanceOf(*model->grid, voxel_m);
+      if (model && IsMostlyUnseen(frame, *model, voxel_m)) {
+        appearance->second = AppearanceOf(*model->grid, voxel_m);
+      }
       return appearance->second.points > 0 && may_be(appearance->second);
     });
   };
 }
 
-std::optional<LostObjects::Return> LostObjects::Find(InstanceId id, const Frame& frame,
-                                                     const LoosePixels& pixels, const Look& look,
-                                                     std::size_t segment) const {
+LostObjects::Return LostObjects::Find(InstanceId id, const Frame& frame, const LoosePixels& pixels,
+                                      const Look& look, std::size_t segment) const {
   const Kept& kept = kept_.at(id);
-  const ModelSearch search{&frame,       &look.points, MaskOf(pixels, frame.depth.size()),
-                           &kept.volume, kept.T_WL,    kept.voxel_m};
-  const auto found = FindModel(search, config_);
-  if (!found) return std::nullopt;
-  return Return{id, segment, frame.T_WC * found->T_LC.inverse() * kept.T_WL.inverse() * kept.T_WO,
-                !IsCertain(*found)};
+  if (look.points.size() >= kLeastSearchedPoints) {
+    const ModelSearch search{&frame,       &look.points, MaskOf(pixels, frame.depth.size()),
+                             &kept.volume, kept.T_WL,    kept.voxel_m};
+    if (const auto found = FindModel(search, config_)) {
+      return {id, segment, frame.T_WC * found->T_LC.inverse() * kept.T_WL.inverse() * kept.T_WO,
+              !IsCertain(*found)};
+    }
+  }
+  const Eigen::Vector3d way_W =
+      frame.T_WC * look.appearance.middle - kept.T_WL * kept.appearance.middle;
+  return {id, segment, Eigen::Translation3d(way_W) * kept.T_WO, true};
 }
 
 std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
@@ -240,13 +268,14 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
     taken_segments.insert(found.segment);
     returns.push_back(found);
   };
+  int searches = 0;
   for (const Pair& pair : pairs) {
     const Kept& kept = kept_.at(pair.id);
     if (taken_ids.contains(pair.id) || taken_segments.contains(pair.segment)) continue;
-    if (kept.frames_in_sight % kEvery_frames != 0) continue;
-    const auto found =
+    if (kept.frames_in_sight % kEvery_frames != 0 || ++searches > kMostSearches) continue;
+    const Return found =
         Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
-    if (found && !found->begins_anew) take(*found);
+    if (!found.begins_anew) take(found);
   }
   // Of the others, by their looks.
   std::set<InstanceId> waited;
@@ -263,9 +292,7 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
              other.alike > pair.alike - kLeastLead;
     });
     if (pair.alike < kLeastLikeness || !is_clear) continue;
-    const auto found =
-        Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
-    if (found) take(*found);
+    take(Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment));
   }
   return returns;
 }
@@ -280,6 +307,7 @@ Expected<void> LostObjects::PutBack(const Return& found, MapRepresentation& map,
     TSDFPP_RETURN_IF_ERROR(CheckAddition(map.config(), found.id, kept.volume, T_WL, found.T_WO));
     map.SetObjectPose(found.id, found.T_WO);
   } else {
+    map.Remove(found.id);
     TSDFPP_RETURN_IF_ERROR(EditingOf(map).Add(found.id, kept.volume, T_WL, found.T_WO));
   }
   T_WO[found.id] = found.T_WO;

@@ -44,6 +44,8 @@ class LostObjects {
   bool empty() const { return kept_.empty(); }
   bool Has(InstanceId id) const { return kept_.contains(id); }
   std::vector<InstanceId> Ids() const;
+  // Of one that is kept: whether it was lost in this frame, and the map still has it.
+  bool IsInMap(InstanceId id) const { return kept_.at(id).is_in_map; }
 
   // Whether a segment of the frame may be one of the kept objects, or one of those of the map that
   // the frame does not show: it has some of their colours, and about their size where it is seen
@@ -84,9 +86,9 @@ class LostObjects {
   };
   struct Look;  // a segment as one frame shows it
   Look LookAt(const Frame& frame, const LoosePixels& pixels, double voxel_m) const;
-  // Begins anew where it is not certain.
-  std::optional<Return> Find(InstanceId id, const Frame& frame, const LoosePixels& pixels,
-                             const Look& look, std::size_t segment) const;
+  // Begins anew where it is not certain; where nothing is found, too, turned as it was last.
+  Return Find(InstanceId id, const Frame& frame, const LoosePixels& pixels, const Look& look,
+              std::size_t segment) const;
 
   SdfTrackConfig config_;
   std::map<InstanceId, Kept> kept_;

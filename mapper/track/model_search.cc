@@ -14,9 +14,6 @@
 namespace tsdfpp {
 namespace {
 
-// A segment of fewer may be of anything.
-constexpr std::size_t kLeastPoints = 100;
-
 // Places all around: views of the model, turns of each about its axis, and shifts.
 constexpr int kViews = 60;
 constexpr int kTurns = 12;
@@ -370,7 +367,7 @@ class Search {
 }  // namespace
 
 std::optional<FoundModel> FindModel(const ModelSearch& search, const SdfTrackConfig& config) {
-  if (search.points->size() < kLeastPoints) return std::nullopt;
+  if (search.points->size() < kLeastSearchedPoints) return std::nullopt;
   return Search(search, config).Find();
 }
 

@@ -19,6 +19,9 @@ struct ModelSearch {
   double voxel_m = 0;
 };
 
+// A segment of fewer points may be of anything.
+inline constexpr std::size_t kLeastSearchedPoints = 100;
+
 struct FoundModel {
   Pose T_LC = Pose::Identity();
   // What speaks for the place, at most 1, and for the best of the places that would look otherwise.

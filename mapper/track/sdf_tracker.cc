@@ -89,7 +89,9 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
     turn.status = TrackStatus::kBegun;
     memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}};
     if (config_.keyframe_turn_rad > 0) {
-      memory.keyframe = KeyframeOf(points, frame.T_WC, frame.intrinsics);
+      // A model that is begun anew has a pose already.
+      const Pose T_OC = known == before.end() ? frame.T_WC : known->second.inverse() * frame.T_WC;
+      memory.keyframe = KeyframeOf(points, T_OC, frame.intrinsics);
     }
     return;
   }

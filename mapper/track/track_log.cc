@@ -9,9 +9,12 @@ void TrackLog::Add(int frame, const TrackedPoses& tracked) {
   for (const auto& [id, motion] : tracked.motions) motions_[id][frame] = motion;
   for (const auto& [id, status] : tracked.seen) {
     TrackSpan& span = objects_.try_emplace(id, TrackSpan{frame, frame}).first->second;
+    const bool was_tracked = span.tracked > 0;
     switch (status) {
       case TrackStatus::kBegun:
-        span.first = span.last = frame;
+        // One that begins anew began before.
+        if (!was_tracked) span.first = frame;
+        span.last = frame;
         break;
       case TrackStatus::kTracked:
         span.last = frame;

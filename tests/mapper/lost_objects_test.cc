@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <cmath>
 #include <optional>
 
 #include "core/units.h"
@@ -168,6 +169,52 @@ TEST(LostObjects, NothingElseIsTakenForThem) {
   for (int i = born; i <= kFrames; ++i) ASSERT_TRUE(pipeline.Process(frame_of(i)));
   EXPECT_EQ(pipeline.Objects().size(), 4U);
   for (const auto& [id, span] : pipeline.track_log().objects()) EXPECT_EQ(span.found, 0);
+}
+
+// What is too small to be looked for is begun anew as well, where its segment is.
+TEST(LostObjects, SmallOnesBeginAnewWhereTheirSegmentIs) {
+  PipelineConfig config = TrackConfig(AssociationMode::kGiven);
+  config.track.max_points = 90;
+  Pipeline pipeline(config, Toys());
+  const int last = kReturns + config.track.return_frames + 1;
+  for (int i = 1; i <= last; ++i) ASSERT_TRUE(pipeline.Process(Coming(i, 0)));
+  EXPECT_EQ(pipeline.track_log().objects().at(kBrick).begun_anew, 1);
+  EXPECT_EQ(pipeline.track_log().objects().at(kBrick).first, 1);
+  EXPECT_GT(VoxelsOfBrick(pipeline), 0U);
+  const auto& poses = pipeline.trajectories().at(kBrick);
+  ASSERT_TRUE(poses.contains(last));
+  const Pose truth = Coming(last, 0).T_WO.at(kBrick) * Coming(1, 0).T_WO.at(kBrick).inverse();
+  // Another side of it is in sight there: the middles of two of its faces are as far apart.
+  const double most_m = std::hypot(0.075, 0.05);
+  EXPECT_LT((poses.at(last) * kBefore - truth * kBefore).norm(), most_m);
+}
+
+// An object that a map's file has a pose of, but that is not tracked now, is fused where it is
+// seen.
+TEST(LostObjects, AreOnlyThoseThatAreTracked) {
+  PipelineConfig config = TrackConfig(AssociationMode::kGiven);
+  auto map = MakeMap(config.method, config.map);
+  const Frame first = Coming(1, 0);
+  map->SetObjectPose(kBrick, Pose::Identity());
+  map->Fuse(first, first.mask);
+  config.tracked = TrackChoice::kClassified;
+  Pipeline pipeline(config, Toys(), std::move(map), {{kBrick, {{1, Pose::Identity()}}}});
+  for (int i = kReturns; i <= kReturns + 2; ++i) ASSERT_TRUE(pipeline.Process(Coming(i, 0)));
+  EXPECT_TRUE(pipeline.track_log().objects().empty());
+  EXPECT_GT(VoxelsOfBrick(pipeline), 0U);
+  EXPECT_TRUE(pipeline.Remarks().size() == 1U) << "that nothing was tracked";
+}
+
+// Between the frames that a network looks at, nothing has a label.
+TEST(LostObjects, FramesWithoutLabelsLoseNothing) {
+  Pipeline pipeline(TrackConfig(AssociationMode::kGiven), Toys());
+  for (int i = 1; i < kLeaves; ++i) ASSERT_TRUE(pipeline.Process(Coming(i, 0)));
+  const std::size_t before = VoxelsOfBrick(pipeline);
+  Frame blank = Coming(kLeaves, 0);
+  blank.mask.setTo(static_cast<double>(kNoInstance));
+  ASSERT_TRUE(pipeline.Process(blank));
+  EXPECT_EQ(VoxelsOfBrick(pipeline), before);
+  EXPECT_EQ(pipeline.track_log().objects().at(kBrick).lost, 0);
 }
 
 // Where a frame is refused, objects that it lacked, or that were found in it, are as they were.
