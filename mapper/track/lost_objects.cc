@@ -109,11 +109,11 @@ bool IsAlike(const Appearance& segment, const Appearance& model, double voxel_m)
   return IsOfSize(segment, model, voxel_m) && ColoursInCommon(segment, model) >= kLeastAlike;
 }
 
-// Whether the model would be in the picture, and most of it is not: it is hidden, or gone.
-bool IsMostlyUnseen(const Frame& frame, const ObjectModel& model, double voxel_m) {
+// Whether some of the model should be in the picture, and is not: something hides it, or it is gone.
+bool IsPartlyUnseen(const Frame& frame, const ObjectModel& model, double voxel_m) {
   const ModelSight sight =
       LookAtModel(frame, *model.grid, model.T_WL, voxel_m, kMargin_voxels * voxel_m);
-  return sight.hidden + sight.through > sight.matched;
+  return sight.hidden + sight.through >= kLeastGone;
 }
 
 }  // namespace
@@ -209,7 +209,7 @@ Associator::MayBeMissing LostObjects::Awaited(const Frame& frame,
     return std::ranges::any_of(unseen, [&](InstanceId id) {
       const auto [appearance, is_new] = of_map->try_emplace(id);
       const std::optional<ObjectModel> model = is_new ? ModelOf(map, id) : std::nullopt;
-      if (model && IsMostlyUnseen(frame, *model, voxel_m)) {
+      if (model && IsPartlyUnseen(frame, *model, voxel_m)) {
         appearance->second = AppearanceOf(*model->grid, voxel_m);
       }
       return appearance->second.points > 0 && may_be(appearance->second);
