@@ -109,7 +109,7 @@ bool IsAlike(const Appearance& segment, const Appearance& model, double voxel_m)
   return IsOfSize(segment, model, voxel_m) && ColoursInCommon(segment, model) >= kLeastAlike;
 }
 
-// Whether some of the model should be in the picture, and is not: something hides it, or it is gone.
+// Whether some of the model should be in the picture and is not: it is hidden, or gone.
 bool IsPartlyUnseen(const Frame& frame, const ObjectModel& model, double voxel_m) {
   const ModelSight sight =
       LookAtModel(frame, *model.grid, model.T_WL, voxel_m, kMargin_voxels * voxel_m);
