@@ -1,4 +1,5 @@
 """From the network's maps to things, as the mapper does it (mapper/segment/network_maps.cc), and how good they are."""
+import cv2
 import numpy as np
 
 LEAST_CENTRE = 0.3     # of a centre's map, after its logit became a share
@@ -10,8 +11,7 @@ def of_maps(maps):
     """Ids (0: no thing; 1 and up, by rows of their centres) of maps (4 x height x width, network.py)."""
     thing = maps[0] > 0
     centre = 1 / (1 + np.exp(-maps[1]))
-    padded = np.pad(centre, CENTRE_REACH_PX)
-    most = np.lib.stride_tricks.sliding_window_view(padded, (2 * CENTRE_REACH_PX + 1,) * 2).max(axis=(2, 3))
+    most = cv2.dilate(centre, np.ones((2 * CENTRE_REACH_PX + 1,) * 2, np.uint8))
     v, u = np.nonzero((centre == most) & (centre > LEAST_CENTRE) & thing)
     ids = np.zeros(thing.shape, np.int32)
     if len(v) == 0:

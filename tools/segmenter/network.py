@@ -9,7 +9,7 @@ INPUTS = 5
 OUTPUTS = 4
 # Sides of the input are whole multiples of it.
 STRIDE = 16
-WIDTHS = (12, 24, 48, 80, 112)
+WIDTHS = (16, 36, 72, 120, 168)
 
 
 def convolution(inputs, outputs, stride=1, dilation=1):

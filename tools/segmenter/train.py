@@ -2,14 +2,18 @@
 """Trains the network of network.py on what make_data.py rendered, and writes it as ONNX.
 
     /usr/bin/python3 tools/segmenter/train.py --data out/segmenter/data --out out/segmenter/run [--minutes 600] [--seed 1]
+        [--device cpu|cuda] [--batch 8] [--threads 2]
 
-Needs Debian's python3-torch and python3-opencv. Minutes are those of a core. OUT gets last.pt (it goes on from there),
-curve.csv (a line every 200 steps: steps, minutes, loss; of every 10th scene, which is not trained on, the share of pixels that
-are a thing's or not as they should be, and the panoptic quality of things; scenes that are) and segmenter.onnx.
+Needs Debian's python3-torch and python3-opencv. `--device cuda` trains where PyTorch finds a GPU. OUT gets last.pt (from which
+it goes on), curve.csv (steps, minutes, loss; of every 10th scene, which is not trained on, the share of pixels that are a
+thing's or not as they should be, and the panoptic quality of things; scenes that are) and segmenter.onnx. Scenes that come
+into the folder meanwhile are taken.
 """
 import argparse
 import copy
+import multiprocessing
 import pathlib
+import queue
 import time
 
 import numpy as np
@@ -22,35 +26,36 @@ import frames
 import instances
 from network import Segmenter
 
-BATCH = 8
-SIZE = (192, 256)  # rows, columns of a part that is trained on
-CHECK_EVERY = 200
+SIZE = (240, 320)  # rows, columns of what is trained on
+CHECKS = 10        # of the network, in all
 HELD_OUT = 10
+MOST_CHECKED = 24  # scenes that are held out
 
 
-def loss_of(maps, thing, known, bumps, way):
+def loss_of(maps, thing, known, bumps, way, has_way):
     of_thing = functional.binary_cross_entropy_with_logits(maps[:, 0], thing, reduction="none")
     of_thing = (of_thing * known).sum() / known.sum()
     of_centre = functional.binary_cross_entropy_with_logits(maps[:, 1], bumps, reduction="none")
     # What is nearly all background must not drown the bumps.
-    of_centre = (of_centre * known * (0.1 + 10 * bumps)).sum() / (known * (0.1 + 10 * bumps)).sum()
+    weight = known * (0.1 + 10 * bumps)
+    of_centre = (of_centre * weight).sum() / weight.sum()
     off = (maps[:, 2:] - way).abs().sum(dim=1) / 16
-    of_way = (off * thing).sum() / thing.sum().clamp(min=1)
+    of_way = (off * has_way).sum() / has_way.sum().clamp(min=1)
     return of_thing + of_centre + 0.3 * of_way
 
 
-def held_out_scores(network, scenes):
+def held_out_scores(network, scenes, device):
     """Share of right pixels, and PQ of things, on the first and the last frame of each."""
     network.eval()
     right = pixels = 0
     quality = instances.Quality()
     with torch.no_grad():
-        for scene in scenes:
+        for scene in scenes[:MOST_CHECKED]:
             for frame in (scene[0], scene[-1]):
                 ids = frame[2]
-                maps = network(torch.from_numpy(frames.input_of(frame))[None])[0].numpy()
+                maps = network(torch.from_numpy(frames.input_of(frame))[None].to(device))[0].cpu().numpy()
                 maps = maps[:, :ids.shape[0], :ids.shape[1]]
-                known = ids != 255
+                known = ids != frames.UNKNOWN
                 right += ((maps[0] > 0) == (ids > 0))[known].sum()
                 pixels += known.sum()
                 quality.add(np.where(known, ids, 0), np.where(known, instances.of_maps(maps), 0))
@@ -60,7 +65,7 @@ def held_out_scores(network, scenes):
 
 def export(network, file):
     """Without the norms, which become part of the convolutions before them."""
-    plain = copy.deepcopy(network).eval()
+    plain = copy.deepcopy(network).cpu().eval()
     for part in plain.modules():
         if isinstance(part, nn.Sequential) and len(part) == 3 and isinstance(part[1], nn.BatchNorm2d):
             part[0], part[1] = fuse_conv_bn_eval(part[0], part[1]), nn.Identity()
@@ -68,18 +73,38 @@ def export(network, file):
                       input_names=["frame"], output_names=["maps"], opset_version=11)
 
 
+def read_for_ever(folder, read):
+    seen = set()
+    while True:
+        for path in sorted(folder.iterdir()):
+            if path.name not in seen and (path / "sequence.json").exists():
+                seen.add(path.name)
+                read.put((int(path.name), frames.read_sequence(path)))
+        time.sleep(1)
+
+
 class Data:
-    """Sequences as they appear in the folder; every tenth is held out."""
+    """Sequences as they appear in the folder, read by a process of its own; every tenth is held out."""
 
-    def __init__(self, folder):
-        self.folder, self.seen, self.train, self.held_out = folder, set(), [], []
+    def __init__(self, folder, most, device):
+        self.read = multiprocessing.Queue(maxsize=32)
+        # Before a GPU is looked at: what has one cannot be forked.
+        multiprocessing.Process(target=read_for_ever, args=(folder, self.read), daemon=True).start()
+        self.store = frames.Store(most, *SIZE, device)
+        self.scenes, self.held_out = 0, []
 
-    def look(self):
-        for path in sorted(self.folder.iterdir()):
-            if path.name in self.seen or not (path / "sequence.json").exists():
-                continue
-            self.seen.add(path.name)
-            (self.held_out if int(path.name) % HELD_OUT == 0 else self.train).append(frames.read_sequence(path))
+    def take(self, at_least=0):
+        """What was read by now; waits where there are fewer scenes than `at_least`."""
+        while True:
+            try:
+                number, sequence = self.read.get(block=self.scenes < at_least)
+            except queue.Empty:
+                return
+            if number % HELD_OUT == 0:
+                self.held_out.append(sequence)
+            else:
+                self.store.add(sequence)
+                self.scenes += 1
 
 
 def main():
@@ -89,58 +114,79 @@ def main():
     parser.add_argument("--minutes", type=float, default=600)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--most-frames", type=int, default=12000)
+    parser.add_argument("--wait-for", type=int, default=20, help="scenes to begin with")
+    parser.add_argument("--export-only", action="store_true", help="write segmenter.onnx of last.pt")
     parser.add_argument("--rate", type=float, default=2e-3, help="of learning, at first; it falls to 0 along a cosine")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
-    torch.manual_seed(options.seed)
+    torch.backends.cudnn.benchmark = True
     options.out.mkdir(parents=True, exist_ok=True)
     draw = np.random.default_rng(options.seed)
-    network = Segmenter().to(memory_format=torch.channels_last)
+    on_gpu = options.device != "cpu"
+    data = None if options.export_only else Data(options.data, options.most_frames, options.device)
+    torch.manual_seed(options.seed)
+    network = Segmenter().to(options.device, memory_format=torch.channels_last)
     optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=1e-4)
     step, spent_s = 0, 0.0
     last = options.out / "last.pt"
     if last.exists():
-        state = torch.load(last)
+        state = torch.load(last, map_location=options.device)
         network.load_state_dict(state["network"])
         optimiser.load_state_dict(state["optimiser"])
         step, spent_s = state["step"], state["spent_s"]
         draw = np.random.default_rng([options.seed, step])
-    data = Data(options.data)
-    total = 0.0
-    began = time.process_time()
+        torch.manual_seed(options.seed + step)
+    if options.export_only:
+        export(network, options.out / "segmenter.onnx")
+        return
+    began = time.monotonic()
+    data.take(options.wait_for)
+    total, since = torch.zeros((), device=options.device), 0
+    length_s = 60 * options.minutes
+    next_check_s = length_s / CHECKS
 
     def spent():
-        return spent_s + time.process_time() - began
+        return spent_s + time.monotonic() - began
 
-    while spent() < 60 * options.minutes:
-        if step % CHECK_EVERY == 0:
-            data.look()
-        share = spent() / (60 * options.minutes)
-        for group in optimiser.param_groups:
-            group["lr"] = options.rate * min(1, (step + 1) / 100) * 0.5 * (1 + np.cos(np.pi * min(1, share)))
-        examples = []
-        for _ in range(BATCH):
-            scene = data.train[draw.integers(len(data.train))]
-            examples.append(frames.example_of(scene[draw.integers(len(scene))], *SIZE, draw))
-        x, thing, known, bumps, way = (torch.from_numpy(np.stack(part)) for part in zip(*examples))
-        optimiser.zero_grad()
-        loss = loss_of(network(x.to(memory_format=torch.channels_last)), thing, known, bumps, way)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5)
-        optimiser.step()
-        total += loss.item()
-        step += 1
-        if step % CHECK_EVERY == 0:
-            right, pq = held_out_scores(network, data.held_out)
-            line = f"{step},{spent() / 60:.1f},{total / CHECK_EVERY:.4f},{right:.4f},{pq:.4f},{len(data.train)}"
+    while spent_s > next_check_s:
+        next_check_s += length_s / CHECKS
+    while True:
+        if step % 20 == 0:
+            data.take()
+        now_s = spent()
+        share = min(1.0, now_s / length_s)
+        if since > 0 and (now_s >= next_check_s or share == 1):
+            next_check_s += length_s / CHECKS
+            right, pq = held_out_scores(network, data.held_out, options.device)
+            line = f"{step},{now_s / 60:.1f},{total.item() / since:.4f},{right:.4f},{pq:.4f},{data.scenes}"
             with open(options.out / "curve.csv", "a") as curve:
                 curve.write(line + "\n")
             print(line, flush=True)
-            total = 0.0
+            total, since = torch.zeros((), device=options.device), 0
             torch.save({"network": network.state_dict(), "optimiser": optimiser.state_dict(), "step": step,
-                        "spent_s": spent()}, last)
-            export(network, options.out / "segmenter.onnx")
-    export(network, options.out / "segmenter.onnx")
+                        "spent_s": float(spent())}, options.out / "next.pt")
+            (options.out / "next.pt").replace(last)
+            if share == 1:
+                break
+        for group in optimiser.param_groups:
+            group["lr"] = options.rate * min(1, (step + 1) / 100) * 0.5 * (1 + np.cos(np.pi * share))
+        numbers = torch.from_numpy(draw.integers(data.store.count, size=options.batch)).to(options.device)
+        x, *targets = frames.examples_of(data.store, numbers, *SIZE)
+        optimiser.zero_grad(set_to_none=True)
+        with torch.autocast("cuda" if on_gpu else "cpu", dtype=torch.bfloat16, enabled=on_gpu):
+            maps = network(x.to(memory_format=torch.channels_last))
+        loss = loss_of(maps.float(), *targets)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 5)
+        optimiser.step()
+        total += loss.detach()
+        since += 1
+        step += 1
+    if not on_gpu:
+        export(network, options.out / "segmenter.onnx")
 
 
 if __name__ == "__main__":
