@@ -12,12 +12,11 @@
 
 #include "bench/figure_runs.h"
 #include "bench/return_scenes.h"
-#include "core/random.h"
+#include "bench/track_scores.h"
 #include "core/toml_reader.h"
 #include "mapper/pipeline.h"
 #include "metrics/object_pose.h"
 #include "metrics/statistics.h"
-#include "metrics/surface_samples.h"
 #include "sim/sensor/sensor.h"
 #include "sim/simulated_source.h"
 
@@ -31,7 +30,6 @@ constexpr int kReplacedShare = 6;  // one case in so many besides
 // last frame shows of it, clear of the picture's edge.
 constexpr double kBackShare = 0.5;
 constexpr int kEdge_px = 3;
-constexpr std::size_t kPoints = 500;  // of a true surface
 
 // What one frame shows of one true object, and as what.
 struct Sight {
@@ -63,28 +61,6 @@ std::map<InstanceId, Sight> SightsOf(const cv::Mat& truth, const cv::Mat& labels
   return sights;
 }
 
-// The mask with other ids, none twice, drawn for this frame.
-cv::Mat WithDrawnIds(const cv::Mat& mask, std::uint64_t seed, int frame) {
-  constexpr std::uint32_t kStream = 72;
-  std::map<InstanceId, InstanceId> drawn{{kBackground, kBackground}, {kNoInstance, kNoInstance}};
-  std::set<InstanceId> used;
-  std::uint32_t draws = 0;
-  cv::Mat result = mask.clone();
-  for (int v = 0; v < mask.rows; ++v) {
-    for (int u = 0; u < mask.cols; ++u) {
-      const InstanceId id = mask.at<InstanceId>(v, u);
-      while (!drawn.contains(id)) {
-        const double draw =
-            UniformDraw(seed, kStream, static_cast<std::uint64_t>(frame), draws++)[0];
-        const auto other = static_cast<InstanceId>(1 + static_cast<int>(draw * (kNoInstance - 1)));
-        if (used.insert(other).second) drawn[id] = other;
-      }
-      result.at<InstanceId>(v, u) = drawn[id];
-    }
-  }
-  return result;
-}
-
 struct Row {
   ReturnKind kind{};
   std::uint64_t seed = 0;
@@ -103,11 +79,11 @@ struct Plan {
 
 Expected<Plan> PlanOf(const ReturnBenchOptions& options) {
   Plan plan;
-  if (options.depth == "noise") {
-    TSDFPP_ASSIGN(plan.sensor, SensorPresetNamed("nguyen2012"));
-  } else if (options.depth != "exact") {
+  if (options.depth != "noise" && options.depth != "exact") {
     return UsageError("--depth: expected exact or noise, found '{}'", options.depth);
   }
+  TSDFPP_ASSIGN(plan.sensor, SensorPresetNamed(options.depth == "noise" ? "nguyen2012+masks_redrawn"
+                                                                        : "masks_redrawn"));
   TSDFPP_ASSIGN(plan.pipeline.method, MethodFromName(options.method));
   plan.pipeline.associate = AssociationMode::kVotes;
   plan.pipeline.poses = PoseSource::kTrack;
@@ -134,12 +110,7 @@ Expected<Run> RunCase(const ReturnScene& drawn, const Plan& plan) {
   Run run;
   TSDFPP_ASSIGN(const std::vector<TrueModel> models, source->Truth());
   for (const TrueModel& model : models) {
-    const SampleConfig config;
-    const SampleSet samples = SampleMesh(model.mesh_O, config.fine_per_cm2, config.seed);
-    const std::size_t count = std::min(kPoints, samples.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      run.points_O[model.info.id].push_back(samples.points[i * samples.size() / count]);
-    }
+    run.points_O[model.info.id] = SomePoints(model.mesh_O);
   }
   Pipeline pipeline(plan.pipeline, {});
   const SequenceInfo& info = source->info();
@@ -147,11 +118,8 @@ Expected<Run> RunCase(const ReturnScene& drawn, const Plan& plan) {
     TSDFPP_ASSIGN(Frame frame, source->ReadTrue(index));
     const cv::Mat truth = frame.mask.clone();
     for (const auto& [id, T_WO] : frame.T_WO) run.truth[id][index] = T_WO;
-    if (!(plan.sensor == SensorConfig{})) {
-      TSDFPP_ASSIGN(const SensedTruth ignored,
-                    ApplySensor(plan.sensor, drawn.scene.seed, info, frame));
-    }
-    frame.mask = WithDrawnIds(frame.mask, drawn.scene.seed, index);
+    TSDFPP_ASSIGN(const SensedTruth ignored,
+                  ApplySensor(plan.sensor, drawn.scene.seed, info, frame));
     frame.T_WO.clear();
     TSDFPP_ASSIGN(const StepTimes times, pipeline.Process(frame));
     run.slowest_ms = std::max(run.slowest_ms, 1e3 * times.track_s);

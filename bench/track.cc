@@ -13,7 +13,6 @@
 #include "core/folders.h"
 #include "core/toml_reader.h"
 #include "metrics/statistics.h"
-#include "metrics/surface_samples.h"
 #include "sim/load_scene.h"
 #include "sim/simulated_source.h"
 
@@ -30,7 +29,6 @@ constexpr double kFixedTurn = 0.01;
 // Between these the squared errors of motions are called as large as the covariance says.
 constexpr double kLeastNees = 0.5;
 constexpr double kMostNees = 2;
-constexpr std::size_t kPoints = 500;  // of a true surface, for ADD and ADD-S, which is quadratic
 
 struct RunPlan {
   std::string name;  // as given
@@ -119,17 +117,6 @@ double MedianMs(const TrackRun& run) {
   std::vector<double> ms;
   for (const TrackRun::Cost& cost : run.costs()) ms.push_back(cost.track_ms / cost.objects);
   return ms.empty() ? 0 : MedianOf(ms);
-}
-
-std::vector<Eigen::Vector3f> SomePoints(const TriangleMesh& mesh) {
-  const SampleConfig config;
-  const SampleSet samples = SampleMesh(mesh, config.fine_per_cm2, config.seed);
-  std::vector<Eigen::Vector3f> points;
-  const std::size_t count = std::min(kPoints, samples.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    points.push_back(samples.points[i * samples.size() / count]);
-  }
-  return points;
 }
 
 Expected<void> Feed(const Frame& frame, const KnownModels& known, const Plan& plan, Stage& stage) {

@@ -5,6 +5,7 @@
 
 #include "metrics/object_pose.h"
 #include "metrics/statistics.h"
+#include "metrics/surface_samples.h"
 
 namespace tsdfpp {
 namespace {
@@ -104,6 +105,18 @@ TrackScores ScoreTracked(const TrackedObject& object) {
     scores.free_directions = MeanOf(free_directions);
   }
   return scores;
+}
+
+std::vector<Eigen::Vector3f> SomePoints(const TriangleMesh& mesh) {
+  constexpr std::size_t kPoints = 500;
+  const SampleConfig config;
+  const SampleSet samples = SampleMesh(mesh, config.fine_per_cm2, config.seed);
+  std::vector<Eigen::Vector3f> points;
+  const std::size_t count = std::min(kPoints, samples.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    points.push_back(samples.points[i * samples.size() / count]);
+  }
+  return points;
 }
 
 }  // namespace tsdfpp

@@ -6,6 +6,7 @@
 #include <set>
 #include <vector>
 
+#include "core/types.h"
 #include "mapper/track/motion_uncertainty.h"
 #include "metrics/measured.h"
 #include "metrics/trajectory.h"
@@ -44,5 +45,8 @@ struct TrackScores {
 // (AnchoredAtFirst); shifts are those of the middle of the object's points, which a turn about that
 // middle leaves 0. There must be one such frame and one point at least.
 TrackScores ScoreTracked(const TrackedObject& object);
+
+// Points of a true surface, for ADD and ADD-S, which is quadratic: 500, or what it has of samples.
+std::vector<Eigen::Vector3f> SomePoints(const TriangleMesh& mesh);
 
 }  // namespace tsdfpp

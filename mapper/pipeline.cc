@@ -222,14 +222,8 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   std::vector<InstanceId> found;
   if (lost_ == nullptr) return found;
   auto pixels_of = PixelsByLabel(association.labels, 0);
-  std::map<InstanceId, TrackStatus> seen;
-  for (const auto& [id, pixels] : pixels_of) seen[id] = TrackStatus::kTracked;
-  if (SaysWhatIsWhere(association.labels)) {
-    for (const InstanceId id :
-         lost_->NotInPlace(frame, *map_, T_WO_, seen, association.unclaimed)) {
-      lost_->Keep(id, *map_, T_WO_.at(id));
-    }
-  }
+  KeepThoseNotInPlace(frame, association, T_WO_,
+                      [&](InstanceId id) { return !pixels_of.contains(id); });
   if (lost_->empty()) return found;
   std::vector<LoosePixels> segments = association.unclaimed;
   std::vector<InstanceId> id_of(segments.size(), kNoInstance);
@@ -266,15 +260,31 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   return found;
 }
 
+void Pipeline::KeepThoseNotInPlace(const Frame& frame, const AssociatedObjects& association,
+                                   const ObjectPoses& T_WO,
+                                   const std::function<bool(InstanceId)>& is_asked) {
+  if (!SaysWhatIsWhere(association.labels)) return;
+  ObjectPoses asked;
+  for (const auto& [id, pose] : T_WO) {
+    if (is_asked(id)) asked.emplace(id, pose);
+  }
+  for (const InstanceId id : lost_->NotInPlace(frame, *map_, asked, association.unclaimed)) {
+    lost_->Keep(id, *map_, asked.at(id));
+  }
+}
+
 void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& association,
                            const std::vector<InstanceId>& found, TrackedFrame& tracked) {
   if (lost_ == nullptr) return;
-  std::map<InstanceId, TrackStatus> seen = tracked.seen;
+  const auto is_frozen = [&](InstanceId id) {
+    const auto status = tracked.seen.find(id);
+    return status != tracked.seen.end() && status->second == TrackStatus::kFrozen;
+  };
   std::vector<InstanceId> settled;
   for (const InstanceId id : found) {
     const bool begins_anew = !ModelOf(*map_, id);
     // Too little of it to begin with: it stays lost.
-    if (begins_anew && seen.contains(id) && seen.at(id) == TrackStatus::kFrozen) {
+    if (begins_anew && is_frozen(id)) {
       tracked.T_WO.erase(id);
       continue;
     }
@@ -284,17 +294,8 @@ void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& associat
     if (begins_anew) track_log_.AddBegunAnew(id);
   }
   std::vector<InstanceId> lost = lost_->TakeOut(settled, *map_, tracked.T_WO);
-  // Those that the frame shows, but not where they could be registered. What is not tracked is
-  // where its pixels are.
-  for (const auto& [id, pixels] : PixelsByLabel(association.labels, 0)) {
-    seen.try_emplace(id, TrackStatus::kTracked);
-  }
-  if (SaysWhatIsWhere(association.labels)) {
-    for (const InstanceId id :
-         lost_->NotInPlace(frame, *map_, tracked.T_WO, seen, association.unclaimed)) {
-      lost_->Keep(id, *map_, tracked.T_WO.at(id));
-    }
-  }
+  // Those that the frame shows, but not where they could be registered.
+  KeepThoseNotInPlace(frame, association, tracked.T_WO, is_frozen);
   for (const InstanceId id : lost_->TakeOut({}, *map_, tracked.T_WO)) lost.push_back(id);
   for (const InstanceId id : lost) track_log_.AddLost(id);
 }

@@ -4,6 +4,7 @@
 // given (the paper's are), the camera is located between the first two.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -136,6 +137,10 @@ class Pipeline {
   // Puts lost objects whose segments are found into the map, and returns them; takes the labels off
   // the segments of those that are not.
   std::vector<InstanceId> FindAgain(const Frame& frame, AssociatedObjects& association);
+  // Of the asked objects of T_WO.
+  void KeepThoseNotInPlace(const Frame& frame, const AssociatedObjects& association,
+                           const ObjectPoses& T_WO,
+                           const std::function<bool(InstanceId)>& is_asked);
   // Takes those out of the map that the frame shows not to be in their place.
   void TakeOutLost(const Frame& frame, const AssociatedObjects& association,
                    const std::vector<InstanceId>& found, TrackedFrame& tracked);

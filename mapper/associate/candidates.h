@@ -34,7 +34,7 @@ class Candidates {
   // frame, and whether it may begin a candidate; the others can but be one that there is, which
   // waits on, and are not counted. Says what each is. It is confirmed where it and its candidate
   // were there, with min_points or more, in confirm_frames of the last confirm_window frames, but
-  // if it is held, not in the return_frames frames from that on in which it was first there.
+  // if it is held, not in the hold_frames frames from that on in which it was first there.
   // Who is confirmed is a candidate no longer, and who cannot be any more is forgotten. A candidate
   // is one segment of a frame at most: pairs with the greatest overlap (that share times the share
   // of the candidate's cells that are near the segment's) are made first, and of a segment's only

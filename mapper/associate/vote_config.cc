@@ -24,7 +24,7 @@ Expected<void> VoteConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckVote("min_points", min_points, 1, 1'000'000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_window", confirm_window, confirm_frames, 1000));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("return_frames", return_frames, 0, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("hold_frames", hold_frames, 0, 1000));
   return {};
 }
 
@@ -41,7 +41,7 @@ Expected<VoteConfig> VoteConfig::FromToml(const toml::table& table, const std::s
       .Get("min_points", config.min_points)
       .Get("confirm_frames", config.confirm_frames)
       .Get("confirm_window", config.confirm_window)
-      .Get("return_frames", config.return_frames);
+      .Get("hold_frames", config.hold_frames);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
@@ -55,7 +55,7 @@ toml::table VoteConfig::ToToml() const {
                      {"near_share", near_share},         {"recent_frames", recent_frames},
                      {"max_points", max_points},         {"min_points", min_points},
                      {"confirm_frames", confirm_frames}, {"confirm_window", confirm_window},
-                     {"return_frames", return_frames}};
+                     {"hold_frames", hold_frames}};
 }
 
 }  // namespace tsdfpp

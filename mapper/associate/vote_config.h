@@ -19,7 +19,7 @@ struct VoteConfig {
   int min_points = 50;      // of a segment that may become a new object
   int confirm_frames = 3;   // it becomes one where it was there in so many frames ...
   int confirm_window = 5;   // ... of so many
-  int return_frames = 45;   // what may be a missing object is held back for so long at most
+  int hold_frames = 45;     // what may be a missing object is held back for so long at most
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

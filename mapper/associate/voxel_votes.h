@@ -35,7 +35,7 @@ class VoxelVotes : public Associator {
   //  5. *Births.* What is left is held back (kNoInstance: not fused, so that nothing of a false
   //     segment enters the map) until Candidates confirm it, and then a new object. One that may be
   //     an object that is missing (ExpectReturns()) is held back until it is found to be that
-  //     (mapper/track/lost_objects.h), for return_frames frames at most. Ids count up and are never
+  //     (mapper/track/lost_objects.h), for hold_frames frames at most. Ids count up and are never
   //     used again; after the last one, kNoInstance - 1, nothing is born any more, and Remarks()
   //     says so.
   //     Segments that are unknown (Segments::unknown) may be the candidate that a known one was

@@ -17,8 +17,6 @@ constexpr double kWithin = 0.8;
 constexpr double kLeastRadius = 0.45;
 constexpr double kMostRadius = 1.8;
 
-using Rgb = std::array<float, 3>;  // 0 to 255
-
 double Quantile(std::vector<double>& values, double share) {
   const auto nth =
       values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -29,33 +27,32 @@ double Quantile(std::vector<double>& values, double share) {
 // A number between bins belongs to both.
 struct Spread {
   int bin = 0;
-  float upper = 0;
+  double upper = 0;
 };
-Spread SpreadOver(float share, int bins) {
-  const float at = std::clamp(share, 0.0F, 1.0F) * static_cast<float>(bins - 1);
+Spread SpreadOver(double share, int bins) {
+  const double at = std::clamp(share, 0.0, 1.0) * (bins - 1);
   const int bin = std::min(bins - 2, static_cast<int>(at));
-  return {bin, at - static_cast<float>(bin)};
+  return {bin, at - bin};
 }
 
 class Gatherer {
  public:
   void AddColour(const Rgb& colour) {
     if (shares_.empty()) shares_.resize(std::size_t{kChroma} * kChroma * kBright);
-    // Dark colours have no chromaticity worth the name: a little grey added makes them grey.
-    constexpr float kGrey = 12;
-    const float sum = colour[0] + colour[1] + colour[2] + 3 * kGrey;
-    const std::array spreads{SpreadOver((colour[0] + kGrey) / sum, kChroma),
-                             SpreadOver((colour[1] + kGrey) / sum, kChroma),
-                             SpreadOver((sum - 3 * kGrey) / (3 * 255), kBright)};
+    const Chromatic chromatic = ChromaticOf(colour);
+    const std::array spreads{SpreadOver(chromatic.first, kChroma),
+                             SpreadOver(chromatic.second, kChroma),
+                             SpreadOver((chromatic.sum - 3 * kAddedGrey) / (3 * 255), kBright)};
     for (int corner = 0; corner < 8; ++corner) {
-      float weight = 1;
+      double weight = 1;
       std::array<int, 3> bin{};
       for (std::size_t i = 0; i < 3; ++i) {
         const int up = (corner >> i) & 1;
         bin[i] = spreads[i].bin + up;
         weight *= up != 0 ? spreads[i].upper : 1 - spreads[i].upper;
       }
-      shares_[static_cast<std::size_t>((bin[2] * kChroma + bin[1]) * kChroma + bin[0])] += weight;
+      shares_[static_cast<std::size_t>((bin[2] * kChroma + bin[1]) * kChroma + bin[0])] +=
+          static_cast<float>(weight);
     }
     ++colours_;
   }
@@ -87,14 +84,23 @@ class Gatherer {
 
 }  // namespace
 
+Rgb RgbOf(const cv::Vec3b& pixel) {
+  return {static_cast<double>(pixel[0]), static_cast<double>(pixel[1]),
+          static_cast<double>(pixel[2])};
+}
+
+Chromatic ChromaticOf(const Rgb& colour) {
+  const double sum = colour[0] + colour[1] + colour[2] + 3 * kAddedGrey;
+  return {(colour[0] + kAddedGrey) / sum, (colour[1] + kAddedGrey) / sum, sum};
+}
+
 Appearance AppearanceOf(const Frame& frame, const std::vector<SegmentPoint>& points) {
   Gatherer gatherer;
   for (const SegmentPoint& point : points) {
     gatherer.AddPoint(point.p_C.cast<double>());
     if (frame.colour.empty()) continue;
     const auto& pixel = frame.colour.at<cv::Vec3b>(point.pixel);
-    gatherer.AddColour(
-        {static_cast<float>(pixel[0]), static_cast<float>(pixel[1]), static_cast<float>(pixel[2])});
+    gatherer.AddColour(RgbOf(pixel));
   }
   return gatherer.Finish();
 }
@@ -102,21 +108,12 @@ Appearance AppearanceOf(const Frame& frame, const std::vector<SegmentPoint>& poi
 Appearance AppearanceOf(const TsdfGrid& model, double voxel_m) {
   Gatherer gatherer;
   for (const auto* entry : model.Sorted()) {
-    const TsdfBlock& block = *entry->block;
-    if (!block.AnyNegative()) continue;
-    for (int i = 0; i < kBlockVoxels; ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      if (block.weight[place] == 0 ||
-          std::abs(float{block.distance[place]}) > kSurface_voxels * static_cast<float>(voxel_m)) {
-        continue;
-      }
-      const Index3 v = VoxelAt(entry->index, i);
+    ForEachSurfaceVoxel(*entry, voxel_m, [&](std::size_t place, const Index3& v) {
       gatherer.AddPoint(voxel_m * Eigen::Vector3d(v.x, v.y, v.z));
-      if (block.ColourCount(place) == 0) continue;
-      const FixedColour fixed = block.FixedColourAt(place);
-      gatherer.AddColour({static_cast<float>(fixed[0]) / 256, static_cast<float>(fixed[1]) / 256,
-                          static_cast<float>(fixed[2]) / 256});
-    }
+      if (entry->block->ColourCount(place) == 0) return;
+      const FixedColour fixed = entry->block->FixedColourAt(place);
+      gatherer.AddColour({fixed[0] / 256.0, fixed[1] / 256.0, fixed[2] / 256.0});
+    });
   }
   return gatherer.Finish();
 }

@@ -149,8 +149,7 @@ LostObjects::Look LostObjects::LookAt(const Frame& frame, const LoosePixels& pix
 }
 
 std::vector<InstanceId> LostObjects::NotInPlace(const Frame& frame, const MapRepresentation& map,
-                                                const ObjectPoses& T_WO,
-                                                const std::map<InstanceId, TrackStatus>& seen,
+                                                const ObjectPoses& T_WO_asked,
                                                 std::span<const LoosePixels> loose) const {
   std::vector<InstanceId> lost;
   const double voxel_m = map.config().voxel_m;
@@ -160,9 +159,7 @@ std::vector<InstanceId> LostObjects::NotInPlace(const Frame& frame, const MapRep
       may_be.at<std::uint8_t>(pixel / may_be.cols, pixel % may_be.cols) = 0;
     }
   }
-  for (const auto& [id, pose] : T_WO) {
-    const auto status = seen.find(id);
-    if (status != seen.end() && status->second != TrackStatus::kFrozen) continue;
+  for (const auto& [id, pose] : T_WO_asked) {
     const std::optional<ObjectModel> model = ModelOf(map, id);
     if (!model) continue;
     const ModelSight sight =
@@ -247,7 +244,7 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
     double alike = 0;
     InstanceId id = kNoInstance;
     std::size_t segment = 0;
-    bool is_given = false;
+    std::optional<Return> searched{};  // what came of a search, which is made once
   };
   std::vector<Pair> pairs;
   for (std::size_t s = 0; s < segments.size(); ++s) {
@@ -257,7 +254,7 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
       const bool is_given = id_of[s] == id;
       if (!is_given && !IsAlike(looks[s].appearance, kept.appearance, kept.voxel_m)) continue;
       pairs.push_back(
-          {is_given ? 2 : ColoursInCommon(looks[s].appearance, kept.appearance), id, s, is_given});
+          {is_given ? 2 : ColoursInCommon(looks[s].appearance, kept.appearance), id, s});
     }
   }
   std::ranges::stable_sort(pairs, [](const Pair& a, const Pair& b) { return a.alike > b.alike; });
@@ -268,18 +265,24 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
     taken_segments.insert(found.segment);
     returns.push_back(found);
   };
+  const auto search = [&](Pair& pair) -> const Return& {
+    if (!pair.searched) {
+      pair.searched =
+          Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
+    }
+    return *pair.searched;
+  };
   int searches = 0;
-  for (const Pair& pair : pairs) {
+  for (Pair& pair : pairs) {
     const Kept& kept = kept_.at(pair.id);
     if (taken_ids.contains(pair.id) || taken_segments.contains(pair.segment)) continue;
     if (kept.frames_in_sight % kEvery_frames != 0 || ++searches > kMostSearches) continue;
-    const Return found =
-        Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
+    const Return& found = search(pair);
     if (!found.begins_anew) take(found);
   }
   // Of the others, by their looks.
   std::set<InstanceId> waited;
-  for (const Pair& pair : pairs) {
+  for (Pair& pair : pairs) {
     Kept& kept = kept_.at(pair.id);
     if (taken_ids.contains(pair.id) || !waited.insert(pair.id).second) continue;
     ++kept.frames_in_sight;
@@ -292,7 +295,7 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
              other.alike > pair.alike - kLeastLead;
     });
     if (pair.alike < kLeastLikeness || !is_clear) continue;
-    take(Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment));
+    take(search(pair));
   }
   return returns;
 }

@@ -23,12 +23,10 @@ class LostObjects {
   // The config must be valid.
   explicit LostObjects(const SdfTrackConfig& config) : config_(config) {}
 
-  // Of the objects with a pose in `T_WO` which the frame does not show (`seen` has none), or not
-  // where they could be registered: those that it shows not to be where they were. What `loose`
-  // segments show is not that object in its place. Of a map with volumes.
+  // Of the objects with a pose in `T_WO_asked`: those that the frame shows not to be where the map
+  // has them. What `loose` segments show is not that object in its place. Of a map with volumes.
   std::vector<InstanceId> NotInPlace(const Frame& frame, const MapRepresentation& map,
-                                     const ObjectPoses& T_WO,
-                                     const std::map<InstanceId, TrackStatus>& seen,
+                                     const ObjectPoses& T_WO_asked,
                                      std::span<const LoosePixels> loose) const;
 
   // Keeps the object's volume, as the map has it, and has.

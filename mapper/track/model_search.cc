@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "mapper/track/appearance.h"
 #include "mapper/track/model_sight.h"
 #include "mapper/track/sdf_registration.h"
 
@@ -41,7 +42,6 @@ constexpr double kMargin_voxels = 1.5;
 // Colours of a surface in other light: chromaticity, and brightness as a ratio.
 constexpr double kSameChroma = 0.07;
 constexpr double kSameBrightness = 1.8;
-constexpr double kGrey = 12;  // added to all channels: dark colours have no chromaticity
 // Against a place for each radian that the object would have turned, where places look the same.
 constexpr double kPerTurn = 0.05;
 // Places look the same where so much of the model's surface lies on itself.
@@ -61,17 +61,9 @@ Surface SurfaceOf(const TsdfGrid& model, const SurfaceReader& reader, double vox
   constexpr std::size_t kMost = 800;
   std::vector<Eigen::Vector3d> all;
   for (const auto* entry : model.Sorted()) {
-    const TsdfBlock& block = *entry->block;
-    if (!block.AnyNegative()) continue;
-    for (int i = 0; i < kBlockVoxels; ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      if (block.weight[place] == 0 ||
-          std::abs(float{block.distance[place]}) > kSurface_voxels * static_cast<float>(voxel_m)) {
-        continue;
-      }
-      const Index3 v = VoxelAt(entry->index, i);
+    ForEachSurfaceVoxel(*entry, voxel_m, [&](std::size_t /*place*/, const Index3& v) {
       all.emplace_back(voxel_m * Eigen::Vector3d(v.x, v.y, v.z));
-    }
+    });
   }
   Surface surface;
   const std::size_t count = std::min(kMost, all.size());
@@ -269,16 +261,10 @@ class Search {
     if (block->ColourCount(place) == 0) return 0;
     const FixedColour fixed = block->FixedColourAt(place);
     const auto& pixel = search_.frame->colour.at<cv::Vec3b>(point.pixel);
-    std::array<double, 3> a{};
-    std::array<double, 3> b{};
-    for (std::size_t c = 0; c < 3; ++c) {
-      a[c] = pixel[static_cast<int>(c)] + kGrey;
-      b[c] = fixed[c] / 256.0 + kGrey;
-    }
-    const double sum_a = a[0] + a[1] + a[2];
-    const double sum_b = b[0] + b[1] + b[2];
-    const double chroma = std::hypot(a[0] / sum_a - b[0] / sum_b, a[1] / sum_a - b[1] / sum_b);
-    const double ratio = sum_a > sum_b ? sum_a / sum_b : sum_b / sum_a;
+    const Chromatic a = ChromaticOf(RgbOf(pixel));
+    const Chromatic b = ChromaticOf({fixed[0] / 256.0, fixed[1] / 256.0, fixed[2] / 256.0});
+    const double chroma = std::hypot(a.first - b.first, a.second - b.second);
+    const double ratio = std::max(a.sum, b.sum) / std::min(a.sum, b.sum);
     return chroma <= kSameChroma && ratio <= kSameBrightness ? 1 : -1;
   }
 

@@ -46,22 +46,14 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
   const Pose T_CL = frame.T_WC.inverse() * T_WL;
   const Intrinsics& camera = frame.intrinsics;
   for (const auto& entry : model.entries()) {
-    const TsdfBlock& block = *entry.block;
-    if (!block.AnyNegative()) continue;
-    for (int i = 0; i < kBlockVoxels; ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      if (block.weight[place] == 0 ||
-          std::abs(float{block.distance[place]}) > kSurface_voxels * static_cast<float>(voxel_m)) {
-        continue;
-      }
-      const Index3 voxel = VoxelAt(entry.index, i);
+    ForEachSurfaceVoxel(entry, voxel_m, [&](std::size_t /*place*/, const Index3& voxel) {
       const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z));
-      if (!(p_C.z() > double{kNearest_m})) continue;
+      if (!(p_C.z() > double{kNearest_m})) return;
       const double u = std::floor(camera.fx * p_C.x() / p_C.z() + camera.cx + 0.5);
       const double v = std::floor(camera.fy * p_C.y() / p_C.z() + camera.cy + 0.5);
-      if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) continue;
+      if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) return;
       Count(frame, static_cast<int>(u), static_cast<int>(v), p_C.z(), margin_m, may_be, sight);
-    }
+    });
   }
   return sight;
 }

@@ -1,15 +1,32 @@
 // What a frame shows of an object's model where it is taken to be.
 #pragma once
 
+#include <cmath>
 #include <opencv2/core.hpp>
 
 #include "core/types.h"
+#include "mapper/volume/block_grid.h"
 #include "mapper/volume/tsdf_block.h"
 
 namespace tsdfpp {
 
 // A surface voxel of a model, to within this many voxels.
 inline constexpr float kSurface_voxels = 0.75F;
+
+// Calls visit(place in the block, voxel of the lattice) for the block's surface voxels, in order.
+template <typename Visit>
+void ForEachSurfaceVoxel(const TsdfGrid::Entry& entry, double voxel_m, const Visit& visit) {
+  const TsdfBlock& block = *entry.block;
+  if (!block.AnyNegative()) return;
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    if (block.weight[place] == 0 ||
+        std::abs(float{block.distance[place]}) > kSurface_voxels * static_cast<float>(voxel_m)) {
+      continue;
+    }
+    visit(place, VoxelAt(entry.index, i));
+  }
+}
 
 // Numbers of surface voxels of a model in the picture, by the depth around their pixel (three by
 // three: outlines are a pixel off).

@@ -63,7 +63,7 @@ class PlainCandidates {
       candidate.points_W = segments_W[s];
       const bool is_confirmed =
           SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames &&
-          (!is_held[s] || frame_ >= candidate.first + config_.return_frames);
+          (!is_held[s] || frame_ >= candidate.first + config_.hold_frames);
       candidacies[s] = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
       if (!is_confirmed && IsInNextWindow(candidate)) left.push_back(candidate);
     }
@@ -140,7 +140,7 @@ class Clouds {
 TEST(Candidates, AreThoseOfPlainPairs) {
   VoteConfig config;
   config.min_points = 5;
-  config.return_frames = 6;
+  config.hold_frames = 6;
   Clouds clouds;
   for (int trial = 0; trial < 20; ++trial) {
     Candidates candidates(config, kVoxel_m);
