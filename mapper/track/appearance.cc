@@ -14,7 +14,7 @@ constexpr int kBright = 5;   // and from black to white
 constexpr double kWithin = 0.8;
 // A segment's radius, of its object's: a side can be this much smaller, and, of a model that shows
 // but one side, larger.
-constexpr double kLeastRadius = 0.45;
+constexpr double kLeastRadius = 0.35;
 constexpr double kMostRadius = 1.8;
 
 double Quantile(std::vector<double>& values, double share) {

@@ -18,8 +18,10 @@ constexpr double kMargin_voxels = 3;
 // An object is not in its place where so many of its voxels are seen not to be there, and more of
 // them than are matched.
 constexpr int kLeastGone = 20;
-// Of these, seen through: a segment may show the object in its place together with something else.
-constexpr double kLeastThrough = 0.1;
+// Of these and the matched, seen through: a segment may show the object in its place together with
+// something else, through which nothing is seen. What was moved a little hides most of its old
+// place itself.
+constexpr double kLeastThrough = 0.04;
 // A segment that comes nearer to the picture's edge goes on outside.
 constexpr int kEdge_px = 3;
 // So much of a segment's outline may be beside something nearer.
