@@ -74,6 +74,9 @@ class Store:
         self.rows = torch.empty(most, dtype=torch.float32, device=device)
         self.count = 0
 
+    def is_full(self):
+        return self.count == len(self.rows)
+
     def add(self, frames):
         for picture, inverse, ids in frames[:len(self.rows) - self.count]:
             rows, columns = ids.shape

@@ -33,9 +33,9 @@ TOYS = {"car": (0.271, 0.146, 0.12), "truck": (0.325, 0.156, 0.17), "mug": (0.15
         "torus": (0.164, 0.164, 0.044), "arch": (0.2, 0.06, 0.13), "cup": (0.104, 0.104, 0.105),
         "cover": (0.104, 0.104, 0.105), "book": (0.12, 0.17, 0.0323), "rocking_horse": (0.34, 0.122, 0.3),
         "knot": (0.193, 0.181, 0.097)}
-# What others can stand on, with the height of its inner bottom and the share of its sides that is flat.
+# What others can stand on, with the share of its sides that is flat.
 FLAT = {"cube": 1, "brick": 1, "plank": 1, "cylinder": 0.7, "hexagon": 0.7, "book": 1}
-# Open above: how high the bottom is, and the share of its sides that is inside.
+# What others can lie in: its sides, how high its bottom is, and the share of its sides that is inside.
 OPEN = {"plate": ((0.22, 0.22, 0.02), 0.006, 0.55), "tray": ((0.32, 0.22, 0.026), 0.007, 0.8),
         "bowl": ((0.17, 0.17, 0.069), 0.008, 0.45), "crate": ((0.38, 0.26, 0.12), 0.012, 0.85),
         "card": ((0.088, 0.063, 0.0021), 0.0021, 1.0)}
@@ -53,13 +53,7 @@ def camera_of(draw):
     return text, f / 220
 
 
-def apart(seed, draw):
-    """Things that stand apart, and move: drawn by the program itself."""
-    lens, far = camera_of(draw)
-    radius = min(1.65, draw.uniform(0.75, 1.5) * far)
-    most = draw.choice([3, 6, 10, 14])
-    low, high = sorted((draw.uniform(0.35, 1.1), draw.uniform(0.35, 1.1)))
-    models = APART if draw.random() < 0.7 else draw.sample(APART, 6)
+def head_of(seed):
     return f"""name = "random"
 purpose = "A draw for training."
 frames = {FRAMES}
@@ -67,7 +61,17 @@ rate_hz = 2
 seed = {seed}
 
 [camera]
-{lens}
+"""
+
+
+def apart(seed, draw):
+    """Things that stand apart, and move: drawn by the program itself."""
+    lens, far = camera_of(draw)
+    radius = min(1.65, draw.uniform(0.75, 1.5) * far)
+    most = draw.choice([3, 6, 10, 14])
+    low, high = sorted((draw.uniform(0.35, 1.1), draw.uniform(0.35, 1.1)))
+    models = APART if draw.random() < 0.7 else draw.sample(APART, 6)
+    return f"""{head_of(seed)}{lens}
 [random]
 objects = [1, {most}]
 models = {str(models).replace("'", '"')}
@@ -195,18 +199,11 @@ height_m = [{', '.join(f'{h:.3f}' for h in heights)}]
     return path, textures, f"\n[lights]\nambient = {ambient:.3f}\n" + "".join(kinds)
 
 
-def scene(draw, seed, lens, radius, target, things, room="", physics=""):
+def scene(draw, seed, lens, radius, target, things, room=""):
     path, textures, lights = rig(draw, radius, target)
-    return f"""name = "random"
-purpose = "A draw for training."
-frames = {FRAMES}
-rate_hz = 2
-seed = {seed}
-
-[camera]
-{lens}{path}
+    return f"""{head_of(seed)}{lens}{path}
 [room]
-{room}{textures}{lights}{physics}{"".join(things.texts)}"""
+{room}{textures}{lights}{"".join(things.texts)}"""
 
 
 def heap(seed, draw):
@@ -264,15 +261,14 @@ def touching(seed, draw):
                      draw.uniform(-180, 180), *upper, level + 1)
                 return
 
-    for row in range(draw.randint(1, 4)):
+    for _ in range(draw.randint(1, 4)):
         yaw = draw.uniform(-180, 180)
         along = (math.cos(math.radians(yaw)), math.sin(math.radians(yaw)))
         across = (-along[1], along[0])
         x, y = draw.uniform(-0.25, 0.1), draw.uniform(-0.2, 0.2)
         side = 0.0
         for _ in range(draw.randint(1, 5)):
-            open_share = 0.3
-            kind = list(OPEN) if draw.random() < open_share else None
+            kind = list(OPEN) if draw.random() < 0.3 else None
             name, factor, size, solid = some_thing(draw, kind)
             turned = draw.random() < 0.25  # then it touches at a corner, about
             length = math.hypot(size[0], size[1]) if turned else size[0]

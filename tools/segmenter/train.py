@@ -6,8 +6,9 @@
 
 Needs Debian's python3-torch and python3-opencv. `--device cuda` trains where PyTorch finds a GPU. OUT gets last.pt (from which
 it goes on), curve.csv (steps, minutes, loss; of every 10th scene, which is not trained on, the share of pixels that are a
-thing's or not as they should be, and the panoptic quality of things; scenes that are) and segmenter.onnx. Scenes that come
-into the folder meanwhile are taken.
+thing's or not as they should be, and the panoptic quality of things; scenes that are) and segmenter.onnx; after training on a
+GPU, whose PyTorch may write another ONNX than OpenCV reads, by `--export-only` with Debian's. Scenes that come into the folder
+meanwhile are taken.
 """
 import argparse
 import copy
@@ -102,7 +103,7 @@ class Data:
                 return
             if number % HELD_OUT == 0:
                 self.held_out.append(sequence)
-            else:
+            elif not self.store.is_full():
                 self.store.add(sequence)
                 self.scenes += 1
 
@@ -116,7 +117,7 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--most-frames", type=int, default=12000)
+    parser.add_argument("--most-frames", type=int, default=12000, help="that are kept; further scenes are left out")
     parser.add_argument("--wait-for", type=int, default=20, help="scenes to begin with")
     parser.add_argument("--export-only", action="store_true", help="write segmenter.onnx of last.pt")
     parser.add_argument("--rate", type=float, default=2e-3, help="of learning, at first; it falls to 0 along a cosine")
@@ -139,10 +140,13 @@ def main():
         step, spent_s = state["step"], state["spent_s"]
         draw = np.random.default_rng([options.seed, step])
         torch.manual_seed(options.seed + step)
+    elif options.export_only:
+        parser.error(f"--export-only: there is no {last}")
     if options.export_only:
         export(network, options.out / "segmenter.onnx")
         return
     began = time.monotonic()
+    print(f"waits for {options.wait_for} scenes in {options.data}", flush=True)
     data.take(options.wait_for)
     total, since = torch.zeros((), device=options.device), 0
     length_s = 60 * options.minutes
