@@ -97,7 +97,13 @@ constexpr int kMiddlePasses = 2;
 constexpr int kLastPasses = 1;
 constexpr int kPassesOfAll = kMiddlePasses + kLastPasses;
 
-// With as narrow a Huber function as the residuals ask for.
+// As narrow as residuals of that deviation ask for.
+double HuberFor(double deviation_m, double voxel_m, const SdfTrackConfig& config) {
+  return std::min(
+      config.huber_voxels * voxel_m,
+      config.huber_deviations * std::max(deviation_m, kLeastDeviation_voxels * voxel_m));
+}
+
 LeastSquaresResult RunPasses(const SdfRegistration& task, const SdfTrackConfig& config,
                              const LeastSquaresOptions& options, int passes, DistanceTerm& term,
                              SdfRegistrationResult& result) {
@@ -105,10 +111,7 @@ LeastSquaresResult RunPasses(const SdfRegistration& task, const SdfTrackConfig& 
   LeastSquaresResult found;
   for (int pass = 0; pass < passes; ++pass) {
     term.KeepAt(result.T_LC);
-    const double deviation_m =
-        std::max(term.KeptDeviation_m(), kLeastDeviation_voxels * task.voxel_m);
-    term.SetHuber(
-        std::min(config.huber_voxels * task.voxel_m, config.huber_deviations * deviation_m));
+    term.SetHuber(HuberFor(term.KeptDeviation_m(), task.voxel_m, config));
     if (pass == 0) {
       prior = PriorFor(term.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
     }
@@ -150,6 +153,21 @@ KnownDirections DirectionsOf(const Matrix6& information) {
   known.turn_shares = of_turns.eigenvalues().cwiseMax(0);
   known.turns = of_turns.eigenvectors();
   return known;
+}
+
+OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
+                        const SdfRegistrationResult& found, const SdfTrackConfig& config) {
+  DistanceTerm term = TermOf(task, found.frame, config, 1);
+  term.SetHuber(HuberFor(found.counts.deviation_m, task.voxel_m, config));
+  const auto cost_at = [&](const Pose& T) {
+    term.KeepAt(T);
+    return term.Sums(T).cost;
+  };
+  const double cost_found = cost_at(found.T_LC);
+  OtherPlace other;
+  other.cost_ratio = cost_at(T_LC) / cost_found;
+  other.counts = term.Count(T_LC);
+  return other;
 }
 
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,

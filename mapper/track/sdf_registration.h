@@ -70,4 +70,14 @@ struct SdfRegistrationResult {
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config);
 
+// What the points say of a place T_LC, and how many times as much against it as against the one
+// found: the ratio of the two costs, robust squared distances, with the Huber width of the latter's
+// deviation.
+struct OtherPlace {
+  DistanceCounts counts;
+  double cost_ratio = 1;
+};
+OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
+                        const SdfRegistrationResult& found, const SdfTrackConfig& config);
+
 }  // namespace tsdfpp

@@ -39,6 +39,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("max_rotation_rad", max_rotation_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("return_frames", return_frames, 0, 10000));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(InRange("rest_evidence", rest_evidence, 0, 100));
   return {};
 }
 
@@ -70,7 +71,8 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("max_translation_voxels", config.max_translation_voxels)
       .Get("max_rotation_rad", config.max_rotation_rad)
       .Get("return_frames", config.return_frames)
-      .Get("rest_voxels", config.rest_voxels);
+      .Get("rest_voxels", config.rest_voxels)
+      .Get("rest_evidence", config.rest_evidence);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
@@ -103,7 +105,8 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"max_translation_voxels", max_translation_voxels},
                      {"max_rotation_rad", max_rotation_rad},
                      {"return_frames", return_frames},
-                     {"rest_voxels", rest_voxels}};
+                     {"rest_voxels", rest_voxels},
+                     {"rest_evidence", rest_evidence}};
 }
 
 }  // namespace tsdfpp

@@ -62,6 +62,10 @@ struct SdfTrackConfig {
   // A motion that moves no point by more than this is none: the pose keeps its numbers, so that a
   // map that resamples what moves does not blur what stands still.
   double rest_voxels = 0.02;
+  // An object whose last motion moved no point by more than a tenth of a voxel rests where the
+  // points say less than 1 + this / sqrt(their number) times as much against its place as against
+  // the one found (ComparePlace()). 0 switches this off.
+  double rest_evidence = 3;
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

@@ -14,6 +14,14 @@ namespace {
 constexpr double kSameSeed_voxels = 0.5;
 // Motions that were not measured for longer than this are not extrapolated.
 constexpr int kLongestExtrapolation_frames = 5;
+// An object that moves less from frame to frame may be at rest.
+constexpr double kSlow_voxels = 0.1;
+// Where two frames find an object at rest beside its place, the later one farther than that, by
+// this much at least, and in the same direction by this cosine, noise is a worse reason than a
+// motion that begins, and this share of the evidence is enough.
+constexpr double kFartherBy = 1.3;
+constexpr double kSameWay = 0.7;
+constexpr double kShareGoingOn = 0.4;
 // Numbers of frames may be any.
 constexpr std::int64_t kMostPassed = 1'000'000'000;
 
@@ -39,6 +47,17 @@ Pose Repeated(const Pose& motion, int times) {
 // The motion since the frame before, T_WL(before)^-1 * T_WL(after), from T_WL(before).
 Pose MotionOf(const Pose& T_WL, const Pose& T_WC, const Pose& T_LC) {
   return T_WL.inverse() * T_WC * T_LC.inverse();
+}
+
+// How far it moves a point at most: points lie up to some two radii from the centre.
+double LongestWay_m(const MotionFrame& frame, const Pose& motion_L) {
+  const Vector6 way = frame.LengthsOf(motion_L);
+  return way.head<3>().norm() + 2 * way.tail<3>().norm();
+}
+
+bool GoesOn(const Vector6& before, const Vector6& now, double voxel_m) {
+  return now.norm() > kSlow_voxels * voxel_m && now.norm() > kFartherBy * before.norm() &&
+         now.dot(before) > kSameWay * now.norm() * before.norm();
 }
 
 // The motion without what it has along directions of which too little is known.
@@ -87,7 +106,7 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
   // Its pixels may have waited until now, so that the map has nothing of it.
   if (known == before.end() || !model) {
     turn.status = TrackStatus::kBegun;
-    memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}};
+    memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}, {}};
     if (config_.keyframe_turn_rad > 0) {
       // A model that is begun anew has a pose already.
       const Pose T_OC = known == before.end() ? frame.T_WC : known->second.inverse() * frame.T_WC;
@@ -123,17 +142,19 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
     sight.passed = static_cast<int>(std::clamp<std::int64_t>(passed, 1, kMostPassed));
   }
 
-  SdfRegistrationResult found = RegisterToDistances(TaskOf(sight, memory), config_);
-  if (!found.converged) return std::nullopt;
-  Calibrate(sight, memory, found);
+  const SdfRegistration task = TaskOf(sight, memory);
+  SdfRegistrationResult found = RegisterToDistances(task, config_);
+  const SdfRegistrationResult nearest = found;
+  if (found.converged) Calibrate(sight, memory, found);
+  if (!Rests(sight, task, nearest, memory, found) && !found.converged) return std::nullopt;
   if (!PassesGates(sight, found)) return std::nullopt;
   const MotionUncertainty motion = Uncertainty(sight, found, memory);
   Remember(sight, found, memory);
 
-  const Vector6 way = found.frame.LengthsOf(MotionOf(model.T_WL, frame.T_WC, found.T_LC));
-  // Points lie up to some two radii from the centre.
-  const double longest_m = way.head<3>().norm() + 2 * way.tail<3>().norm();
-  if (longest_m <= config_.rest_voxels * voxel_m) return Registered{model.T_WL, motion};
+  const Pose motion_L = MotionOf(model.T_WL, frame.T_WC, found.T_LC);
+  if (LongestWay_m(found.frame, motion_L) <= config_.rest_voxels * voxel_m) {
+    return Registered{model.T_WL, motion};
+  }
   return Registered{AsRigid(frame.T_WC * found.T_LC.inverse()), motion};
 }
 
@@ -154,6 +175,26 @@ SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) con
     add_seed(Eigen::Translation3d(*memory.centre_L - expected_L) * task.T_LC_expected);
   }
   return task;
+}
+
+bool SdfTracker::Rests(const Sight& sight, const SdfRegistration& task,
+                       const SdfRegistrationResult& nearest, Memory& memory,
+                       SdfRegistrationResult& found) const {
+  const std::optional<Vector6> leant = std::exchange(memory.leaning, std::nullopt);
+  if (config_.rest_evidence <= 0 || nearest.counts.observed == 0) return false;
+  if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) return false;
+  const Pose T_LC_stay = sight.T_WL.inverse() * sight.frame->T_WC;
+  const OtherPlace there = ComparePlace(task, T_LC_stay, nearest, config_);
+  const Vector6 leaning =
+      found.frame.LengthsOf(MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC));
+  double evidence = config_.rest_evidence / std::sqrt(static_cast<double>(nearest.counts.observed));
+  if (leant && sight.passed == 1 && GoesOn(*leant, leaning, sight.voxel_m))
+    evidence *= kShareGoingOn;
+  if (!(there.cost_ratio < 1 + evidence)) return false;
+  memory.leaning = leaning;
+  found.T_LC = T_LC_stay;
+  found.counts = there.counts;
+  return true;
 }
 
 void SdfTracker::Calibrate(const Sight& sight, const Memory& memory,

@@ -48,6 +48,7 @@ class SdfTracker : public Tracker {
     std::optional<Eigen::Vector3d> centre_L;  // of its segment then
     std::optional<Keyframe> keyframe;
     std::optional<PlaceUncertainty> place;  // then
+    std::optional<Vector6> leaning;         // of what was left at rest: to where it was found
   };
 
   // A frame's segment of an object, and the object as the map has it.
@@ -85,6 +86,10 @@ class SdfTracker : public Tracker {
                                      const ObjectModel& model, double voxel_m, const Pose& T_WO,
                                      Memory& memory) const;
   SdfRegistration TaskOf(const Sight& sight, const Memory& memory) const;
+  // Whether it was at rest and nothing says that it is no more; `found` is then that place. The
+  // points are at their nearest to the model at `nearest`, of which `found` is the best guess.
+  bool Rests(const Sight& sight, const SdfRegistration& task, const SdfRegistrationResult& nearest,
+             Memory& memory, SdfRegistrationResult& found) const;
   // Takes off `found` what the keyframe says that the model adds.
   void Calibrate(const Sight& sight, const Memory& memory, SdfRegistrationResult& found) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;

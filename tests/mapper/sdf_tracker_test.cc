@@ -92,6 +92,80 @@ void ExpectFrozen(Pipeline& pipeline, const Frame& frame, const std::vector<Inst
   }
 }
 
+// A brick and a tray at rest until frame kStart, seen with noise by a camera that moves; then the
+// brick slides, so far a frame.
+constexpr int kStart = 10;
+Frame NoisyToys(int index, double slide_m) {
+  reference::Scene scene = TableOnly();
+  AddBrick(scene, 0.3, {-0.14 + slide_m * std::max(0, index - kStart), 0.03, kTableTop_m + 0.045});
+  AddTray(scene, -0.4, {0.08, 0.11, kTableTop_m + 0.016});
+  const Intrinsics fine{384, 288, 320.0, 320.0, 191.5, 143.5};
+  Frame frame = reference::Render(scene, CircleCamera(0.005 * index), index, fine);
+  constexpr double kNoise_m = 0.002;
+  cv::RNG random(static_cast<std::uint64_t>(index) + 1);
+  cv::Mat noise(frame.depth.size(), CV_32FC1);
+  random.fill(noise, cv::RNG::NORMAL, 0, kNoise_m);
+  noise.setTo(0, frame.depth == 0);
+  frame.depth += noise;
+  return frame;
+}
+
+// Frames kStart + 1 ... kEnd: the largest error of the brick's place.
+constexpr int kEnd = kStart + 8;
+double FarthestOff_m(Pipeline& pipeline, double slide_m) {
+  const Pose T_WO_first = NoisyToys(1, slide_m).T_WO.at(kBrick);
+  double farthest_m = 0;
+  for (int i = kStart + 1; i <= kEnd; ++i) {
+    const Frame frame = NoisyToys(i, slide_m);
+    EXPECT_TRUE(pipeline.Process(frame));
+    const Pose found = pipeline.trajectories().at(kBrick).at(i) * T_WO_first;
+    farthest_m =
+        std::max(farthest_m, (found.translation() - frame.T_WO.at(kBrick).translation()).norm());
+  }
+  return farthest_m;
+}
+
+TEST(SdfTracker, LeavesAtRestWhatNothingSaysMoves) {
+  constexpr double kFast_m = 0.006, kSlow_m = 0.0015;
+  for (const double evidence : {0.0, SdfTrackConfig{}.rest_evidence}) {
+    for (const double slide_m : {kFast_m, kSlow_m}) {
+      SCOPED_TRACE(fmt::format("evidence {}, {} m a frame", evidence, slide_m));
+      PipelineConfig config = TrackConfig();
+      config.track.rest_evidence = evidence;
+      // So fine that noise is more than what is wrong with a model of few voxels.
+      config.map.voxel_m = kToyVoxel_m / 2;
+      Pipeline pipeline(config, Toys());
+      int moved = 0;
+      for (int i = 1; i <= kStart; ++i) {
+        ASSERT_TRUE(pipeline.Process(NoisyToys(i, slide_m)));
+        for (const InstanceId id : {kBrick, kTray}) {
+          const Pose& pose = pipeline.trajectories().at(id).at(i);
+          moved += pose.matrix() == Eigen::Matrix4d::Identity() ? 0 : 1;
+        }
+      }
+      // Where no evidence is asked for noise is taken for motion.
+      if (evidence > 0) {
+        EXPECT_EQ(moved, 0);
+      } else {
+        EXPECT_GT(moved, kStart);
+      }
+      EXPECT_LT(FarthestOff_m(pipeline, slide_m), kPixel_voxels * kToyVoxel_m);
+      EXPECT_EQ(pipeline.track_log().objects().at(kBrick).frozen, 0);
+    }
+  }
+}
+
+// What rests is no excuse for what is not there.
+TEST(SdfTracker, FreezesObjectsAtRestThatTheMaskSwaps) {
+  Pipeline pipeline(TrackConfig(), Toys());
+  for (int i = 1; i < kStart; ++i) ASSERT_TRUE(pipeline.Process(NoisyToys(i, 0)));
+  Frame swapped = NoisyToys(kStart, 0);
+  swapped.mask.setTo(99, swapped.mask == kBrick);
+  swapped.mask.setTo(kBrick, swapped.mask == kTray);
+  swapped.mask.setTo(kTray, swapped.mask == 99);
+  ExpectFrozen(pipeline, swapped, {kBrick, kTray});
+}
+
 TEST(SdfTracker, FreezesObjectsThatTheMaskSwaps) {
   Pipeline pipeline(TrackConfig(), Toys());
   for (int i = 1; i <= 6; ++i) ASSERT_TRUE(pipeline.Process(MovingToys(i)));
