@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <limits>
 #include <set>
 #include <utility>
 
@@ -20,10 +19,6 @@
 
 namespace tsdfpp {
 namespace {
-
-// Voxels from the origin beyond which a coordinate in single precision is off by more than a
-// sixteenth of one.
-constexpr double kExactVoxels = 1 << 20;
 
 class StopWatch {
  public:
@@ -222,8 +217,9 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   std::vector<InstanceId> found;
   if (lost_ == nullptr) return found;
   auto pixels_of = PixelsByLabel(association.labels, 0);
-  KeepThoseNotInPlace(frame, association, T_WO_,
-                      [&](InstanceId id) { return !pixels_of.contains(id); });
+  const auto is_shown = [&](InstanceId id) { return pixels_of.contains(id); };
+  KeepThoseNotInPlace(frame, association, T_WO_, std::not_fn(is_shown));
+  lost_->GiveUpUnsure(is_shown, *map_, T_WO_);
   if (lost_->empty()) return found;
   std::vector<LoosePixels> segments = association.unclaimed;
   std::vector<InstanceId> id_of(segments.size(), kNoInstance);
@@ -298,6 +294,7 @@ void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& associat
   KeepThoseNotInPlace(frame, association, tracked.T_WO, is_frozen);
   for (const InstanceId id : lost_->TakeOut({}, *map_, tracked.T_WO)) lost.push_back(id);
   for (const InstanceId id : lost) track_log_.AddLost(id);
+  lost_->Watch(tracked.seen);
 }
 
 void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
@@ -323,48 +320,6 @@ void Pipeline::CountWhileEmpty(const Frame& frame, const cv::Mat& labels) {
   if (!is_empty_) return;
   is_empty_ = map_->Memory().blocks == 0;
   if (is_empty_) in_vain_.Add(frame, labels);
-}
-
-std::vector<std::string> Pipeline::Remarks() const {
-  std::vector<std::string> remarks;
-  if (is_empty_) remarks.push_back("the map is empty: " + in_vain_.Text());
-  const double voxels = farthest_m_ / config_.map.voxel_m;
-  if (voxels > kExactVoxels) {
-    remarks.push_back(fmt::format(
-        "the camera is up to {:.6g} m from the origin along an axis, where single precision rounds "
-        "by up to {:.2g} voxels, which blurs surfaces; poses nearer to the origin would help",
-        farthest_m_, voxels * std::numeric_limits<float>::epsilon() / 2));
-  }
-  if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
-    const std::size_t seen = track_log_.objects().size();
-    const std::string_view which =
-        tracked_.choice() == TrackChoice::kAll ? "beside the background" : "that has a class";
-    remarks.push_back(fmt::format(
-        "objects were to be tracked (--poses {}) and none was: {}", PoseSourceName(config_.poses),
-        seen == 0 ? fmt::format("no frame shows an object {}", which)
-                  : fmt::format("frames show {} objects {}, of which none could be registered",
-                                seen, which)));
-  }
-  if (lost_ != nullptr && !lost_->empty()) {
-    std::vector<std::string> names;
-    for (const ObjectInfo& object : Objects()) {
-      if (lost_->Has(object.id)) names.push_back(object.name);
-    }
-    remarks.push_back(fmt::format(
-        "where {} of the tracked objects went is not known, so the map has nothing of them: {}",
-        lost_->Ids().size(), fmt::join(names, ", ")));
-  }
-  const CameraLog& camera = camera_->log();
-  if (camera.lost > 0 || camera.carried_on > 0) {
-    remarks.push_back(fmt::format(
-        "the camera was not found in {} of {} frames, which are {} (--camera {})",
-        camera.lost + camera.carried_on, camera.lost + camera.carried_on + camera.located,
-        config_.camera == CameraSource::kTrack ? "not mapped"
-                                               : "mapped by its given motion since the last",
-        CameraSourceName(config_.camera)));
-  }
-  for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
-  return remarks;
 }
 
 std::vector<ObjectInfo> Pipeline::Objects() const {

@@ -182,6 +182,28 @@ void LostObjects::Keep(InstanceId id, const MapRepresentation& map, const Pose& 
       id, Kept{*model->grid, AppearanceOf(*model->grid, voxel_m), model->T_WL, T_WO, voxel_m});
 }
 
+void LostObjects::GiveUpUnsure(const std::function<bool(InstanceId)>& is_shown,
+                               const MapRepresentation& map, const ObjectPoses& T_WO) {
+  for (const auto& [id, frozen] : unsure_) {
+    const auto pose = T_WO.find(id);
+    if (frozen < config_.return_frames || pose == T_WO.end() || !is_shown(id) || Has(id)) continue;
+    Keep(id, map, pose->second);
+    if (const auto kept = kept_.find(id); kept != kept_.end()) kept->second.is_given_up = true;
+  }
+}
+
+void LostObjects::Watch(const std::map<InstanceId, TrackStatus>& seen) {
+  for (const auto& [id, status] : seen) {
+    const auto unsure = unsure_.find(id);
+    if (unsure == unsure_.end()) continue;
+    if (status == TrackStatus::kFrozen) {
+      ++unsure->second;
+    } else {
+      unsure_.erase(unsure);
+    }
+  }
+}
+
 std::vector<InstanceId> LostObjects::Ids() const {
   std::vector<InstanceId> ids;
   ids.reserve(kept_.size());
@@ -277,6 +299,10 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
   int searches = 0;
   for (Pair& pair : pairs) {
     const Kept& kept = kept_.at(pair.id);
+    if (kept.is_given_up && id_of[pair.segment] == pair.id) {
+      take({pair.id, pair.segment, kept.T_WO, true});
+      continue;
+    }
     if (taken_ids.contains(pair.id) || taken_segments.contains(pair.segment)) continue;
     if (kept.frames_in_sight % kEvery_frames != 0 || ++searches > kMostSearches) continue;
     const Return& found = search(pair);
@@ -321,11 +347,15 @@ Expected<void> LostObjects::PutBack(const Return& found, MapRepresentation& map,
 
 std::vector<InstanceId> LostObjects::TakeOut(const std::vector<InstanceId>& found,
                                              MapRepresentation& map, ObjectPoses& T_WO) {
-  for (const InstanceId id : found) kept_.erase(id);
+  for (const InstanceId id : found) {
+    kept_.erase(id);
+    unsure_[id] = 0;
+  }
   std::vector<InstanceId> lost;
   for (auto& [id, kept] : kept_) {
     if (!kept.is_in_map) continue;
     kept.is_in_map = false;
+    unsure_.erase(id);
     map.Remove(id);
     T_WO.erase(id);
     lost.push_back(id);

@@ -1,6 +1,7 @@
 // Objects that are not where the map has them: kept apart until a segment is found to be theirs.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -31,6 +32,14 @@ class LostObjects {
 
   // Keeps the object's volume, as the map has it, and has.
   void Keep(InstanceId id, const MapRepresentation& map, const Pose& T_WO);
+
+  // Keeps those of the shown objects with a pose in `T_WO` that were found, and since then were
+  // frozen in return_frames frames and registered in none: the place was wrong, or the model is.
+  // Their next segment begins them anew, where they are.
+  void GiveUpUnsure(const std::function<bool(InstanceId)>& is_shown, const MapRepresentation& map,
+                    const ObjectPoses& T_WO);
+  // What became of the objects in a frame (TrackedPoses::seen).
+  void Watch(const std::map<InstanceId, TrackStatus>& seen);
 
   // Ends a frame: of those found then (FindAgain()) nothing is kept any more; the others are taken
   // out of the map and of `T_WO`.
@@ -80,7 +89,8 @@ class LostObjects {
     Pose T_WO = Pose::Identity();
     double voxel_m = 0;
     bool is_in_map = true;
-    int frames_in_sight = 0;  // in which something was that may be it
+    int frames_in_sight = 0;   // in which something was that may be it
+    bool is_given_up = false;  // the model is
   };
   struct Look;  // a segment as one frame shows it
   Look LookAt(const Frame& frame, const LoosePixels& pixels, double voxel_m) const;
@@ -90,6 +100,8 @@ class LostObjects {
 
   SdfTrackConfig config_;
   std::map<InstanceId, Kept> kept_;
+  // Those that were found and not registered since, with the frames in which they were frozen.
+  std::map<InstanceId, int> unsure_;
 };
 
 }  // namespace tsdfpp

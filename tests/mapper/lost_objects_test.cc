@@ -10,7 +10,6 @@
 
 #include "core/units.h"
 #include "mapper/pipeline.h"
-#include "mapper/track/model_sight.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/toy_scene.h"
 #include "tests/mapper/vote_world.h"
@@ -62,6 +61,17 @@ PipelineConfig TrackConfig(AssociationMode associate) {
 
 std::vector<ObjectInfo> Toys() {
   return {{kBackground, "background", ""}, {kBrick, "brick", ""}, {kTray, "tray", ""}};
+}
+
+// Those that are not 0.
+LoosePixels PixelsWhere(const cv::Mat& segment) {
+  LoosePixels pixels;
+  for (int pixel = 0; pixel < segment.rows * segment.cols; ++pixel) {
+    if (segment.at<std::uint8_t>(pixel / segment.cols, pixel % segment.cols) != 0) {
+      pixels.push_back(pixel);
+    }
+  }
+  return pixels;
 }
 
 std::size_t VoxelsOfBrick(const Pipeline& pipeline, InstanceId id = kBrick) {
@@ -253,6 +263,49 @@ TEST(LostObjects, CanBeUndone) {
   EXPECT_EQ(VoxelsOf(*map).ObservedVoxels(kBrick).size(), 0U);
 }
 
+// What was found, and then cannot be registered there in any frame, was not found.
+TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
+  const Frame frame = Coming(1, 0);
+  const SdfTrackConfig config;
+  const auto shown = [](InstanceId id) { return id == kBrick; };
+  const LoosePixels pixels = PixelsWhere(frame.mask == kBrick);
+  const InstanceId id_of = kBrick;
+  for (const bool is_registered_once : {false, true}) {
+    SCOPED_TRACE(is_registered_once);
+    const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+    ObjectPoses T_WO{{kBrick, Pose::Identity()}};
+    map->SetObjectPose(kBrick, Pose::Identity());
+    map->Fuse(frame, frame.mask);
+    LostObjects lost(config);
+    lost.Keep(kBrick, *map, T_WO.at(kBrick));
+    Pose elsewhere = Pose::Identity();
+    elsewhere.translation().x() = 0.02;
+    ASSERT_TRUE(lost.PutBack({kBrick, 0, elsewhere, false}, *map, T_WO));
+    EXPECT_TRUE(lost.TakeOut({kBrick}, *map, T_WO).empty());
+    for (int i = 0; i < config.return_frames; ++i) {
+      lost.GiveUpUnsure(shown, *map, T_WO);
+      EXPECT_TRUE(lost.empty()) << i;
+      const bool is_registered = is_registered_once && i == 3;
+      lost.Watch({{kBrick, is_registered ? TrackStatus::kTracked : TrackStatus::kFrozen},
+                  {kTray, TrackStatus::kFrozen}});
+    }
+    lost.GiveUpUnsure([](InstanceId) { return false; }, *map, T_WO);
+    EXPECT_TRUE(lost.empty()) << "it is not in sight";
+    lost.GiveUpUnsure(shown, *map, T_WO);
+    ASSERT_EQ(lost.Has(kBrick), !is_registered_once);
+    if (is_registered_once) continue;
+    const auto returns = lost.FindAgain(frame, {&pixels, 1}, {&id_of, 1});
+    ASSERT_EQ(returns.size(), 1U);
+    EXPECT_TRUE(returns[0].begins_anew);
+    EXPECT_EQ(returns[0].T_WO.matrix(), elsewhere.matrix());
+    ASSERT_TRUE(lost.PutBack(returns[0], *map, T_WO));
+    EXPECT_TRUE(VoxelsOf(*map).ObservedVoxels(kBrick).empty());
+    EXPECT_TRUE(lost.TakeOut({kBrick}, *map, T_WO).empty());
+    lost.Watch({{kBrick, TrackStatus::kBegun}});
+    EXPECT_TRUE(lost.empty());
+  }
+}
+
 // Whatever the number of threads.
 TEST(LostObjects, AreFoundAtTheSamePlaceByAnyNumberOfThreads) {
   std::vector<std::map<int, Pose>> poses;
@@ -307,12 +360,7 @@ TEST(LostObjects, AreNotInPlaceWhereTheyWereMovedALittle) {
   for (int i = 1; i < kLeaves; ++i) ASSERT_TRUE(pipeline.Process(frame_of(i, {0, 0, 0}, 0)));
   const LostObjects lost{SdfTrackConfig{}};
   const auto is_lost = [&](const Frame& frame, const cv::Mat& segment) {
-    LoosePixels pixels;
-    for (int pixel = 0; pixel < segment.rows * segment.cols; ++pixel) {
-      if (segment.at<std::uint8_t>(pixel / segment.cols, pixel % segment.cols) != 0) {
-        pixels.push_back(pixel);
-      }
-    }
+    const LoosePixels pixels = PixelsWhere(segment);
     const ObjectPoses asked{{kBrick, Pose::Identity()}};
     return !lost.NotInPlace(frame, pipeline.map(), asked, {&pixels, 1}).empty();
   };
@@ -328,38 +376,6 @@ TEST(LostObjects, AreNotInPlaceWhereTheyWereMovedALittle) {
   const Frame in_place = frame_of(kReturns, {0, 0, 0}, 0);
   EXPECT_FALSE(is_lost(in_place, in_place.mask == kBrick));
   EXPECT_FALSE(is_lost(in_place, (in_place.mask == kBrick) | (in_place.mask == kTray)));
-}
-
-TEST(LostObjects, AModelIsMatchedSeenThroughOrHidden) {
-  Pipeline pipeline(TrackConfig(AssociationMode::kGiven), Toys());
-  const Frame with = Coming(1, 0);
-  ASSERT_TRUE(pipeline.Process(with));
-  const TsdfGrid& model = *VoxelsOf(pipeline.map()).GridOf(kBrick);
-  const double margin_m = 3 * kToyVoxel_m;
-  const auto look = [&](const Frame& frame) {
-    return LookAtModel(frame, model, Pose::Identity(), kToyVoxel_m, margin_m);
-  };
-  const ModelSight there = look(with);
-  EXPECT_GT(there.matched, 30);
-  EXPECT_EQ(there.through, 0);
-  Frame empty = with;
-  empty.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(5));
-  const ModelSight gone = look(empty);
-  // At outlines some voxels have no depth around them.
-  EXPECT_GE(gone.through, there.matched + there.hidden);
-  EXPECT_LE(0.9 * gone.through, there.matched + there.hidden);
-  EXPECT_EQ(gone.matched + gone.hidden, 0);
-  Frame covered = with;
-  covered.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(0.1));
-  EXPECT_EQ(look(covered).hidden, gone.through);
-  const ModelSight others = LookAtModel(with, model, Pose::Identity(), kToyVoxel_m, margin_m,
-                                        cv::Mat::zeros(with.depth.size(), CV_8UC1));
-  EXPECT_EQ(others.beside, there.matched);
-  EXPECT_EQ(others.matched, 0);
-  Frame unknown = with;
-  unknown.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(0));
-  const ModelSight nothing = look(unknown);
-  EXPECT_EQ(nothing.matched + nothing.through + nothing.hidden, 0);
 }
 
 }  // namespace
