@@ -15,6 +15,7 @@
 #include "bench/camera.h"
 #include "bench/figures.h"
 #include "bench/mesh.h"
+#include "bench/motion.h"
 #include "bench/rays.h"
 #include "bench/released.h"
 #include "bench/render.h"
@@ -183,6 +184,23 @@ void AddReturns(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunReturnBench(*options); }; });
 }
 
+void AddMotion(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<MotionBenchOptions>();
+  CLI::App* command = app.add_subcommand(
+      "motion",
+      "Whether what moves, and nothing else, becomes an object without a network, as CSV");
+  command->add_option("--out", options->out, "Output folder")->required();
+  AddCount(command, "--cases", options->cases, "In which a toy moves; as many in which none does",
+           1, 100000);
+  AddCount(command, "--first-seed", options->first_seed, "Of the first case", 0, 1000000);
+  command->add_option("--depth", options->depth, "exact or noise")
+      ->check(CLI::IsMember({"exact", "noise"}))
+      ->capture_default_str();
+  command->add_option("--method", options->method, "The map")->capture_default_str();
+  command->add_option("--track-config", options->settings, "Settings of the tracker, TOML");
+  command->callback([=, &chosen] { chosen = [=] { return RunMotionBench(*options); }; });
+}
+
 void AddCamera(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<CameraBenchOptions>();
   CLI::App* command =
@@ -255,6 +273,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddSegment(app, chosen);
   tsdfpp::AddTrack(app, chosen);
   tsdfpp::AddReturns(app, chosen);
+  tsdfpp::AddMotion(app, chosen);
   tsdfpp::AddCamera(app, chosen);
   tsdfpp::AddScaling(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });

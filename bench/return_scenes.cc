@@ -32,7 +32,12 @@ constexpr double kPlaceJitter_m = 0.03;
 constexpr double kPaintedShare = 0.5;
 
 constexpr int kLastBefore = 12;
-constexpr double kLift_m = 0.25;     // over all that stands there
+constexpr double kLift_m = 0.25;  // over all that stands there
+constexpr double kPush_m = 0.12;
+constexpr double kSlowest_m = 0.05;  // a second
+constexpr double kFastest_m = 0.4;
+constexpr double kPushSpread_rad = 0.9;
+constexpr int kFramesAfterPush = 12;
 constexpr double kOutside_m = 1.45;  // beside the table's middle, where the camera sees nothing
 
 class Draw {
@@ -187,10 +192,37 @@ void Hide(Stage& stage, bool is_moved) {
   Screen(stage, spot);
 }
 
+void PlaceOthers(Stage& stage, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) stage.AddToy(stage.DrawSpot(stage.NextPlace()));
+}
+
+// Towards the table's middle, more or less.
+void Push(Stage& stage) {
+  const Spot from = stage.DrawSpot(stage.NextPlace());
+  SceneObject& object = stage.AddToy(from);
+  ReturnScene& drawn = stage.drawn();
+  drawn.pushed = object.id;
+  drawn.speed_m = std::exp(stage.draw().Between(std::log(kSlowest_m), std::log(kFastest_m)));
+  const double angle = std::atan2(-from.position_W.y(), -from.position_W.x()) +
+                       stage.draw().Between(-kPushSpread_rad, kPushSpread_rad);
+  Spot to = from;
+  to.position_W += kPush_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+  to.yaw_deg += stage.draw().Between(-40, 40);
+  const int frames = static_cast<int>(std::lround(kPush_m / drawn.speed_m * drawn.scene.rate_hz));
+  object.keyframes = {{kLastBefore, from.position_W, Heading(from.yaw_deg)},
+                      {kLastBefore + frames, to.position_W, Heading(to.yaw_deg)}};
+  drawn.scene.frames = kLastBefore + frames + kFramesAfterPush;
+}
+
 }  // namespace
 
 ReturnScene DrawReturnScene(ReturnKind kind, std::uint64_t seed) {
   Stage stage(kind, seed);
+  if (kind == ReturnKind::kPushed || kind == ReturnKind::kStill) {
+    if (kind == ReturnKind::kPushed) Push(stage);
+    PlaceOthers(stage, kind == ReturnKind::kPushed ? kPlaces.size() - 1 : kPlaces.size());
+    return stage.drawn();
+  }
   const bool is_carried = kind != ReturnKind::kHidden && kind != ReturnKind::kMoved;
   if (!is_carried) {
     Hide(stage, kind == ReturnKind::kMoved);
@@ -211,8 +243,7 @@ ReturnScene DrawReturnScene(ReturnKind kind, std::uint64_t seed) {
     } else {
       Carry(stage, from, stage.DrawSpot(other));
     }
-    stage.AddToy(stage.DrawSpot(stage.NextPlace()));
-    stage.AddToy(stage.DrawSpot(stage.NextPlace()));
+    PlaceOthers(stage, 2);
   }
   return stage.drawn();
 }

@@ -183,9 +183,8 @@ Expected<void> CheckStart(const MapArguments& options, const MapStart& start,
 void LogStart(const MapStart& start) {
   if (!start.mask_remark.empty()) spdlog::warn("{}", start.mask_remark);
   if (start.config.poses != PoseSource::kGiven) {
-    const bool all = start.pipeline->tracked().choice() == TrackChoice::kAll;
     spdlog::info("{}: tracked is {}", start.info.name,
-                 all ? "all that is not background" : "what has a class");
+                 TrackChoiceText(start.pipeline->tracked().choice()));
   }
   if (!start.pose_remark.empty()) spdlog::info("{}", start.pose_remark);
   if (start.by_votes()) {
@@ -336,10 +335,12 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                              "(tracked by signed distances, docs/tracking.md); ") +
                      kDefaultPosesHelp)
       ->check(NotEmpty("gt, icp or track"));
-  app.add_option("--track", options->track,
-                 "Which objects are tracked: classified (those with a class), all (whatever is not "
-                 "background), auto (classified where the sequence knows a class)")
-      ->check(OneOf({"auto", "classified", "all"}))
+  app.add_option(
+         "--track", options->track,
+         "Which objects are tracked: classified (those with a class), all (whatever is not "
+         "background), moving (the same, once it is seen to move), auto (moving with "
+         "--segmentation depth --poses track; else classified where a class is known, else all)")
+      ->check(OneOf({"auto", "classified", "all", "moving"}))
       ->capture_default_str();
   app.add_option("--track-config", options->track_config,
                  "Settings of --poses track and --camera, a TOML file (docs/tracking.md)")

@@ -27,6 +27,7 @@ nlohmann::json TrackingJson(const MapStart& start) {
                        {"times_lost", span.lost},
                        {"times_found", span.found},
                        {"times_begun_anew", span.begun_anew}});
+    if (span.moved) objects.back()["moved_since_frame"] = *span.moved;
   }
   return {{"which", TrackChoiceName(pipeline.tracked().choice())}, {"objects", objects}};
 }

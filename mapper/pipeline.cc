@@ -41,7 +41,8 @@ std::unique_ptr<Tracker> MakeTracker(const PipelineConfig& config) {
     case PoseSource::kIcp:
       return std::make_unique<PclIcp>(config.icp);
     case PoseSource::kTrack:
-      return std::make_unique<SdfTracker>(config.track);
+      return std::make_unique<SdfTracker>(config.track, ModelOf,
+                                          config.Tracked() == TrackChoice::kMoving);
   }
   std::abort();
 }
@@ -79,6 +80,11 @@ bool PipelineConfig::BleedingWaits() const {
   return poses == PoseSource::kTrack || camera != CameraSource::kGiven;
 }
 
+TrackChoice PipelineConfig::Tracked() const {
+  const bool is_of_depth = segmentation == Segmentation::kDepth && poses == PoseSource::kTrack;
+  return tracked == TrackChoice::kAuto && is_of_depth ? TrackChoice::kMoving : tracked;
+}
+
 Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(map.Validate());
   TSDFPP_RETURN_IF_ERROR(segmenter.depth.Validate());
@@ -88,6 +94,10 @@ Expected<void> PipelineConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(icp.Validate());
   TSDFPP_RETURN_IF_ERROR(track.Validate());
   TSDFPP_RETURN_IF_ERROR(CheckPoses(method, poses));
+  if (tracked == TrackChoice::kMoving && poses != PoseSource::kTrack) {
+    return UsageError("--track moving needs --poses track, found --poses {}",
+                      PoseSourceName(poses));
+  }
   TSDFPP_RETURN_IF_ERROR(CheckCamera(method, camera));
   if (UsesNetwork(segmentation) && segmenter.finder == nullptr) {
     return UsageError("segmentation '{}' has nobody who finds instances, expected a network",
@@ -138,7 +148,7 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
       map_(std::move(map)),
       trajectories_(std::move(trajectories)),
       objects_(config.associate == AssociationMode::kGiven ? objects : born),
-      tracked_(config.tracked, objects_) {
+      tracked_(config.Tracked(), objects_) {
   // One field cannot do without the values that an object has in it.
   if (config.poses == PoseSource::kTrack && map_->editing() != nullptr &&
       !IsOneField(config.method)) {
@@ -217,9 +227,9 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   std::vector<InstanceId> found;
   if (lost_ == nullptr) return found;
   auto pixels_of = PixelsByLabel(association.labels, 0);
-  const auto is_shown = [&](InstanceId id) { return pixels_of.contains(id); };
-  KeepThoseNotInPlace(frame, association, T_WO_, std::not_fn(is_shown));
-  lost_->GiveUpUnsure(is_shown, *map_, T_WO_);
+  KeepThoseNotInPlace(frame, association, T_WO_,
+                      [&](InstanceId id) { return !pixels_of.contains(id); });
+  lost_->GiveUpUnsure(frame, pixels_of, *map_, T_WO_);
   if (lost_->empty()) return found;
   std::vector<LoosePixels> segments = association.unclaimed;
   std::vector<InstanceId> id_of(segments.size(), kNoInstance);
@@ -285,9 +295,10 @@ void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& associat
       continue;
     }
     settled.push_back(id);
+    if (begins_anew) track_log_.AddBegunAnew(id);
+    if (lost_->IsGivenUp(id)) continue;
     if (lost_->IsInMap(id)) track_log_.AddLost(id);
     track_log_.AddFound(id);
-    if (begins_anew) track_log_.AddBegunAnew(id);
   }
   std::vector<InstanceId> lost = lost_->TakeOut(settled, *map_, tracked.T_WO);
   // Those that the frame shows, but not where they could be registered.

@@ -44,6 +44,9 @@ struct PipelineConfig {
   CameraSource camera = CameraSource::kGiven;
   PoseSource poses = PoseSource::kGiven;
   TrackChoice tracked = TrackChoice::kAuto;  // which objects, where poses are not given
+  // The same, with kMoving for kAuto where `track` tracks segments of depth, which are furniture,
+  // too.
+  TrackChoice Tracked() const;
   IcpConfig icp{};
   SdfTrackConfig track{};  // of the camera, too
 

@@ -1,7 +1,6 @@
 // What a pipeline says of a run that its user should know.
 #include <limits>
 
-#include "mapper/map_reach.h"
 #include "mapper/pipeline.h"
 #include "mapper/track/camera_tracker.h"
 #include "mapper/track/lost_objects.h"
@@ -27,8 +26,9 @@ std::vector<std::string> Pipeline::Remarks() const {
   }
   if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
     const std::size_t seen = track_log_.objects().size();
-    const std::string_view which =
-        tracked_.choice() == TrackChoice::kAll ? "beside the background" : "that has a class";
+    const std::string_view which = tracked_.choice() == TrackChoice::kClassified
+                                       ? "that has a class"
+                                       : "beside the background";
     remarks.push_back(fmt::format(
         "objects were to be tracked (--poses {}) and none was: {}", PoseSourceName(config_.poses),
         seen == 0 ? fmt::format("no frame shows an object {}", which)

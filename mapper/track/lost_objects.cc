@@ -182,11 +182,15 @@ void LostObjects::Keep(InstanceId id, const MapRepresentation& map, const Pose& 
       id, Kept{*model->grid, AppearanceOf(*model->grid, voxel_m), model->T_WL, T_WO, voxel_m});
 }
 
-void LostObjects::GiveUpUnsure(const std::function<bool(InstanceId)>& is_shown,
+void LostObjects::GiveUpUnsure(const Frame& frame,
+                               const std::map<InstanceId, LoosePixels>& pixels_of,
                                const MapRepresentation& map, const ObjectPoses& T_WO) {
   for (const auto& [id, frozen] : unsure_) {
     const auto pose = T_WO.find(id);
-    if (frozen < config_.return_frames || pose == T_WO.end() || !is_shown(id) || Has(id)) continue;
+    const auto pixels = pixels_of.find(id);
+    if (frozen < config_.return_frames || pose == T_WO.end() || pixels == pixels_of.end()) continue;
+    const Look look = LookAt(frame, pixels->second, map.config().voxel_m);
+    if (Has(id) || !look.is_large || look.is_at_edge) continue;
     Keep(id, map, pose->second);
     if (const auto kept = kept_.find(id); kept != kept_.end()) kept->second.is_given_up = true;
   }
@@ -354,7 +358,7 @@ std::vector<InstanceId> LostObjects::TakeOut(const std::vector<InstanceId>& foun
   std::vector<InstanceId> lost;
   for (auto& [id, kept] : kept_) {
     if (!kept.is_in_map) continue;
-    kept.is_in_map = false;
+    kept.is_in_map = kept.is_given_up = false;
     unsure_.erase(id);
     map.Remove(id);
     T_WO.erase(id);

@@ -1,7 +1,6 @@
 // Objects that are not where the map has them: kept apart until a segment is found to be theirs.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -33,11 +32,12 @@ class LostObjects {
   // Keeps the object's volume, as the map has it, and has.
   void Keep(InstanceId id, const MapRepresentation& map, const Pose& T_WO);
 
-  // Keeps those of the shown objects with a pose in `T_WO` that were found, and since then were
-  // frozen in return_frames frames and registered in none: the place was wrong, or the model is.
-  // Their next segment begins them anew, where they are.
-  void GiveUpUnsure(const std::function<bool(InstanceId)>& is_shown, const MapRepresentation& map,
-                    const ObjectPoses& T_WO);
+  // Of the objects with a pose in `T_WO`, by the pixels that are theirs: keeps those that were
+  // found, and since then were frozen in return_frames frames and registered in none. Their place
+  // was wrong, or their model is, and FindAgain() begins them anew where they are. Those whose
+  // segment is too small, or at the picture's edge, are left.
+  void GiveUpUnsure(const Frame& frame, const std::map<InstanceId, LoosePixels>& pixels_of,
+                    const MapRepresentation& map, const ObjectPoses& T_WO);
   // What became of the objects in a frame (TrackedPoses::seen).
   void Watch(const std::map<InstanceId, TrackStatus>& seen);
 
@@ -53,6 +53,8 @@ class LostObjects {
   std::vector<InstanceId> Ids() const;
   // Of one that is kept: whether it was lost in this frame, and the map still has it.
   bool IsInMap(InstanceId id) const { return kept_.at(id).is_in_map; }
+  // Whether it was kept by GiveUpUnsure().
+  bool IsGivenUp(InstanceId id) const { return kept_.at(id).is_given_up; }
 
   // Whether a segment of the frame may be one of the kept objects, or one of those of the map that
   // the frame does not show: it has some of their colours, and about their size where it is seen

@@ -40,6 +40,10 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("return_frames", return_frames, 0, 10000));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_evidence", rest_evidence, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("motion_voxels", motion_voxels, 0.1, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("motion_frames", motion_frames, 1, 1000));
+  TSDFPP_RETURN_IF_ERROR(InRange("motion_evidence", motion_evidence, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("motion_points", motion_points, 1, 1000000));
   return {};
 }
 
@@ -72,7 +76,11 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("max_rotation_rad", config.max_rotation_rad)
       .Get("return_frames", config.return_frames)
       .Get("rest_voxels", config.rest_voxels)
-      .Get("rest_evidence", config.rest_evidence);
+      .Get("rest_evidence", config.rest_evidence)
+      .Get("motion_voxels", config.motion_voxels)
+      .Get("motion_frames", config.motion_frames)
+      .Get("motion_evidence", config.motion_evidence)
+      .Get("motion_points", config.motion_points);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
@@ -106,7 +114,11 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"max_rotation_rad", max_rotation_rad},
                      {"return_frames", return_frames},
                      {"rest_voxels", rest_voxels},
-                     {"rest_evidence", rest_evidence}};
+                     {"rest_evidence", rest_evidence},
+                     {"motion_voxels", motion_voxels},
+                     {"motion_frames", motion_frames},
+                     {"motion_evidence", motion_evidence},
+                     {"motion_points", motion_points}};
 }
 
 }  // namespace tsdfpp

@@ -67,6 +67,14 @@ struct SdfTrackConfig {
   // the one found (ComparePlace()). 0 switches this off.
   double rest_evidence = 3;
 
+  // What waits for motion (TrackChoice::kMoving) has moved where so many frames in a row show a
+  // point of it this far from where it began, each with this evidence, as above, against its place
+  // there; with fewer points than these, so many times as much.
+  double motion_voxels = 1;
+  int motion_frames = 3;
+  double motion_evidence = 6;
+  int motion_points = 100;
+
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;
   // Reads one table strictly; `where` names the file in errors.

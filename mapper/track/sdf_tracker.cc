@@ -22,6 +22,9 @@ constexpr double kSlow_voxels = 0.1;
 constexpr double kFartherBy = 1.3;
 constexpr double kSameWay = 0.7;
 constexpr double kShareGoingOn = 0.4;
+// What seems to move for longer, and has not come as far as an object that moves, is something
+// else: its model is wrong there.
+constexpr int kLongestWait_frames = 20;
 // Numbers of frames may be any.
 constexpr std::int64_t kMostPassed = 1'000'000'000;
 
@@ -60,6 +63,11 @@ bool GoesOn(const Vector6& before, const Vector6& now, double voxel_m) {
          now.dot(before) > kSameWay * now.norm() * before.norm();
 }
 
+// Few points can be off together.
+double LeastEvidence(int points, const SdfTrackConfig& config) {
+  return config.motion_evidence * std::max(1.0, double(config.motion_points) / std::max(points, 1));
+}
+
 // The motion without what it has along directions of which too little is known.
 Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double weak_share) {
   if (weak_share <= 0) return motion_L;
@@ -78,6 +86,7 @@ Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double 
 
 TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
                                const MapRepresentation& map, const ObjectPoses& before) {
+  ++turn_;
   std::vector<Turn> turns;
   for (auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
     turns.push_back({id, std::move(pixels), &memory_[id]});
@@ -91,6 +100,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
     if (turn.motion) after.motions[turn.id] = *turn.motion;
     if (turn.status == TrackStatus::kBegun) after.T_WO.try_emplace(turn.id, Pose::Identity());
     if (turn.moved_to) after.T_WO[turn.id] = *turn.moved_to;
+    if (turn.has_moved) after.moved.push_back(turn.id);
   }
   return after;
 }
@@ -106,7 +116,14 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
   // Its pixels may have waited until now, so that the map has nothing of it.
   if (known == before.end() || !model) {
     turn.status = TrackStatus::kBegun;
-    memory = {frame.index, Pose::Identity(), frame.T_WC * CentreOf(points), {}, {}, {}};
+    // One that begins anew is the same object.
+    Memory anew;
+    anew.frame = frame.index;
+    anew.centre_L = frame.T_WC * CentreOf(points);
+    anew.T_WO_begun = memory.T_WO_begun;
+    anew.has_moved = memory.has_moved;
+    anew.is_placed = memory.is_placed;
+    memory = std::move(anew);
     if (config_.keyframe_turn_rad > 0) {
       // A model that is begun anew has a pose already.
       const Pose T_OC = known == before.end() ? frame.T_WC : known->second.inverse() * frame.T_WC;
@@ -115,6 +132,7 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
     return;
   }
   const auto registered = Register(frame, points, *model, voxel_m, known->second, memory);
+  turn.has_moved = memory.has_moved;
   if (!registered) return;
   turn.status = TrackStatus::kTracked;
   turn.motion = registered->motion;
@@ -127,6 +145,8 @@ void SdfTracker::Place(InstanceId id, int frame) {
   memory.frame = frame - 1;
   memory.motion_L = Pose::Identity();
   memory.centre_L.reset();
+  memory.leaning.reset();
+  memory.is_placed = true;
 }
 
 std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
@@ -146,8 +166,10 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
   SdfRegistrationResult found = RegisterToDistances(task, config_);
   const SdfRegistrationResult nearest = found;
   if (found.converged) Calibrate(sight, memory, found);
-  if (!Rests(sight, task, nearest, memory, found) && !found.converged) return std::nullopt;
+  const Rest rest = StayAtRest(sight, task, nearest, memory, found);
+  if (!rest.is_kept && !found.converged) return std::nullopt;
   if (!PassesGates(sight, found)) return std::nullopt;
+  if (Waits(sight, rest, memory, found) || !PassesGates(sight, found)) return std::nullopt;
   const MotionUncertainty motion = Uncertainty(sight, found, memory);
   Remember(sight, found, memory);
 
@@ -177,24 +199,63 @@ SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) con
   return task;
 }
 
-bool SdfTracker::Rests(const Sight& sight, const SdfRegistration& task,
-                       const SdfRegistrationResult& nearest, Memory& memory,
-                       SdfRegistrationResult& found) const {
+SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistration& task,
+                                        const SdfRegistrationResult& nearest, Memory& memory,
+                                        SdfRegistrationResult& found) const {
   const std::optional<Vector6> leant = std::exchange(memory.leaning, std::nullopt);
-  if (config_.rest_evidence <= 0 || nearest.counts.observed == 0) return false;
-  if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) return false;
-  const Pose T_LC_stay = sight.T_WL.inverse() * sight.frame->T_WC;
-  const OtherPlace there = ComparePlace(task, T_LC_stay, nearest, config_);
+  Rest rest;
+  if ((config_.rest_evidence <= 0 && !waits_) || nearest.counts.observed == 0) return rest;
+  if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) return rest;
+  rest.T_LC = sight.T_WL.inverse() * sight.frame->T_WC;
+  const OtherPlace there = ComparePlace(task, rest.T_LC, nearest, config_);
+  rest.counts = there.counts;
   const Vector6 leaning =
       found.frame.LengthsOf(MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC));
-  double evidence = config_.rest_evidence / std::sqrt(static_cast<double>(nearest.counts.observed));
-  if (leant && sight.passed == 1 && GoesOn(*leant, leaning, sight.voxel_m))
-    evidence *= kShareGoingOn;
-  if (!(there.cost_ratio < 1 + evidence)) return false;
+  rest.evidence = (there.cost_ratio - 1) * std::sqrt(static_cast<double>(nearest.counts.observed));
+  const bool goes_on = leant && sight.passed == 1 && GoesOn(*leant, leaning, sight.voxel_m);
+  rest.is_kept = rest.evidence < config_.rest_evidence * (goes_on ? kShareGoingOn : 1);
+  if (!rest.is_kept) return rest;
   memory.leaning = leaning;
-  found.T_LC = T_LC_stay;
-  found.counts = there.counts;
-  return true;
+  found.T_LC = rest.T_LC;
+  found.counts = rest.counts;
+  return rest;
+}
+
+bool SdfTracker::Waits(const Sight& sight, const Rest& rest, Memory& memory,
+                       SdfRegistrationResult& found) const {
+  if (!waits_ || memory.has_moved) return false;
+  if (!memory.T_WO_begun) memory.T_WO_begun = sight.T_WL * sight.T_LO;
+  const auto away_voxels = [&](const Pose& T_LC) {
+    const Pose T_WO = sight.frame->T_WC * T_LC.inverse() * sight.T_LO;
+    const Pose motion_W = T_WO * memory.T_WO_begun->inverse();
+    const Eigen::Vector3d begun_W = motion_W.inverse() * (sight.frame->T_WC * sight.centre_C);
+    return LongestWay_m({begun_W, found.frame.radius_m}, motion_W) / sight.voxel_m;
+  };
+  // It was lost, and was found elsewhere.
+  if (std::exchange(memory.is_placed, false) &&
+      away_voxels(sight.T_WL.inverse() * sight.frame->T_WC) >= config_.motion_voxels) {
+    memory.has_moved = true;
+    return false;
+  }
+  if (memory.turn_before != turn_ - 1) memory.turns_away = memory.turns_waited = 0;
+  memory.turn_before = turn_;
+  const bool is_away = !rest.is_kept && away_voxels(found.T_LC) >= config_.motion_voxels;
+  const bool is_sure = rest.evidence >= LeastEvidence(found.counts.observed, config_);
+  memory.turns_away = is_away && is_sure ? memory.turns_away + 1 : 0;
+  memory.has_moved = memory.turns_away >= config_.motion_frames;
+  const bool is_beside =
+      LongestWay_m(found.frame, MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC)) >
+      kSlow_voxels * sight.voxel_m;
+  if (memory.has_moved || rest.is_kept || !is_beside) {
+    memory.turns_waited = 0;
+  } else if (++memory.turns_waited <= kLongestWait_frames || is_away) {
+    return true;
+  }
+  if (!memory.has_moved) {
+    found.T_LC = rest.T_LC;
+    found.counts = rest.counts;
+  }
+  return false;
 }
 
 void SdfTracker::Calibrate(const Sight& sight, const Memory& memory,

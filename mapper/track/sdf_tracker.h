@@ -20,9 +20,12 @@ using ModelSource = std::function<std::optional<ObjectModel>(const MapRepresenta
 
 class SdfTracker : public Tracker {
  public:
-  // The config must be valid. Models are the map's, unless others are known.
-  explicit SdfTracker(const SdfTrackConfig& config, ModelSource models = ModelOf)
-      : config_(config), models_(std::move(models)) {}
+  // The config must be valid. Models are the map's, unless others are known. Where `waits` for
+  // motion, an object stays where it began until it is known to have moved (TrackedPoses::moved);
+  // in frames that say that it is elsewhere, before, it is frozen.
+  explicit SdfTracker(const SdfTrackConfig& config, ModelSource models = ModelOf,
+                      bool waits = false)
+      : config_(config), models_(std::move(models)), waits_(waits) {}
 
   // An object's frame O is its lattice: its pose is the identity where it is first seen with enough
   // points. Frozen are objects that have too few points, are not registered, or fail a gate: they
@@ -49,6 +52,13 @@ class SdfTracker : public Tracker {
     std::optional<Keyframe> keyframe;
     std::optional<PlaceUncertainty> place;  // then
     std::optional<Vector6> leaning;         // of what was left at rest: to where it was found
+    // Of one that waits for motion.
+    std::optional<Pose> T_WO_begun;  // where it was when it was registered first
+    bool has_moved = false;
+    bool is_placed = false;  // by Place(), since it was registered last
+    int turn_before = 0;     // the last in which it was registered, here or elsewhere
+    int turns_away = 0;      // of those, in a row, from where it began
+    int turns_waited = 0;    // of those, in a row, for more of a motion
   };
 
   // A frame's segment of an object, and the object as the map has it.
@@ -76,6 +86,7 @@ class SdfTracker : public Tracker {
     TrackStatus status = TrackStatus::kFrozen;
     std::optional<MotionUncertainty> motion{};
     std::optional<Pose> moved_to{};  // its pose T_WO; nothing where it stays where it was
+    bool has_moved = false;          // it is known to have
   };
 
   // May run beside the turns of other objects.
@@ -86,10 +97,25 @@ class SdfTracker : public Tracker {
                                      const ObjectModel& model, double voxel_m, const Pose& T_WO,
                                      Memory& memory) const;
   SdfRegistration TaskOf(const Sight& sight, const Memory& memory) const;
-  // Whether it was at rest and nothing says that it is no more; `found` is then that place. The
-  // points are at their nearest to the model at `nearest`, of which `found` is the best guess.
-  bool Rests(const Sight& sight, const SdfRegistration& task, const SdfRegistrationResult& nearest,
-             Memory& memory, SdfRegistrationResult& found) const;
+  // What a frame says of an object that was at rest.
+  struct Rest {
+    bool is_kept = false;  // nothing says that it is at rest no more
+    // Against its place: (what it costs there / where it is found - 1) sqrt(n), n the number of
+    // observed points. 0 where it was not at rest.
+    double evidence = 0;
+    // That place, and the points there; of an object that was at rest.
+    Pose T_LC = Pose::Identity();
+    DistanceCounts counts;
+  };
+  // `found` is then that place. The points are at their nearest to the model at `nearest`, of which
+  // `found` is the best guess.
+  Rest StayAtRest(const Sight& sight, const SdfRegistration& task,
+                  const SdfRegistrationResult& nearest, Memory& memory,
+                  SdfRegistrationResult& found) const;
+  // Takes in how far it is from where it began. Whether it is to wait for more of its motion; it
+  // does not wait for ever, and then `found` is where it is at rest.
+  bool Waits(const Sight& sight, const Rest& rest, Memory& memory,
+             SdfRegistrationResult& found) const;
   // Takes off `found` what the keyframe says that the model adds.
   void Calibrate(const Sight& sight, const Memory& memory, SdfRegistrationResult& found) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
@@ -102,6 +128,8 @@ class SdfTracker : public Tracker {
 
   SdfTrackConfig config_;
   ModelSource models_;
+  bool waits_;
+  int turn_ = 0;  // calls of Track()
   std::map<InstanceId, Memory> memory_;
 };
 

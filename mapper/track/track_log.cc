@@ -28,6 +28,10 @@ void TrackLog::Add(int frame, const TrackedPoses& tracked) {
         break;
     }
   }
+  for (const InstanceId id : tracked.moved) {
+    TrackSpan& span = objects_[id];
+    if (!span.moved) span.moved = frame;
+  }
 }
 
 bool TrackLog::IsEmpty() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 
 #include "mapper/track/tracker.h"
 
@@ -16,7 +17,8 @@ struct TrackSpan {
   int frozen = 0;   // and were not
   int lost = 0;     // times that it was seen not to be in its place (mapper/track/lost_objects.h)
   int found = 0;    // times that it was found again
-  int begun_anew = 0;  // times that it came back and its place on the model was not found
+  int begun_anew = 0;  // times that its place on the model was not found, or was found wrongly
+  std::optional<int> moved{};  // the first frame with it in TrackedPoses::moved
   bool operator==(const TrackSpan&) const = default;
 };
 

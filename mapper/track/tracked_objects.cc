@@ -7,11 +7,13 @@ namespace tsdfpp {
 
 Expected<TrackChoice> TrackChoiceFromName(std::string_view name) {
   for (const TrackChoice choice :
-       {TrackChoice::kAuto, TrackChoice::kClassified, TrackChoice::kAll}) {
+       {TrackChoice::kAuto, TrackChoice::kClassified, TrackChoice::kAll, TrackChoice::kMoving}) {
     if (name == TrackChoiceName(choice)) return choice;
   }
-  return UsageError("choice of what is tracked '{}' is unknown, expected auto, classified or all",
-                    name);
+  return UsageError(
+      "choice of what is tracked '{}' is unknown, expected auto, classified, all or "
+      "moving",
+      name);
 }
 
 std::string_view TrackChoiceName(TrackChoice choice) {
@@ -22,6 +24,22 @@ std::string_view TrackChoiceName(TrackChoice choice) {
       return "classified";
     case TrackChoice::kAll:
       return "all";
+    case TrackChoice::kMoving:
+      return "moving";
+  }
+  std::abort();
+}
+
+std::string_view TrackChoiceText(TrackChoice choice) {
+  switch (choice) {
+    case TrackChoice::kClassified:
+      return "what has a class";
+    case TrackChoice::kAll:
+      return "all that is not background";
+    case TrackChoice::kMoving:
+      return "all that is not background, once it is seen to move";
+    case TrackChoice::kAuto:
+      break;
   }
   std::abort();
 }
@@ -49,7 +67,7 @@ std::string TrackedObjects::ClassOf(InstanceId id) const {
 }
 
 cv::Mat TrackedObjects::Select(const cv::Mat& labels) const {
-  if (choice() == TrackChoice::kAll) return labels;
+  if (choice() != TrackChoice::kClassified) return labels;
   cv::Mat selected = labels.clone();
   for (int v = 0; v < selected.rows; ++v) {
     auto* row = selected.ptr<InstanceId>(v);

@@ -15,11 +15,14 @@ enum class TrackChoice {
   kAuto,        // kClassified from when on a class is known of any object, else kAll
   kClassified,  // those with a semantic class
   kAll,         // whatever is not background
+  kMoving,      // the same, but what has not been seen to move yet stays where it was seen first
 };
 
-// "auto", "classified" or "all". Errors: kUsage.
+// "auto", "classified", "all" or "moving". Errors: kUsage.
 Expected<TrackChoice> TrackChoiceFromName(std::string_view name);
 std::string_view TrackChoiceName(TrackChoice choice);
+// What that is, for a sentence. Not of kAuto.
+std::string_view TrackChoiceText(TrackChoice choice);
 
 class TrackedObjects {
  public:
@@ -31,9 +34,9 @@ class TrackedObjects {
 
   bool Contains(InstanceId id) const {
     if (id == kBackground || id == kNoInstance) return false;
-    return choice() == TrackChoice::kAll || classes_.contains(id);
+    return choice() != TrackChoice::kClassified || classes_.contains(id);
   }
-  // kClassified or kAll, as it is now.
+  // Not kAuto, but what that is now.
   TrackChoice choice() const;
   // The class that the object was given most often, the first in the alphabet of equally frequent
   // ones; empty where it has none.

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string_view>
+#include <vector>
 
 #include "core/error.h"
 #include "core/types.h"
@@ -28,6 +29,9 @@ struct TrackedPoses {
   std::map<InstanceId, TrackStatus> seen{};  // of those that are tracked and that the frame shows
   // Of those that were registered by a tracker that knows: how well their motion since is known.
   std::map<InstanceId, MotionUncertainty> motions{};
+  // Of those that the frame shows: which are known to have moved since they began, by a tracker
+  // that waits for that.
+  std::vector<InstanceId> moved{};
 };
 
 class Tracker {

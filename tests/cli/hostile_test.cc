@@ -335,6 +335,8 @@ TEST_F(Hostile, SettingsOfTrackingAreNotLeftOut) {
   const CommandOutput all = go_on({"--track", "all"});
   EXPECT_EQ(all.exit_code, 0) << all.err;
   EXPECT_NE(all.err.find("tracked is all that is not background"), std::string::npos) << all.err;
+  ExpectSentence(go_on({"--track", "moving"}), kUsage,
+                 "--track moving needs --poses track, found --poses icp");
   ExpectSentence(go_on({"--track-config", folder_ / "none.toml"}), kUsage, "no such file");
   ASSERT_TRUE(WriteFile(folder_ / "track.toml", "min_points = 40\n").has_value());
   ExpectSentence(go_on({"--track-config", folder_ / "track.toml"}), kUsage,

@@ -267,8 +267,9 @@ TEST(LostObjects, CanBeUndone) {
 TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
   const Frame frame = Coming(1, 0);
   const SdfTrackConfig config;
-  const auto shown = [](InstanceId id) { return id == kBrick; };
   const LoosePixels pixels = PixelsWhere(frame.mask == kBrick);
+  const std::map<InstanceId, LoosePixels> shown{{kBrick, pixels}};
+  const LoosePixels few(pixels.begin(), pixels.begin() + 10);
   const InstanceId id_of = kBrick;
   for (const bool is_registered_once : {false, true}) {
     SCOPED_TRACE(is_registered_once);
@@ -283,15 +284,17 @@ TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
     ASSERT_TRUE(lost.PutBack({kBrick, 0, elsewhere, false}, *map, T_WO));
     EXPECT_TRUE(lost.TakeOut({kBrick}, *map, T_WO).empty());
     for (int i = 0; i < config.return_frames; ++i) {
-      lost.GiveUpUnsure(shown, *map, T_WO);
+      lost.GiveUpUnsure(frame, shown, *map, T_WO);
       EXPECT_TRUE(lost.empty()) << i;
       const bool is_registered = is_registered_once && i == 3;
       lost.Watch({{kBrick, is_registered ? TrackStatus::kTracked : TrackStatus::kFrozen},
                   {kTray, TrackStatus::kFrozen}});
     }
-    lost.GiveUpUnsure([](InstanceId) { return false; }, *map, T_WO);
+    lost.GiveUpUnsure(frame, {}, *map, T_WO);
     EXPECT_TRUE(lost.empty()) << "it is not in sight";
-    lost.GiveUpUnsure(shown, *map, T_WO);
+    lost.GiveUpUnsure(frame, {{kBrick, few}}, *map, T_WO);
+    EXPECT_TRUE(lost.empty()) << "too little of it is";
+    lost.GiveUpUnsure(frame, shown, *map, T_WO);
     ASSERT_EQ(lost.Has(kBrick), !is_registered_once);
     if (is_registered_once) continue;
     const auto returns = lost.FindAgain(frame, {&pixels, 1}, {&id_of, 1});
@@ -300,10 +303,25 @@ TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
     EXPECT_EQ(returns[0].T_WO.matrix(), elsewhere.matrix());
     ASSERT_TRUE(lost.PutBack(returns[0], *map, T_WO));
     EXPECT_TRUE(VoxelsOf(*map).ObservedVoxels(kBrick).empty());
-    EXPECT_TRUE(lost.TakeOut({kBrick}, *map, T_WO).empty());
-    lost.Watch({{kBrick, TrackStatus::kBegun}});
-    EXPECT_TRUE(lost.empty());
   }
+}
+
+// The same in the pipeline, where a gate says no in every frame.
+TEST(LostObjects, AreBegunAnewInThePipeline) {
+  PipelineConfig config = TrackConfig(AssociationMode::kGiven);
+  config.track.min_observed_share = 0.9;
+  Pipeline pipeline(config, Toys());
+  const int last = kReturns + config.track.return_frames;
+  ASSERT_TRUE(pipeline.Process(Coming(1, 110 * kDegree)));
+  const TrackSpan& brick = pipeline.track_log().objects().at(kBrick);
+  for (int i = 2; i <= last; ++i) {
+    ASSERT_TRUE(pipeline.Process(Coming(i, 110 * kDegree)));
+    EXPECT_EQ(brick.begun_anew, i == last ? 1 : 0) << i;
+  }
+  EXPECT_EQ(brick.tracked, 0);
+  EXPECT_EQ(brick.lost, 1);
+  EXPECT_EQ(brick.found, 1);
+  EXPECT_GT(VoxelsOfBrick(pipeline), 0U);
 }
 
 // Whatever the number of threads.

@@ -93,11 +93,11 @@ void ExpectFrozen(Pipeline& pipeline, const Frame& frame, const std::vector<Inst
 }
 
 // A brick and a tray at rest until frame kStart, seen with noise by a camera that moves; then the
-// brick slides, so far a frame.
+// brick has slid so far.
 constexpr int kStart = 10;
-Frame NoisyToys(int index, double slide_m) {
+Frame NoisyToys(int index, double slid_m) {
   reference::Scene scene = TableOnly();
-  AddBrick(scene, 0.3, {-0.14 + slide_m * std::max(0, index - kStart), 0.03, kTableTop_m + 0.045});
+  AddBrick(scene, 0.3, {-0.14 + slid_m, 0.03, kTableTop_m + 0.045});
   AddTray(scene, -0.4, {0.08, 0.11, kTableTop_m + 0.016});
   const Intrinsics fine{384, 288, 320.0, 320.0, 191.5, 143.5};
   Frame frame = reference::Render(scene, CircleCamera(0.005 * index), index, fine);
@@ -113,10 +113,10 @@ Frame NoisyToys(int index, double slide_m) {
 // Frames kStart + 1 ... kEnd: the largest error of the brick's place.
 constexpr int kEnd = kStart + 8;
 double FarthestOff_m(Pipeline& pipeline, double slide_m) {
-  const Pose T_WO_first = NoisyToys(1, slide_m).T_WO.at(kBrick);
+  const Pose T_WO_first = NoisyToys(1, 0).T_WO.at(kBrick);
   double farthest_m = 0;
   for (int i = kStart + 1; i <= kEnd; ++i) {
-    const Frame frame = NoisyToys(i, slide_m);
+    const Frame frame = NoisyToys(i, slide_m * (i - kStart));
     EXPECT_TRUE(pipeline.Process(frame));
     const Pose found = pipeline.trajectories().at(kBrick).at(i) * T_WO_first;
     farthest_m =
@@ -137,7 +137,7 @@ TEST(SdfTracker, LeavesAtRestWhatNothingSaysMoves) {
       Pipeline pipeline(config, Toys());
       int moved = 0;
       for (int i = 1; i <= kStart; ++i) {
-        ASSERT_TRUE(pipeline.Process(NoisyToys(i, slide_m)));
+        ASSERT_TRUE(pipeline.Process(NoisyToys(i, 0)));
         for (const InstanceId id : {kBrick, kTray}) {
           const Pose& pose = pipeline.trajectories().at(id).at(i);
           moved += pose.matrix() == Eigen::Matrix4d::Identity() ? 0 : 1;
@@ -164,6 +164,103 @@ TEST(SdfTracker, FreezesObjectsAtRestThatTheMaskSwaps) {
   swapped.mask.setTo(kBrick, swapped.mask == kTray);
   swapped.mask.setTo(kTray, swapped.mask == 99);
   ExpectFrozen(pipeline, swapped, {kBrick, kTray});
+}
+
+// With --track moving.
+PipelineConfig MovingConfig() {
+  PipelineConfig config = TrackConfig();
+  config.tracked = TrackChoice::kMoving;
+  config.map.voxel_m = kToyVoxel_m / 2;
+  return config;
+}
+
+TEST(SdfTracker, WaitsForMotion) {
+  constexpr double kSlide_m = 0.006;  // a frame; two are more than a voxel
+  const PipelineConfig config = MovingConfig();
+  Pipeline pipeline(config, Toys());
+  for (int i = 1; i <= kStart; ++i) ASSERT_TRUE(pipeline.Process(NoisyToys(i, 0)));
+  const auto& objects = pipeline.track_log().objects();
+  EXPECT_FALSE(objects.at(kBrick).moved);
+  const std::size_t before = VoxelsOf(pipeline.map()).ObservedVoxels(kBrick).size();
+  const Pose T_WO_first = NoisyToys(1, 0).T_WO.at(kBrick);
+  for (int i = kStart + 1; i <= kEnd; ++i) {
+    SCOPED_TRACE(i);
+    const Frame frame = NoisyToys(i, kSlide_m * (i - kStart));
+    ASSERT_TRUE(pipeline.Process(frame));
+    const Pose pose = pipeline.trajectories().at(kBrick).at(i);
+    if (!objects.at(kBrick).moved) {
+      EXPECT_EQ(pose.matrix(), Eigen::Matrix4d::Identity());
+      continue;
+    }
+    const Pose found = pose * T_WO_first;
+    EXPECT_LT((found.translation() - frame.T_WO.at(kBrick).translation()).norm(),
+              kPixel_voxels * kToyVoxel_m);
+  }
+  ASSERT_TRUE(objects.at(kBrick).moved);
+  EXPECT_LE(*objects.at(kBrick).moved, kStart + 1 + config.track.motion_frames);
+  EXPECT_GE(VoxelsOf(pipeline.map()).ObservedVoxels(kBrick).size(), before);
+  EXPECT_FALSE(objects.at(kTray).moved);
+}
+
+// A shift of less than a voxel is no motion yet. It is not waited for more of it for ever.
+TEST(SdfTracker, WaitsForMotionForSomeFramesAlone) {
+  constexpr double kSlid_m = 0.005;
+  constexpr int kLongestWait_frames = 20;  // of sdf_tracker.cc
+  Pipeline pipeline(MovingConfig(), Toys());
+  for (int i = 1; i <= kStart; ++i) ASSERT_TRUE(pipeline.Process(NoisyToys(i, 0)));
+  for (int i = 1; i <= kLongestWait_frames + 1; ++i) {
+    ASSERT_TRUE(pipeline.Process(NoisyToys(kStart + i, kSlid_m)));
+  }
+  const TrackSpan& brick = pipeline.track_log().objects().at(kBrick);
+  EXPECT_FALSE(brick.moved);
+  EXPECT_EQ(brick.frozen, kLongestWait_frames);
+  EXPECT_EQ(brick.last, kStart + kLongestWait_frames + 1);
+  EXPECT_EQ(pipeline.trajectories().at(kBrick).rbegin()->second.matrix(),
+            Eigen::Matrix4d::Identity());
+}
+
+// A network that knows trays alone.
+class TrayFinder : public InstanceFinder {
+ public:
+  Expected<std::vector<Instance>> Find(const Frame& frame) override {
+    const cv::Mat mask = NoisyToys(frame.index, SlidAt(frame.index)).mask == kTray;
+    return std::vector<Instance>{{cv::Rect({}, mask.size()), mask, "tray", 1}};
+  }
+  static double SlidAt(int index) { return 0.006 * std::max(0, index - kStart); }
+};
+
+// What no network knows, but moves, is tracked from then on, as a whole.
+TEST(SdfTracker, WhatMovesIsAnObjectWithoutANetwork) {
+  PipelineConfig config = MovingConfig();
+  config.segmentation = Segmentation::kFull;
+  config.segmenter.finder = std::make_shared<TrayFinder>();
+  config.segmenter.network.unknown_objects = true;
+  config.associate = AssociationMode::kVotes;
+  ASSERT_TRUE(config.Validate());
+  Pipeline pipeline(config, {});
+  cv::Mat brick;
+  for (int i = 1; i <= kEnd; ++i) {
+    Frame frame = NoisyToys(i, TrayFinder::SlidAt(i));
+    brick = frame.mask == kBrick;
+    frame.mask = cv::Mat();
+    frame.T_WO.clear();
+    ASSERT_TRUE(pipeline.Process(frame));
+  }
+  std::map<InstanceId, int> moved;  // pixels of those that have, on the brick
+  for (const auto& [id, span] : pipeline.track_log().objects()) {
+    if (span.moved) {
+      moved[id] = cv::countNonZero((pipeline.labels() == static_cast<double>(id)) & brick);
+    }
+  }
+  ASSERT_EQ(moved.size(), 1U);
+  EXPECT_GT(2 * moved.begin()->second, cv::countNonZero(brick));
+  const InstanceId id = moved.begin()->first;
+  const Pose& pose = pipeline.trajectories().at(id).at(kEnd);
+  EXPECT_LT((pose.translation() - Eigen::Vector3d(TrayFinder::SlidAt(kEnd), 0, 0)).norm(),
+            kPixel_voxels * kToyVoxel_m);
+  std::map<InstanceId, std::string> classes;
+  for (const ObjectInfo& object : pipeline.Objects()) classes[object.id] = object.semantic_class;
+  EXPECT_EQ(classes.at(id), "");
 }
 
 TEST(SdfTracker, FreezesObjectsThatTheMaskSwaps) {

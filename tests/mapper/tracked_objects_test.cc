@@ -26,10 +26,13 @@ TEST(TrackedObjects, AreThoseThatWereOnceClassified) {
 }
 
 TEST(TrackedObjects, AreAllButTheBackgroundWhereAllAreAsked) {
-  const TrackedObjects tracked(TrackChoice::kAll, {{3, "a", "car"}});
-  EXPECT_EQ(Selected(tracked, {0, 3, kNoInstance, 4}), (Ids{0, 3, kNoInstance, 4}));
-  EXPECT_FALSE(tracked.Contains(kBackground));
-  EXPECT_FALSE(tracked.Contains(kNoInstance));
+  for (const TrackChoice choice : {TrackChoice::kAll, TrackChoice::kMoving}) {
+    const TrackedObjects tracked(choice, {{3, "a", "car"}});
+    EXPECT_EQ(tracked.choice(), choice);
+    EXPECT_EQ(Selected(tracked, {0, 3, kNoInstance, 4}), (Ids{0, 3, kNoInstance, 4}));
+    EXPECT_FALSE(tracked.Contains(kBackground));
+    EXPECT_FALSE(tracked.Contains(kNoInstance));
+  }
 }
 
 TEST(TrackedObjects, AreTheClassifiedOnesFromWhenAClassIsKnown) {
@@ -55,7 +58,7 @@ TEST(TrackedObjects, HaveTheClassThatTheyWereGivenMostOften) {
 
 TEST(TrackChoice, HasNames) {
   for (const TrackChoice choice :
-       {TrackChoice::kAuto, TrackChoice::kAll, TrackChoice::kClassified}) {
+       {TrackChoice::kAuto, TrackChoice::kAll, TrackChoice::kClassified, TrackChoice::kMoving}) {
     EXPECT_EQ(TrackChoiceFromName(TrackChoiceName(choice)).value(), choice);
   }
   EXPECT_FALSE(TrackChoiceFromName("some").has_value());
