@@ -35,7 +35,7 @@ struct ReturnScene {
 };
 
 // Of frames of 320 x 240 pixels, at 30 a second: toys of the catalogue, each once at most, some of
-// them painted, two of which stay where they are.
+// them painted. Two stay where they are; three of kPushed, and all four of kStill.
 ReturnScene DrawReturnScene(ReturnKind kind, std::uint64_t seed);
 
 }  // namespace tsdfpp
