@@ -1,6 +1,10 @@
 #include "mapper/segment/components.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <map>
 #include <numeric>
 #include <set>
@@ -69,6 +73,18 @@ void JoinRows(const std::vector<RunOfPixels>& upper, std::int32_t first_upper,
   }
 }
 
+// Strips of rows, one a task, each with sums of its own, which are as many for any number of
+// threads. Calls of_strip(strip, first row, the row after the last).
+constexpr int kStrips = 8;
+template <typename OfStrip>
+void ForEachStrip(int rows, const OfStrip& of_strip) {
+  tbb::parallel_for(0, kStrips, [&](int strip) {
+    of_strip(static_cast<std::size_t>(strip), rows * strip / kStrips, rows * (strip + 1) / kStrips);
+  });
+}
+
+using LabelPair = std::pair<std::int32_t, std::int32_t>;  // the lower first
+
 // Parts, of which small ones are joined to others.
 class Joining {
  public:
@@ -79,14 +95,30 @@ class Joining {
 
   // The links of each small part to others.
   void CountLinks(const PixelLinks& links, const cv::Mat& labels) {
-    for (int v = 0; v < labels.rows; ++v) {
-      const auto* row = labels.ptr<std::int32_t>(v);
-      const auto* below = v + 1 < labels.rows ? labels.ptr<std::int32_t>(v + 1) : nullptr;
-      const auto* right = links.right.ptr<std::uint8_t>(v);
-      const auto* down = links.down.ptr<std::uint8_t>(v);
-      for (int u = 0; u < labels.cols; ++u) {
-        if (u + 1 < labels.cols && right[u] != 0) Count(row[u], row[u + 1]);
-        if (below != nullptr && down[u] != 0) Count(row[u], below[u]);
+    std::array<std::vector<LabelPair>, kStrips> pairs;
+    ForEachStrip(labels.rows, [&](std::size_t strip, int first, int last) {
+      for (int v = first; v < last; ++v) {
+        const auto* row = labels.ptr<std::int32_t>(v);
+        const auto* right = links.right.ptr<std::uint8_t>(v);
+        for (int u = 0; u + 1 < labels.cols; ++u) {
+          if (row[u] != row[u + 1] && right[u] != 0) AddPair(row[u], row[u + 1], pairs[strip]);
+        }
+        if (v + 1 == labels.rows) break;
+        const auto* below = labels.ptr<std::int32_t>(v + 1);
+        const auto* down = links.down.ptr<std::uint8_t>(v);
+        for (int u = 0; u < labels.cols; ++u) {
+          if (row[u] != below[u] && down[u] != 0) AddPair(row[u], below[u], pairs[strip]);
+        }
+      }
+      std::sort(pairs[strip].begin(), pairs[strip].end());
+    });
+    for (const auto& of_strip : pairs) {
+      for (auto begin = of_strip.begin(); begin != of_strip.end();) {
+        const auto end = std::find_if(begin, of_strip.end(), [&](auto& p) { return p != *begin; });
+        const auto count = static_cast<int>(end - begin);
+        shared_[begin->first][begin->second] += count;
+        shared_[begin->second][begin->first] += count;
+        begin = end;
       }
     }
   }
@@ -140,12 +172,9 @@ class Joining {
     const PartSize& size = sizes_[static_cast<std::size_t>(label)];
     return size.pixels > 0 && (size.pixels < least_.pixels || size.area_m2 < least_.area_m2);
   }
-  void Count(std::int32_t a, std::int32_t b) {
-    if (a == b || a == 0 || b == 0) return;
-    if (IsSmall(a) || IsSmall(b)) {
-      ++shared_[a][b];
-      ++shared_[b][a];
-    }
+  void AddPair(std::int32_t a, std::int32_t b, std::vector<LabelPair>& pairs) const {
+    if (a == 0 || b == 0 || !(IsSmall(a) || IsSmall(b))) return;
+    pairs.emplace_back(std::min(a, b), std::max(a, b));
   }
   // 0 where all its neighbours were joined to others.
   std::int32_t MostLinked(std::int32_t label) {
@@ -180,6 +209,91 @@ class Joining {
   std::vector<std::int32_t> becomes_;  // by label: itself, or what it was joined to
   std::map<std::int32_t, std::map<std::int32_t, int>> shared_;
 };
+
+// Neighbours in a row with the same label, and the sum of their depths' squares.
+struct RunOfLabel {
+  std::int32_t label = 0;
+  std::int32_t pixels = 0;
+  float squares = 0;
+};
+
+// Calls of_run(run) for each, in order of rows. Without `depth` sums are 0.
+template <typename OfRun>
+void ForEachRunOfLabel(const cv::Mat& labels, const cv::Mat& depth, const OfRun& of_run) {
+  std::array<std::vector<RunOfLabel>, kStrips> runs;
+  ForEachStrip(labels.rows, [&](std::size_t strip, int first, int last) {
+    for (int v = first; v < last; ++v) {
+      const auto* row = labels.ptr<std::int32_t>(v);
+      const auto* z = depth.empty() ? nullptr : depth.ptr<float>(v);
+      for (int begin = 0; begin < labels.cols;) {
+        int end = begin + 1;
+        while (end < labels.cols && row[end] == row[begin]) ++end;
+        float squares = 0;
+        for (int u = begin; z != nullptr && u < end; ++u) squares += z[u] * z[u];
+        runs[strip].push_back({row[begin], end - begin, squares});
+        begin = end;
+      }
+    }
+  });
+  for (const auto& of_strip : runs) std::for_each(of_strip.begin(), of_strip.end(), of_run);
+}
+
+void AddWhereLinked(const std::uint8_t* link, const std::uint8_t* what, int count,
+                    std::uint8_t* to) {
+  for (int i = 0; i < count; ++i) {
+    const int all_bits = -static_cast<int>(link[i] != 0);
+    to[i] = static_cast<std::uint8_t>(to[i] | (all_bits & what[i]));
+  }
+}
+
+// The labelled pixels with links to ones that get a label, in order of rows.
+std::vector<int> OutermostOf(const cv::Mat& known, const PixelLinks& links, const cv::Mat& labels,
+                             cv::Mat& open) {
+  const int rows = labels.rows;
+  const int cols = labels.cols;
+  const auto width = static_cast<std::size_t>(cols);
+  open.create(labels.size(), CV_8UC1);  // 1 where a label is missing, 2 where there is one
+  ForEachRow(rows, [&](int v) {
+    const auto* q = known.ptr<float>(v);
+    const auto* label = labels.ptr<std::int32_t>(v);
+    auto* to = open.ptr<std::uint8_t>(v);
+    for (int u = 0; u < cols; ++u) {
+      const int missing = static_cast<int>(label[u] == 0) & static_cast<int>(q[u] != 0);
+      to[u] = static_cast<std::uint8_t>(missing | (label[u] != 0 ? 2 : 0));
+    }
+  });
+  std::array<std::vector<int>, kStrips> found;
+  ForEachStrip(rows, [&](std::size_t strip, int first, int last) {
+    std::vector<std::uint8_t> is_out(width + sizeof(std::uint64_t));  // zeros behind the row
+    const std::vector<std::uint8_t> nothing(width);
+    for (int v = first; v < last; ++v) {
+      const auto* row = open.ptr<std::uint8_t>(v);
+      const auto* above = v > 0 ? open.ptr<std::uint8_t>(v - 1) : nothing.data();
+      const auto* below = v + 1 < rows ? open.ptr<std::uint8_t>(v + 1) : nothing.data();
+      const auto* up = v > 0 ? links.down.ptr<std::uint8_t>(v - 1) : nothing.data();
+      const auto* down = links.down.ptr<std::uint8_t>(v);
+      const auto* right = links.right.ptr<std::uint8_t>(v);
+      auto* to = is_out.data();
+      std::fill(to, to + cols, std::uint8_t{0});
+      AddWhereLinked(up, above, cols, to);
+      AddWhereLinked(down, below, cols, to);
+      AddWhereLinked(right, row + 1, cols - 1, to);
+      AddWhereLinked(right, row, cols - 1, to + 1);
+      // Bit 0: a neighbour lacks a label; and there is one here.
+      for (int u = 0; u < cols; ++u) to[u] = static_cast<std::uint8_t>(to[u] & (row[u] >> 1));
+      for (int u = 0; u < cols; u += static_cast<int>(sizeof(std::uint64_t))) {
+        std::uint64_t eight = 0;
+        std::memcpy(&eight, to + u, sizeof(eight));
+        for (int i = u; eight != 0 && i < u + static_cast<int>(sizeof(eight)); ++i) {
+          if (to[i] != 0) found[strip].push_back(v * cols + i);
+        }
+      }
+    }
+  });
+  std::vector<int> all;
+  for (const auto& of_strip : found) all.insert(all.end(), of_strip.begin(), of_strip.end());
+  return all;
+}
 
 }  // namespace
 
@@ -220,7 +334,7 @@ std::int32_t LabelComponents(const cv::Mat& member, const PixelLinks& links, std
   return next;
 }
 
-void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& labels) {
+void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& scratch, cv::Mat& labels) {
   const int cols = labels.cols;
   const int rows = labels.rows;
   const auto* q = known.ptr<float>();
@@ -235,16 +349,7 @@ void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& labels) 
     if (u + 1 < cols && right[at] != 0) with(at + 1);
     if (at + cols < rows * cols && down[at] != 0) with(at + cols);
   };
-  std::vector<int> ring;  // got their labels last
-  for (int at = 0; at < rows * cols; ++at) {
-    if (label[at] != 0 || q[at] == 0) continue;
-    // Begin at the labelled neighbours of what has no label.
-    for_each_neighbour(at, [&](int next) {
-      if (label[next] != 0) ring.push_back(next);
-    });
-  }
-  std::sort(ring.begin(), ring.end());
-  ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
+  std::vector<int> ring = OutermostOf(known, links, labels, scratch);  // got their labels last
   std::vector<int> next_ring;
   while (!ring.empty()) {
     next_ring.clear();
@@ -261,10 +366,9 @@ void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& labels) 
 
 std::vector<std::int32_t> CountLabels(const cv::Mat& labels, std::int32_t end) {
   std::vector<std::int32_t> pixels(static_cast<std::size_t>(end));
-  for (int v = 0; v < labels.rows; ++v) {
-    const auto* row = labels.ptr<std::int32_t>(v);
-    for (int u = 0; u < labels.cols; ++u) ++pixels[static_cast<std::size_t>(row[u])];
-  }
+  ForEachRunOfLabel(labels, cv::Mat(), [&](const RunOfLabel& run) {
+    pixels[static_cast<std::size_t>(run.label)] += run.pixels;
+  });
   return pixels;
 }
 
@@ -272,23 +376,11 @@ std::vector<PartSize> MeasureParts(const cv::Mat& labels, const cv::Mat& depth, 
                                    std::int32_t end) {
   std::vector<PartSize> sizes(static_cast<std::size_t>(end));
   const double pixel_m2 = double{pixel} * double{pixel};
-  for (int v = 0; v < labels.rows; ++v) {
-    const auto* row = labels.ptr<std::int32_t>(v);
-    const auto* z = depth.ptr<float>(v);
-    for (int begin = 0; begin < labels.cols;) {
-      // Runs of one label are long.
-      int end_of_run = begin;
-      float sum = 0;
-      while (end_of_run < labels.cols && row[end_of_run] == row[begin]) {
-        sum += z[end_of_run] * z[end_of_run];
-        ++end_of_run;
-      }
-      PartSize& size = sizes[static_cast<std::size_t>(row[begin])];
-      size.pixels += end_of_run - begin;
-      size.area_m2 += pixel_m2 * double{sum};
-      begin = end_of_run;
-    }
-  }
+  ForEachRunOfLabel(labels, depth, [&](const RunOfLabel& run) {
+    PartSize& size = sizes[static_cast<std::size_t>(run.label)];
+    size.pixels += run.pixels;
+    size.area_m2 += pixel_m2 * double{run.squares};
+  });
   return sizes;
 }
 

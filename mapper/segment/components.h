@@ -23,8 +23,8 @@ std::int32_t LabelComponents(const cv::Mat& member, const PixelLinks& links, std
 
 // Gives every pixel that is 0 in `labels` and where `known` (CV_32FC1) is not 0 the label of the
 // pixel from which the fewest links lead to it; of several the first that got there, beginning in
-// order of rows. Pixels to which no link leads stay 0.
-void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& labels);
+// order of rows. Pixels to which no link leads stay 0. `scratch` keeps memory from call to call.
+void GrowLabels(const cv::Mat& known, const PixelLinks& links, cv::Mat& scratch, cv::Mat& labels);
 
 // Pixels of each label, by label; the first is of 0. Labels are below `end`.
 std::vector<std::int32_t> CountLabels(const cv::Mat& labels, std::int32_t end);

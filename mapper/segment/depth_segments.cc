@@ -24,7 +24,7 @@ Expected<Segments> DepthSegments::Segment(const Frame& frame) {
   labels_.create(depth.size(), CV_32SC1);
   labels_.setTo(0);
   std::int32_t end = LabelComponents(inner_, links, kBackgroundLabel + 1, labels_);
-  GrowLabels(maps_->inverse_depth, links, labels_);
+  GrowLabels(maps_->inverse_depth, links, inner_, labels_);
   // What is too thin to have an inside.
   ForEachRow(depth.rows, [&](int v) {
     const auto* q = maps_->inverse_depth.ptr<float>(v);
@@ -38,10 +38,21 @@ Expected<Segments> DepthSegments::Segment(const Frame& frame) {
                        config_.min_m2};
   end = JoinSmall(links, least, kBackgroundLabel + 1,
                   MeasureParts(labels_, maps_->depth, maps_->rays.pixel_width, end), labels_);
-  end = PartBackground(*maps_, links, least, end, config_, labels_);
+  end = background_.Part(*maps_, links, least, end, config_, labels_);
   TSDFPP_ASSIGN(cv::Mat ids, IdsOf(frame, end));
   return Segments{std::move(ids)};
 }
+
+namespace {
+
+// Marks where there is no link.
+void AddCuts(const std::uint8_t* links, int count, std::uint8_t* edges) {
+  for (int i = 0; i < count; ++i) {
+    edges[i] = static_cast<std::uint8_t>(edges[i] | (links[i] == 0 ? 255 : 0));
+  }
+}
+
+}  // namespace
 
 void DepthSegments::FindInner() {
   const SurfaceMaps& maps = *maps_;
@@ -54,28 +65,28 @@ void DepthSegments::FindInner() {
     const auto* right = maps.reach_right.ptr<std::uint8_t>(v);
     const auto* down = maps.reach_down.ptr<std::uint8_t>(v);
     const auto* above = maps.reach_down.ptr<std::uint8_t>(std::max(v - 1, 0));
-    const bool is_last = v + 1 == rows;
     auto* to = edge_.ptr<std::uint8_t>(v);
-    for (int u = 0; u < cols; ++u) {
-      const bool cut = (!is_last & (down[u] == 0)) | ((v > 0) & (above[u] == 0));
-      to[u] = (concave[u] != 0) | cut ? 255 : 0;
-    }
-    for (int u = 0; u + 1 < cols; ++u) {
-      const std::uint8_t cut = right[u] == 0 ? 255 : 0;
-      to[u] |= cut;
-      to[u + 1] |= cut;
-    }
+    std::copy(concave, concave + cols, to);
+    if (v + 1 < rows) AddCuts(down, cols, to);
+    if (v > 0) AddCuts(above, cols, to);
+    AddCuts(right, cols - 1, to);
+    AddCuts(right, cols - 1, to + 1);
   });
   ForEachRow(rows, [&](int v) {
     const auto* q = maps.inverse_depth.ptr<float>(v);
     const auto* row = edge_.ptr<std::uint8_t>(v);
     const auto* above = edge_.ptr<std::uint8_t>(std::max(v - 1, 0));
     const auto* below = edge_.ptr<std::uint8_t>(std::min(v + 1, rows - 1));
-    auto* to = inner_.ptr<std::uint8_t>(v);
-    const auto column = [&](int u) { return above[u] | row[u] | below[u]; };
+    // With a column without edges on either side.
+    std::vector<std::uint8_t> columns(static_cast<std::size_t>(cols) + 2);
+    auto* column = columns.data() + 1;
     for (int u = 0; u < cols; ++u) {
-      const int around = column(std::max(u - 1, 0)) | column(u) | column(std::min(u + 1, cols - 1));
-      to[u] = around == 0 && q[u] != 0 ? 255 : 0;
+      column[u] = static_cast<std::uint8_t>(above[u] | row[u] | below[u]);
+    }
+    auto* to = inner_.ptr<std::uint8_t>(v);
+    for (int u = 0; u < cols; ++u) {
+      const int around = column[u - 1] | column[u] | column[u + 1];
+      to[u] = static_cast<int>(around == 0) & static_cast<int>(q[u] != 0) ? 255 : 0;
     }
   });
 }

@@ -2,6 +2,7 @@
 // 2018; docs/segmentation.md).
 #pragma once
 
+#include "mapper/segment/background.h"
 #include "mapper/segment/segmenter.h"
 #include "mapper/segment/surface_maps.h"
 
@@ -29,6 +30,7 @@ class DepthSegments : public Segmenter {
 
   DepthSegmentsConfig config_;
   SurfaceMapper mapper_;
+  BackgroundParter background_;
   const SurfaceMaps* maps_ = nullptr;
   cv::Mat edge_;
   cv::Mat inner_;

@@ -3,7 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
 #include <vector>
@@ -11,6 +13,35 @@
 #include "mapper/segment/surface_kernels.h"
 
 namespace tsdfpp {
+namespace {
+
+constexpr int kFurthest = 255;
+
+// Of each value that is not 0, how many such follow each other from there on, at most kFurthest.
+void CountAhead(int count, std::uint8_t* values) {
+  static const auto kCountDown = [] {
+    std::array<std::uint8_t, kFurthest> down{};
+    for (int i = 0; i < kFurthest; ++i) {
+      down[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(kFurthest - i);
+    }
+    return down;
+  }();
+  std::uint8_t* const end = values + count;
+  for (std::uint8_t* at = values; at != end;) {
+    if (*at == 0) {
+      ++at;
+      continue;
+    }
+    std::uint8_t* const zero = std::find(at, end, std::uint8_t{0});
+    const auto far = std::max<std::ptrdiff_t>(zero - at - kFurthest, 0);
+    std::fill(at, at + far, std::uint8_t{kFurthest});
+    std::copy(kCountDown.end() - (zero - at - far), kCountDown.end(), at + far);
+    at = zero;
+  }
+}
+
+}  // namespace
+
 void FindJumps(const PixelRays& rays, const ChordReach& reach, const DepthSegmentsConfig& config,
                const cv::Mat& inverse, const cv::Mat& sigma, cv::Mat& reach_right,
                cv::Mat& reach_down) {
@@ -35,9 +66,7 @@ void FindJumps(const PixelRays& rays, const ChordReach& reach, const DepthSegmen
     const auto pairs = static_cast<std::size_t>(cols - 1);
     LinksOfRow({padded.data(), q, q + 1, behind, noise, noise + 1}, pairs, scale, right);
     right[cols - 1] = 0;
-    for (int u = cols - 2; u >= 0; --u) {
-      if (right[u] != 0) right[u] = static_cast<std::uint8_t>(std::min(right[u + 1] + 1, 255));
-    }
+    CountAhead(cols, right);
     auto* down = reach_down.ptr<std::uint8_t>(v);
     if (v + 1 == rows) {
       std::fill(down, down + cols, std::uint8_t{0});

@@ -105,7 +105,8 @@ TEST(Components, GrowToTheNearestLabel) {
     }
     steps[seed.x] = away;
   }
-  GrowLabels(known, {links.right, links.down}, labels);
+  cv::Mat scratch;
+  GrowLabels(known, {links.right, links.down}, scratch, labels);
   int grown = 0;
   for (int v = 0; v < 40; ++v) {
     for (int u = 0; u < 60; ++u) {
