@@ -2,75 +2,15 @@
 // (docs/tracking.md; after Bylow et al., RSS 2013).
 #pragma once
 
-#include <array>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include "mapper/track/pose_least_squares.h"
 #include "mapper/track/sdf_track_config.h"
 #include "mapper/track/segment_points.h"
-#include "mapper/volume/object_volume.h"
+#include "mapper/track/surface_reader.h"
 
 namespace tsdfpp {
-
-// Where a point stands to a model's surface.
-struct SurfaceSample {
-  bool is_observed = false;  // the eight voxels around the point are
-  bool has_slope = false;    // and their distances tell where the surface is
-  float value_m = 0;         // the distance as the voxels have it
-  Eigen::Vector3f gradient_L = Eigen::Vector3f::Zero();
-  float slope = 0;   // the gradient's length
-  float weight = 0;  // the least number of observations of the eight
-
-  // Distances in a map are along the rays that saw them, up to 1 / cos of the angle of incidence
-  // too long; this is that to the surface. Where there is a slope.
-  float distance_m() const { return value_m / slope; }
-  Eigen::Vector3f normal_L() const { return gradient_L / slope; }
-};
-
-// The eight voxels around a point as they were read last, for points that are asked for again and
-// again and hardly move.
-struct VoxelCube {
-  Index3 base{std::numeric_limits<int>::max(), 0, 0};  // of none at first
-  std::array<float, 8> distance{};                     // corner x + 2 y + 4 z
-  int least_weight = 0;                                // 0 where one is unobserved
-};
-
-// Reads an object's distances. The grid must not change meanwhile.
-class SurfaceReader {
- public:
-  SurfaceReader(const TsdfGrid& grid, double voxel_m);
-
-  // At a point of the lattice's frame, metres; any point that is not finite is unobserved. `sag_m`
-  // is taken off the distance first.
-  SurfaceSample At(const Eigen::Vector3d& p_L, float sag_m = 0) const;
-  // The same; `cube` is this reader's, and is read anew where the point left it.
-  SurfaceSample At(const Eigen::Vector3d& p_L, float sag_m, VoxelCube& cube) const;
-
-  // What At() has of a point without its slope's length: false where it is unobserved.
-  struct Linear {
-    float value_m = 0;
-    Eigen::Vector3f gradient_L = Eigen::Vector3f::Zero();
-  };
-  bool LinearAt(const Eigen::Vector3d& p_L, float sag_m, VoxelCube& cube, Linear& linear) const;
-
-  // By how much the trilinear interpolation of the voxels around a point lies above a function
-  // whose second differences along the axes are those of the voxels: f (1 - f) / 2 times each, f
-  // the point's place between two voxels, which is exact for any quadratic one. Distances along
-  // rays bend where a surface does, upwards over convex ones, and the more the flatter the rays
-  // fall; without this the interpolated surface lies inside the object
-  // (docs/tracking.md). Lines of voxels that go on on neither side count as straight. 0 where a
-  // corner is unobserved.
-  float SagAt(const Eigen::Vector3d& p_L) const;
-
- private:
-  void Read(const Index3& base, VoxelCube& cube) const;
-
-  VoxelReader voxels_;
-  double per_voxel_;
-  float voxel_m_;
-};
 
 // What the points say at a pose.
 struct DistanceCounts {
@@ -121,7 +61,8 @@ class DistanceTerm {
     float distance_m = 0;
   };
   SurfaceSample SampleAt(const Pose& T_LC, std::size_t i) const {
-    return model_->At(T_LC * points_[i].p_C.cast<double>(), kept_.empty() ? 0 : kept_[i].sag_m);
+    const Eigen::Vector3d y = T_LC * points_[i].p_C.cast<double>();
+    return kept_.empty() ? model_->At(y) : model_->At(y, kept_[i].sag_m, cubes_[i]);
   }
   double WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_C, const Eigen::Vector3d& y,
                   const Eigen::Vector3d& camera_L) const;

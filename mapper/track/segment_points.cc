@@ -19,8 +19,12 @@ bool IsInside(const cv::Mat& depth, int v, int u, float max_step_m) {
 }
 
 // Keeps the label of pixels whose neighbours within `erosion_px` columns have it too; others, and
-// the background, become kNoInstance.
-void ErodeRow(const InstanceId* row, int cols, int erosion_px, InstanceId* to) {
+// the background, become kNoInstance. Returns the columns from the first label on to the last, and
+// calls of_label(label) for each run of a label.
+template <typename OfLabel>
+cv::Range ErodeRow(const InstanceId* row, int cols, int erosion_px, InstanceId* to,
+                   const OfLabel& of_label) {
+  cv::Range kept(cols, 0);
   for (int begin = 0; begin < cols;) {
     int end = begin;
     while (end < cols && row[end] == row[begin]) ++end;
@@ -28,9 +32,14 @@ void ErodeRow(const InstanceId* row, int cols, int erosion_px, InstanceId* to) {
     const int last = end == cols ? end : end - erosion_px;
     const InstanceId label = row[begin] == kBackground ? kNoInstance : row[begin];
     std::fill(to + begin, to + end, kNoInstance);
-    if (first < last) std::fill(to + first, to + last, label);
     begin = end;
+    if (label == kNoInstance) continue;
+    of_label(label);
+    if (first >= last) continue;
+    std::fill(to + first, to + last, label);
+    kept = {std::min(kept.start, first), last};
   }
+  return kept;
 }
 
 }  // namespace
@@ -46,17 +55,16 @@ std::map<InstanceId, std::vector<int>> PixelsByLabel(const cv::Mat& labels, int 
   cv::Mat eroded(labels.size(), CV_16UC1);
   // For each column, down to which rows above this one the pixels have one label.
   std::vector<int> since(static_cast<std::size_t>(labels.cols), 0);
+  std::vector<cv::Range> kept;  // the columns with labels, by row
   for (int v = 0; v < labels.rows + erosion_px; ++v) {
     if (v < labels.rows) {
       const auto* row = labels.ptr<InstanceId>(v);
-      for (int u = 0; u < labels.cols; ++u) {
-        if (row[u] != kBackground && row[u] != kNoInstance && row[u] != last) pixels_of(row[u]);
-      }
-      ErodeRow(row, labels.cols, erosion_px, eroded.ptr<InstanceId>(v));
+      kept.push_back(ErodeRow(row, labels.cols, erosion_px, eroded.ptr<InstanceId>(v), pixels_of));
       const auto* here = eroded.ptr<InstanceId>(v);
       const auto* above = eroded.ptr<InstanceId>(std::max(v - 1, 0));
       for (int u = 0; u < labels.cols; ++u) {
-        if (here[u] != above[u]) since[static_cast<std::size_t>(u)] = v;
+        int& of_column = since[static_cast<std::size_t>(u)];
+        of_column = here[u] != above[u] ? v : of_column;
       }
     }
     // All that a pixel of this row asks for is known by now.
@@ -64,7 +72,8 @@ std::map<InstanceId, std::vector<int>> PixelsByLabel(const cv::Mat& labels, int 
     if (middle < 0) continue;
     const int first = std::max(0, middle - erosion_px);
     const auto* row = eroded.ptr<InstanceId>(middle);
-    for (int u = 0; u < labels.cols; ++u) {
+    const cv::Range& columns = kept[static_cast<std::size_t>(middle)];
+    for (int u = columns.start; u < columns.end; ++u) {
       if (row[u] == kNoInstance || since[static_cast<std::size_t>(u)] > first) continue;
       pixels_of(row[u]).push_back(middle * labels.cols + u);
     }

@@ -69,10 +69,16 @@ std::string TrackedObjects::ClassOf(InstanceId id) const {
 cv::Mat TrackedObjects::Select(const cv::Mat& labels) const {
   if (choice() != TrackChoice::kClassified) return labels;
   cv::Mat selected = labels.clone();
+  InstanceId last = kBackground;
+  bool is_last_left_out = false;
   for (int v = 0; v < selected.rows; ++v) {
     auto* row = selected.ptr<InstanceId>(v);
     for (int u = 0; u < selected.cols; ++u) {
-      if (row[u] != kNoInstance && !Contains(row[u])) row[u] = kBackground;
+      if (row[u] != last) {
+        last = row[u];
+        is_last_left_out = last != kNoInstance && last != kBackground && !Contains(last);
+      }
+      if (is_last_left_out) row[u] = kBackground;
     }
   }
   return selected;

@@ -262,12 +262,14 @@ TEST(SurfaceReader, KnowsTheSagOfAQuadraticFunction) {
   const TsdfGrid grid = GridOf(quadratic, 16);
   const SurfaceReader reader(grid, kVoxel_m);
   const VoxelReader voxels(grid);
-  for (std::uint64_t i = 0; i < 200; ++i) {
-    const auto draw = UniformDraw(11, 0, i);
+  SurfaceReader::SagCache cache;  // of fewer cubes than there are
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const auto draw = UniformDraw(11, 0, i % 200);
     const Eigen::Vector3d q = 12 * Eigen::Vector3d(draw[0], draw[1], draw[2]).array() - 6;
     const double trilinear = *DistanceAt(FindCorners(voxels, q));
     // Single precision, of values up to 0.5 and their differences.
     EXPECT_NEAR(reader.SagAt(q * kVoxel_m), trilinear - exact(q), 1e-6);
+    EXPECT_EQ(reader.SagAt(q * kVoxel_m, cache), reader.SagAt(q * kVoxel_m));
   }
   EXPECT_EQ(reader.SagAt(Eigen::Vector3d(5, 5, 5)), 0) << "nothing is there";
 }
