@@ -1,7 +1,5 @@
 #include "mapper/segment/components.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -73,16 +71,6 @@ void JoinRows(const std::vector<RunOfPixels>& upper, std::int32_t first_upper,
   }
 }
 
-// Strips of rows, one a task, each with sums of its own, which are as many for any number of
-// threads. Calls of_strip(strip, first row, the row after the last).
-constexpr int kStrips = 8;
-template <typename OfStrip>
-void ForEachStrip(int rows, const OfStrip& of_strip) {
-  tbb::parallel_for(0, kStrips, [&](int strip) {
-    of_strip(static_cast<std::size_t>(strip), rows * strip / kStrips, rows * (strip + 1) / kStrips);
-  });
-}
-
 using LabelPair = std::pair<std::int32_t, std::int32_t>;  // the lower first
 
 // Parts, of which small ones are joined to others.
@@ -95,7 +83,7 @@ class Joining {
 
   // The links of each small part to others.
   void CountLinks(const PixelLinks& links, const cv::Mat& labels) {
-    std::array<std::vector<LabelPair>, kStrips> pairs;
+    std::array<std::vector<LabelPair>, kRowStrips> pairs;
     ForEachStrip(labels.rows, [&](std::size_t strip, int first, int last) {
       for (int v = first; v < last; ++v) {
         const auto* row = labels.ptr<std::int32_t>(v);
@@ -220,7 +208,7 @@ struct RunOfLabel {
 // Calls of_run(run) for each, in order of rows. Without `depth` sums are 0.
 template <typename OfRun>
 void ForEachRunOfLabel(const cv::Mat& labels, const cv::Mat& depth, const OfRun& of_run) {
-  std::array<std::vector<RunOfLabel>, kStrips> runs;
+  std::array<std::vector<RunOfLabel>, kRowStrips> runs;
   ForEachStrip(labels.rows, [&](std::size_t strip, int first, int last) {
     for (int v = first; v < last; ++v) {
       const auto* row = labels.ptr<std::int32_t>(v);
@@ -262,7 +250,7 @@ std::vector<int> OutermostOf(const cv::Mat& known, const PixelLinks& links, cons
       to[u] = static_cast<std::uint8_t>(missing | (label[u] != 0 ? 2 : 0));
     }
   });
-  std::array<std::vector<int>, kStrips> found;
+  std::array<std::vector<int>, kRowStrips> found;
   ForEachStrip(rows, [&](std::size_t strip, int first, int last) {
     std::vector<std::uint8_t> is_out(width + sizeof(std::uint64_t));  // zeros behind the row
     const std::vector<std::uint8_t> nothing(width);

@@ -1,10 +1,13 @@
 #include "mapper/segment/joined_segments.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <numeric>
+
+#include "mapper/segment/pixel_rays.h"
 
 namespace tsdfpp {
 namespace {
@@ -17,17 +20,30 @@ using Overlaps = std::map<std::size_t, std::int64_t>;
 
 // By segment of depth.
 std::vector<Overlaps> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted) {
+  struct Run {
+    InstanceId segment = 0;
+    std::uint16_t instance = 0;
+    int pixels = 0;
+  };
+  std::array<std::vector<Run>, kRowStrips> runs;
+  ForEachStrip(depth.rows, [&](std::size_t strip, int first, int last) {
+    for (int v = first; v < last; ++v) {
+      const auto* segment = depth.ptr<InstanceId>(v);
+      const auto* instance = painted.ptr<std::uint16_t>(v);
+      for (int u = 0; u < depth.cols;) {
+        const Run run{segment[u], instance[u]};
+        const int begin = u;
+        while (u < depth.cols && segment[u] == run.segment && instance[u] == run.instance) ++u;
+        if (run.segment == kNoInstance) continue;
+        runs[strip].push_back({run.segment, run.instance, u - begin});
+      }
+    }
+  });
   std::vector<Overlaps> overlaps;
-  for (int v = 0; v < depth.rows; ++v) {
-    const auto* segment = depth.ptr<InstanceId>(v);
-    const auto* instance = painted.ptr<std::uint16_t>(v);
-    for (int u = 0; u < depth.cols;) {
-      const int begin = u;
-      while (u < depth.cols && segment[u] == segment[begin] && instance[u] == instance[begin]) ++u;
-      const std::size_t of = segment[begin];
-      if (of == kNoInstance) continue;
-      if (of >= overlaps.size()) overlaps.resize(of + 1);
-      overlaps[of][instance[begin]] += u - begin;
+  for (const auto& of_strip : runs) {
+    for (const Run& run : of_strip) {
+      if (run.segment >= overlaps.size()) overlaps.resize(std::size_t{run.segment} + 1);
+      overlaps[run.segment][run.instance] += run.pixels;
     }
   }
   return overlaps;
@@ -37,6 +53,7 @@ std::vector<Overlaps> CountOverlaps(const cv::Mat& depth, const cv::Mat& painted
 // to be segments.
 std::vector<bool> FindLone(const cv::Mat& painted, std::span<const std::int64_t> areas) {
   std::vector<bool> is_lone(areas.size(), false);
+  if (std::find(areas.begin() + 1, areas.end(), 0) == areas.end()) return is_lone;
   for (int v = 0; v < painted.rows; ++v) {
     const auto* row = painted.ptr<std::uint16_t>(v);
     for (int u = 0; u < painted.cols; ++u) {
@@ -109,12 +126,12 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
   }
   // Ids are as many as segments at most, and masks get what is left of them.
   std::size_t ids = overlaps.size();
-  std::vector<bool> keeps_mask(instances.size() + 1, false);
+  std::vector<std::uint8_t> keeps_mask(instances.size() + 1, 0);
   for (std::size_t i = 1; i <= instances.size(); ++i) {
     const bool is_bare = is_lone[i] || (2 * held[i] < areas[i] && free[i] > 0);
     if (instances[i - 1].score < config.mask_score || !is_bare) continue;
     if (!is_found[i] && ids + 1 > kNoInstance) continue;
-    keeps_mask[i] = true;
+    keeps_mask[i] = 1;
     ids += is_found[i] ? 0 : 1;
   }
 
@@ -122,9 +139,9 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
   InstanceId next = kBackground + 1;
   std::vector<InstanceId> id_of_instance(instances.size() + 1, kNoInstance);
   for (std::size_t i = 1; i <= instances.size(); ++i) {
-    if (!is_found[i] && !keeps_mask[i]) continue;
+    if (!is_found[i] && keeps_mask[i] == 0) continue;
     joined.classes[next] = instances[i - 1].semantic_class;
-    if (keeps_mask[i] && of_masks != nullptr) of_masks->push_back(next);
+    if (keeps_mask[i] != 0 && of_masks != nullptr) of_masks->push_back(next);
     id_of_instance[i] = next++;
   }
   std::vector<InstanceId> id_of(overlaps.size(), kBackground);
@@ -137,17 +154,18 @@ Segments JoinSegments(const cv::Mat& depth, const cv::Mat& painted,
       id_of[segment] = next++;
     }
   }
-  joined.ids = depth.clone();
-  for (int v = 0; v < joined.ids.rows; ++v) {
-    auto* id = joined.ids.ptr<InstanceId>(v);
+  joined.ids.create(depth.size(), CV_16UC1);
+  ForEachRow(depth.rows, [&](int v) {
+    const auto* segment = depth.ptr<InstanceId>(v);
     const auto* instance = painted.ptr<std::uint16_t>(v);
-    for (int u = 0; u < joined.ids.cols; ++u) {
+    auto* id = joined.ids.ptr<InstanceId>(v);
+    for (int u = 0; u < depth.cols; ++u) {
       // An instance that is there has what is no segment's, and what its mask keeps of others.
-      const bool is_mask =
-          id[u] == kNoInstance || (keeps_mask[instance[u]] && instance_of[id[u]] == 0);
-      id[u] = is_mask ? id_of_instance[instance[u]] : id_of[id[u]];
+      const bool is_mask = segment[u] == kNoInstance ||
+                           (keeps_mask[instance[u]] != 0 && instance_of[segment[u]] == 0);
+      id[u] = is_mask ? id_of_instance[instance[u]] : id_of[segment[u]];
     }
-  }
+  });
   return joined;
 }
 
@@ -175,20 +193,24 @@ const Segments& KnownSegments::Carry(const cv::Mat& depth) {
   if (depth.size() != last_depth_.size()) return Set(depth, {});
   // Those of instances have the first ids, so that an id is an instance's place and 1.
   std::vector<Instance> instances;
-  std::vector<bool> is_mask{false};
+  std::vector<std::uint8_t> is_mask{0};
   for (const auto& [id, name] : last_.classes) {
-    is_mask.push_back(std::binary_search(of_masks_.begin(), of_masks_.end(), id));
-    instances.push_back({{}, {}, name, is_mask.back() ? 1.F : -1.F});
+    const bool is_of_mask = std::binary_search(of_masks_.begin(), of_masks_.end(), id);
+    is_mask.push_back(is_of_mask ? 1 : 0);
+    instances.push_back({{}, {}, name, is_of_mask ? 1.F : -1.F});
   }
   // What is no instance's is left out, and what was filled up, as it moves with nothing.
-  cv::Mat painted = last_.ids.clone();
-  for (int v = 0; v < painted.rows; ++v) {
-    auto* id = painted.ptr<InstanceId>(v);
+  cv::Mat painted(depth.size(), CV_16UC1);
+  ForEachRow(painted.rows, [&](int v) {
+    const auto* id = last_.ids.ptr<InstanceId>(v);
     const auto* before = last_depth_.ptr<InstanceId>(v);
+    auto* to = painted.ptr<std::uint16_t>(v);
     for (int u = 0; u < painted.cols; ++u) {
-      if (id[u] > instances.size() || (before[u] == kNoInstance && !is_mask[id[u]])) id[u] = 0;
+      const bool is_left_out =
+          id[u] > instances.size() || (before[u] == kNoInstance && is_mask[id[u]] == 0);
+      to[u] = is_left_out ? std::uint16_t{0} : id[u];
     }
-  }
+  });
   // What moved on lies half beside itself at worst.
   NetworkConfig config = config_;
   config.join_overlap = kCarriedOverlap;

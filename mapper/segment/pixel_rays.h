@@ -6,6 +6,8 @@
 #include <tbb/partitioner.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "core/types.h"
@@ -41,6 +43,17 @@ void ForEachRow(int rows, const OfRow& of_row) {
         for (int v = range.begin(); v < range.end(); ++v) of_row(v);
       },
       tbb::simple_partitioner());
+}
+
+// Calls of_strip(strip, first row, the row after the last) for each of kRowStrips strips, in
+// parallel: for sums of a strip's own, which are as many for any number of threads.
+inline constexpr int kRowStrips = 8;
+template <typename OfStrip>
+void ForEachStrip(int rows, const OfStrip& of_strip) {
+  tbb::parallel_for(0, kRowStrips, [&](int strip) {
+    const auto row = [&](int i) { return static_cast<int>(std::int64_t{rows} * i / kRowStrips); };
+    of_strip(static_cast<std::size_t>(strip), row(strip), row(strip + 1));
+  });
 }
 
 }  // namespace tsdfpp

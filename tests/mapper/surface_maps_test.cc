@@ -114,6 +114,40 @@ TEST(SurfaceMaps, NormalsOfATableAreItsOwn) {
   EXPECT_LT(worst_deg(test::WithNoise(frame, 5), Kinect()), 10);
 }
 
+// How many links follow each other, at most 255, counted one by one: of a wall with a step and
+// holes that are too wide to be bridged, wider and higher than that.
+TEST(SurfaceMaps, ReachIsTheNumberOfLinksAhead) {
+  constexpr int kRows = 300;
+  constexpr int kCols = 700;
+  cv::Mat depth(kRows, kCols, CV_32FC1, cv::Scalar(2));
+  depth.colRange(610, kCols).setTo(1.5);
+  depth(cv::Rect(40, 280, 60, 15)).setTo(0);
+  SurfaceMapper mapper;
+  DepthSegmentsConfig config;
+  config.noise = DepthNoise::kExact;
+  const SurfaceMaps& maps =
+      mapper.Compute(depth, {kCols, kRows, 600, 600, kCols / 2.0, kRows / 2.0}, config);
+  const auto count = [&](const cv::Mat& reach, int v, int u, int down, int right) {
+    int links = 0;
+    while (v < kRows && u < kCols && reach.at<std::uint8_t>(v, u) != 0) {
+      ++links;
+      v += down;
+      u += right;
+    }
+    return std::min(links, 255);
+  };
+  int longest = 0;
+  for (int v = 0; v < kRows; ++v) {
+    for (int u = 0; u < kCols; ++u) {
+      ASSERT_EQ(maps.reach_right.at<std::uint8_t>(v, u), count(maps.reach_right, v, u, 0, 1));
+      ASSERT_EQ(maps.reach_down.at<std::uint8_t>(v, u), count(maps.reach_down, v, u, 1, 0));
+      longest = std::max(longest, count(maps.reach_right, v, u, 0, 1));
+    }
+  }
+  EXPECT_EQ(longest, 255);
+  EXPECT_EQ(maps.reach_right.at<std::uint8_t>(10, 609), 0) << "the step";
+}
+
 TEST(ChordReach, GrowsWithNoiseInPixels) {
   const float pixel = 1.0F / 525;
   const auto reach = [&](float z, const DepthSegmentsConfig& config) {
