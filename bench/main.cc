@@ -24,6 +24,7 @@
 #include "bench/segment.h"
 #include "bench/side_by_side.h"
 #include "bench/track.h"
+#include "bench/whole.h"
 #include "core/guard.h"
 
 namespace tsdfpp {
@@ -220,6 +221,27 @@ void AddCamera(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunCameraBench(*options); }; });
 }
 
+void AddWhole(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<WholeBenchOptions>();
+  CLI::App* command = app.add_subcommand(
+      "whole", "What a frame costs the whole system, from segmentation to fusion, beside Open3D");
+  AddScene(command, options->scene);
+  command->add_option("--scales", options->scales, "Images so many times the scene's size")
+      ->delimiter(',')
+      ->check(CLI::Range(0.05, 4.0))
+      ->capture_default_str();
+  command->add_option("--settings", options->settings, "Some of them")
+      ->delimiter(',')
+      ->capture_default_str();
+  AddCount(command, "--every", options->every, "The network's frames, of beside", 1, 1000);
+  AddCount(command, "--first", options->first, "Frames of the sequence that are left out", 0,
+           100000);
+  AddCount(command, "--frames", options->frames, "Of a run; the first 20 warm up", 21, 100000);
+  AddCount(command, "--threads", options->threads, "Of the mapper and of Open3D", 1, 1024);
+  command->add_option("--out", options->out, "Write the table into this folder as well");
+  command->callback([=, &chosen] { chosen = [=] { return RunWholeBench(*options); }; });
+}
+
 void AddReleased(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<ReleasedOptions>();
   CLI::App* command = app.add_subcommand("released", "What docs/released.md shows, as CSV");
@@ -276,6 +298,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddMotion(app, chosen);
   tsdfpp::AddCamera(app, chosen);
   tsdfpp::AddScaling(app, chosen);
+  tsdfpp::AddWhole(app, chosen);
   const std::vector<CLI::App*> commands = app.get_subcommands([](CLI::App*) { return true; });
   if (argc < 2 || std::none_of(commands.begin(), commands.end(), [&](const CLI::App* command) {
         return command->get_name() == argv[1];

@@ -1,0 +1,164 @@
+#include "bench/whole.h"
+
+#include <fmt/ranges.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+#include "bench/clocks.h"
+#include "bench/figure_runs.h"
+#include "bench/median.h"
+#include "core/intrinsics.h"
+#include "eval/adapters/open3d_peer.h"
+#include "eval/adapters/voxel_block_grid.h"
+#include "mapper/instance_network.h"
+#include "mapper/pipeline.h"
+#include "metrics/statistics.h"
+#include "sim/load_scene.h"
+#include "sim/simulated_source.h"
+
+namespace tsdfpp {
+namespace {
+
+constexpr const char* kSensor = "nguyen2012+colour_noise";
+
+struct Shown {
+  SequenceInfo info;
+  std::vector<Frame> frames;
+};
+
+Expected<Shown> Render(const WholeBenchOptions& options, double scale) {
+  TSDFPP_ASSIGN(SceneConfig scene, LoadSceneConfig(options.scene));
+  TSDFPP_ASSIGN(scene.sensor, SensorPresetNamed(kSensor));
+  scene.intrinsics = Scaled(scene.intrinsics, scale);
+  TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(scene, {}));
+  Shown shown{source->info(), {}};
+  const int end = std::min(shown.info.frame_count, options.first + options.frames);
+  if (end - options.first <= options.warm_up) {
+    return UsageError("--frames: {} of {}'s {} are left after --first {}, expected more than {}",
+                      std::max(end - options.first, 0), options.scene, shown.info.frame_count,
+                      options.first, options.warm_up);
+  }
+  for (int i = options.first; i < end; ++i) {
+    TSDFPP_ASSIGN(Frame frame, source->Read(shown.info.first_index + i));
+    shown.frames.push_back(std::move(frame));
+  }
+  return shown;
+}
+
+Expected<PipelineConfig> ConfigOf(const std::string& setting, const WholeBenchOptions& options) {
+  PipelineConfig config;
+  config.method = Method::kTsdfppAnchored;
+  config.poses = PoseSource::kTrack;
+  if (setting == "given") return config;
+  config.associate = AssociationMode::kVotes;
+  if (setting == "depth") {
+    config.segmentation = Segmentation::kDepth;
+    return config;
+  }
+  config.segmentation = Segmentation::kFull;
+  if (setting == "beside") {
+    config.segmenter.network.every = options.every;
+    config.segmenter.network.latency = options.every;
+  } else if (setting != "full") {
+    return UsageError("--settings: '{}' is unknown, expected given, depth, full or beside",
+                      setting);
+  }
+  TSDFPP_ASSIGN(config.segmenter.finder, OwnInstanceNetwork(config.segmenter.network));
+  return config;
+}
+
+// Milliseconds of each frame after those that warm up.
+struct Times {
+  std::vector<double> segment, locate, associate, track, update_poses, fuse, all;
+
+  void Add(const StepTimes& steps) {
+    const auto add = [](std::vector<double>& to, double seconds) { to.push_back(1e3 * seconds); };
+    add(segment, steps.segment_s);
+    add(associate, steps.associate_s);
+    add(track, steps.track_s);
+    add(update_poses, steps.update_poses_s);
+    add(fuse, steps.fuse_s);
+    add(all, steps.Total_s());
+  }
+};
+
+Expected<Times> TimesOf(const Shown& shown, const PipelineConfig& config, int warm_up) {
+  const bool is_given = config.associate == AssociationMode::kGiven;
+  Pipeline pipeline(config, is_given ? shown.info.objects : std::vector<ObjectInfo>{});
+  Times times;
+  for (const Frame& frame : shown.frames) {
+    TSDFPP_ASSIGN(const StepTimes steps, pipeline.Process(frame));
+    if (warm_up-- <= 0) times.Add(steps);
+  }
+  return times;
+}
+
+// The median of the fastest of Open3D's volumes.
+double Open3dMilliseconds(const Shown& shown, const MapConfig& map, int warm_up) {
+  const double band_m = std::max(map.trunc_front_voxels, map.trunc_back_voxels) * map.voxel_m;
+  const auto median = [&](auto&& volume) {
+    std::vector<double> ms;
+    for (const Frame& frame : shown.frames) ms.push_back(1e3 * volume.Integrate(frame));
+    return Median({ms.begin() + warm_up, ms.end()});
+  };
+  return std::min({median(Open3dVolume(map.voxel_m, band_m)),
+                   median(VoxelBlockGridPeer(map.voxel_m, band_m, 8)),
+                   median(VoxelBlockGridPeer(map.voxel_m, band_m, 16))});
+}
+
+void AddRow(const std::string& size, const std::string& setting, Times times, double open3d_ms,
+            FigureTable& table) {
+  std::sort(times.all.begin(), times.all.end());
+  const double late_ms = QuantileOfSorted(times.all, 0.95);
+  const double median_ms = Median(times.all);
+  const std::vector<std::string> row{size,
+                                     setting,
+                                     Cell(Median(times.segment), 1),
+                                     Cell(Median(times.associate), 1),
+                                     Cell(Median(times.track), 1),
+                                     Cell(Median(times.fuse), 1),
+                                     Cell(median_ms, 1),
+                                     Cell(late_ms, 1),
+                                     Cell(times.all.back(), 1),
+                                     Cell(1e3 / late_ms, 1),
+                                     Cell(open3d_ms, 1),
+                                     Cell(median_ms / open3d_ms, 2),
+                                     Cell(late_ms / open3d_ms, 2)};
+  std::printf("%s\n", fmt::format("{}", fmt::join(row, ",")).c_str());
+  std::fflush(stdout);
+  table.Add(row);
+}
+
+}  // namespace
+
+Expected<void> RunWholeBench(const WholeBenchOptions& options) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(options.threads));
+  SetOpen3dThreads(options.threads);
+  std::vector<PipelineConfig> configs;
+  for (const std::string& setting : options.settings) {
+    TSDFPP_ASSIGN(PipelineConfig config, ConfigOf(setting, options));
+    configs.push_back(std::move(config));
+  }
+  FigureTable table({"images", "setting", "segment", "associate", "track", "fuse", "all: median",
+                     "95th percentile", "worst", "frames a second at the 95th percentile",
+                     "Open3D's fastest, integration alone", "median over Open3D's",
+                     "95th percentile over Open3D's"});
+  for (const double scale : options.scales) {
+    TSDFPP_ASSIGN(const Shown shown, Render(options, scale));
+    const double open3d_ms = Open3dMilliseconds(shown, MapConfig{}, options.warm_up);
+    const Intrinsics& k = shown.info.intrinsics;
+    for (std::size_t i = 0; i < configs.size(); ++i) {
+      TSDFPP_ASSIGN(Times times, TimesOf(shown, configs[i], options.warm_up));
+      AddRow(fmt::format("{}x{}", k.width, k.height), options.settings[i], std::move(times),
+             open3d_ms, table);
+    }
+  }
+  if (options.out.empty()) return {};
+  return table.Write(options.out, "whole");
+}
+
+}  // namespace tsdfpp

@@ -1,0 +1,35 @@
+// What a frame costs the whole system, segmentation and tracking included.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace tsdfpp {
+
+struct WholeBenchOptions {
+  std::string scene = "scenes/toycar3.toml";
+  // Images that many times the scene's size.
+  std::vector<double> scales{1, 2.0 / 3};
+  // Some of: given, depth, full, beside (WholeSettings).
+  std::vector<std::string> settings{"given", "depth", "full", "beside"};
+  int every = 5;     // of `beside`: the network sees every n-th frame
+  int first = 20;    // frames of the sequence that are left out
+  int frames = 200;  // mapped
+  int warm_up = 20;  // of these, the first ones, not counted
+  int threads = 2;
+  std::string out;  // where given, the table is written into this folder as well
+};
+
+// Prints milliseconds a frame of the pipeline (`tsdf++/anchored`, objects tracked by `track`), by
+// step, and of all steps, on a scene's frames with the noise of nguyen2012 and of colours, which
+// are in memory before it begins; beside them those of integration with colour of the fastest of
+// Open3D's volumes on the same frames, with the same band. Settings: `given` tracks the true masks'
+// objects, `depth` segments of depth (`--track moving`), `full` what our own network finds in each
+// frame, joined with depth, `beside` the same with the network on a thread of its own at every n-th
+// frame, known as many frames later. `out` gets whole.csv. Errors: those of the scene; kUsage for a
+// setting that there is not; kEnvironment where `out` cannot be written.
+Expected<void> RunWholeBench(const WholeBenchOptions& options);
+
+}  // namespace tsdfpp
