@@ -145,7 +145,7 @@ Expected<void> RunWholeBench(const WholeBenchOptions& options) {
   }
   FigureTable table({"images", "setting", "segment", "associate", "track", "fuse", "all: median",
                      "95th percentile", "worst", "frames a second at the 95th percentile",
-                     "Open3D's fastest, integration alone", "median over Open3D's",
+                     "Open3D's integration", "median over Open3D's",
                      "95th percentile over Open3D's"});
   for (const double scale : options.scales) {
     TSDFPP_ASSIGN(const Shown shown, Render(options, scale));
