@@ -12,24 +12,27 @@ struct WholeBenchOptions {
   std::string scene = "scenes/toycar3.toml";
   // Images that many times the scene's size.
   std::vector<double> scales{1, 2.0 / 3};
-  // Some of: given, depth, full, beside (WholeSettings).
+  // Some of: given, depth, full, beside.
   std::vector<std::string> settings{"given", "depth", "full", "beside"};
   int every = 5;     // of `beside`: the network sees every n-th frame
   int first = 20;    // frames of the sequence that are left out
   int frames = 200;  // mapped
   int warm_up = 20;  // of these, the first ones, not counted
-  int threads = 2;
-  std::string out;  // where given, the table is written into this folder as well
+  int threads = 2;   // of the mapper and of Open3D; the network's own of `beside` is one more
+  std::string out;   // where given, the table is written into this folder as well
 };
 
 // Prints milliseconds a frame of the pipeline (`tsdf++/anchored`, objects tracked by `track`), by
 // step, and of all steps, on a scene's frames with the noise of nguyen2012 and of colours, which
-// are in memory before it begins; beside them those of integration with colour of the fastest of
-// Open3D's volumes on the same frames, with the same band. Settings: `given` tracks the true masks'
-// objects, `depth` segments of depth (`--track moving`), `full` what our own network finds in each
-// frame, joined with depth, `beside` the same with the network on a thread of its own at every n-th
-// frame, known as many frames later. `out` gets whole.csv. Errors: those of the scene; kUsage for a
-// setting that there is not; kEnvironment where `out` cannot be written.
+// are in memory before it begins, with the camera's true poses; beside them those of integration
+// with colour of the fastest of Open3D's volumes on the same frames, with a band as wide. As
+// shipped: ours has 10 voxels in front of a surface and 3 behind it, Open3D 6.5 and 6.5, and ours
+// colours two voxels beside the surface, Open3D the whole band. Settings: `given` tracks the true
+// masks' objects, `depth` segments of depth (`--track moving`), `full` what our own network finds
+// in each frame, joined with depth, `beside` the same with the network on a thread of its own at
+// every n-th frame, known as many frames later. `out` gets whole.csv. Errors: those of the scene,
+// the network and the pipeline; kUsage for a setting that there is not, or too few frames;
+// kEnvironment where `out` cannot be written.
 Expected<void> RunWholeBench(const WholeBenchOptions& options);
 
 }  // namespace tsdfpp

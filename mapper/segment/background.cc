@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLargeShare = 0.5;
 constexpr double kWithinShare = 0.9;
-constexpr float kOff = 2;  // times NearPlane_m
+constexpr float kOff = 2;  // times PlaneSample::near
 // A wall, where little of it is seen: the room ends there, so next to nothing lies behind it.
 constexpr double kWall_m2 = 0.005;
 constexpr double kWallShare = 0.8;
@@ -33,7 +33,7 @@ std::vector<std::size_t> FindWalls(const SurfaceMaps& maps, const cv::Mat& label
   std::vector<double> behind(candidates.size());
   double all = 0;
   int count = 0;
-  const cv::Range all_rows(0, labels.rows);
+  const cv::Range all_rows(0, (labels.rows + kSampleStride - 1) / kSampleStride);
   ForEachPlaneSample(maps, labels, config, all_rows, [&](std::int32_t, const auto& sample) {
     if (count++ % kThinning != 0) return;
     all += 1;

@@ -27,7 +27,8 @@ class BackgroundParter {
   // - What lies within such a segment off its plane, by more than twice what is near, where it is
   //   connected in a part that is small. Larger such parts get labels from `end` on, in order of
   //   their first pixels.
-  // Returns the number after the last label. The same for any number of threads.
+  // Labelled pixels have a depth. Returns the number after the last label. The same for any number
+  // of threads.
   std::int32_t Part(const SurfaceMaps& maps, const PixelLinks& links, const PartSize& least,
                     std::int32_t end, const DepthSegmentsConfig& config, cv::Mat& labels);
 

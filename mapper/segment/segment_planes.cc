@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <array>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
@@ -67,18 +68,13 @@ InversePlane Solve(const PlaneSums& sums) {
 
 void SamplesByLabel::Take(const SurfaceMaps& maps, const cv::Mat& labels, std::int32_t end,
                           const DepthSegmentsConfig& config) {
-  constexpr int kStrips = 8;  // of rows, as many for any number of threads
   const int rows = (labels.rows + kSampleStride - 1) / kSampleStride;
-  const auto rows_of = [&](int strip) {
-    return cv::Range(rows * strip / kStrips, rows * (strip + 1) / kStrips);
-  };
   // By strip and label: how many, then where the next one goes.
-  std::array<std::vector<std::size_t>, kStrips> next;
-  const auto of_strip = [&](int strip) -> auto& { return next[static_cast<std::size_t>(strip)]; };
-  tbb::parallel_for(0, kStrips, [&](int strip) {
-    auto& count = of_strip(strip);
+  std::array<std::vector<std::size_t>, kRowStrips> next;
+  ForEachStrip(rows, [&](std::size_t strip, int first, int last) {
+    auto& count = next[strip];
     count.assign(static_cast<std::size_t>(end), 0);
-    ForEachPlaneSample(maps, labels, config, rows_of(strip), [&](std::int32_t label, const auto&) {
+    ForEachPlaneSample(maps, labels, config, {first, last}, [&](std::int32_t label, const auto&) {
       ++count[static_cast<std::size_t>(label)];
     });
   });
@@ -90,9 +86,9 @@ void SamplesByLabel::Take(const SurfaceMaps& maps, const cv::Mat& labels, std::i
   }
   begin_.back() = count;
   samples_.resize(count);
-  tbb::parallel_for(0, kStrips, [&](int strip) {
-    auto& to = of_strip(strip);
-    ForEachPlaneSample(maps, labels, config, rows_of(strip),
+  ForEachStrip(rows, [&](std::size_t strip, int first, int last) {
+    auto& to = next[strip];
+    ForEachPlaneSample(maps, labels, config, {first, last},
                        [&](std::int32_t label, const auto& sample) {
                          samples_[to[static_cast<std::size_t>(label)]++] = sample();
                        });

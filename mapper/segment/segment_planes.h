@@ -3,7 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -11,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "mapper/segment/pixel_rays.h"
 #include "mapper/segment/surface_maps.h"
 
 namespace tsdfpp {
@@ -34,7 +34,8 @@ struct PlaneSample {
 };
 
 // Calls of_sample(label, sample), where sample() is the PlaneSample, for every second row's every
-// second pixel that has a label and a depth, in order of rows, of which it takes [begin, end).
+// second pixel that has a label and a depth, in order of rows. `rows` are some of these second
+// rows.
 template <typename OfSample>
 void ForEachPlaneSample(const SurfaceMaps& maps, const cv::Mat& labels,
                         const DepthSegmentsConfig& config, const cv::Range& rows,

@@ -94,7 +94,7 @@ class SurfaceReader {
   float SagAt(const Eigen::Vector3d& p_L) const;
 
   // The same for points that lie close to each other one after the other, as those of an image do:
-  // what one cube of voxels has of it is kept for the next point in it.
+  // what one cube of voxels has of it is kept for the next point in it. `cache` is this reader's.
   class SagCache;
   float SagAt(const Eigen::Vector3d& p_L, SagCache& cache) const;
 

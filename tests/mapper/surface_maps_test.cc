@@ -129,19 +129,20 @@ TEST(SurfaceMaps, ReachIsTheNumberOfLinksAhead) {
       mapper.Compute(depth, {kCols, kRows, 600, 600, kCols / 2.0, kRows / 2.0}, config);
   const auto count = [&](const cv::Mat& reach, int v, int u, int down, int right) {
     int links = 0;
-    while (v < kRows && u < kCols && reach.at<std::uint8_t>(v, u) != 0) {
+    while (links < 255 && v < kRows && u < kCols && reach.at<std::uint8_t>(v, u) != 0) {
       ++links;
       v += down;
       u += right;
     }
-    return std::min(links, 255);
+    return links;
   };
   int longest = 0;
   for (int v = 0; v < kRows; ++v) {
     for (int u = 0; u < kCols; ++u) {
-      ASSERT_EQ(maps.reach_right.at<std::uint8_t>(v, u), count(maps.reach_right, v, u, 0, 1));
+      const int right = count(maps.reach_right, v, u, 0, 1);
+      ASSERT_EQ(maps.reach_right.at<std::uint8_t>(v, u), right);
       ASSERT_EQ(maps.reach_down.at<std::uint8_t>(v, u), count(maps.reach_down, v, u, 1, 0));
-      longest = std::max(longest, count(maps.reach_right, v, u, 0, 1));
+      longest = std::max(longest, right);
     }
   }
   EXPECT_EQ(longest, 255);
