@@ -237,6 +237,7 @@ void AddWhole(CLI::App& app, Chosen& chosen) {
   AddCount(command, "--first", options->first, "Frames of the sequence that are left out", 0,
            100000);
   AddCount(command, "--frames", options->frames, "Of a run; the first 20 warm up", 21, 100000);
+  AddCount(command, "--runs", options->runs, "Of all; figures are medians over them", 1, 100);
   AddCount(command, "--threads", options->threads, "Of the mapper and of Open3D", 1, 1024);
   command->add_option("--out", options->out, "Write the table into this folder as well");
   command->callback([=, &chosen] { chosen = [=] { return RunWholeBench(*options); }; });

@@ -109,24 +109,48 @@ double Open3dMilliseconds(const Shown& shown, const MapConfig& map, int warm_up)
                    median(VoxelBlockGridPeer(map.voxel_m, band_m, 16))});
 }
 
-void AddRow(const std::string& size, const std::string& setting, Times times, double open3d_ms,
-            FigureTable& table) {
+// What a row has of one run: kColumns without the first two.
+std::vector<double> FiguresOf(Times times, double open3d_ms) {
   std::sort(times.all.begin(), times.all.end());
   const double late_ms = QuantileOfSorted(times.all, 0.95);
   const double median_ms = Median(times.all);
-  const std::vector<std::string> row{size,
-                                     setting,
-                                     Cell(Median(times.segment), 1),
-                                     Cell(Median(times.associate), 1),
-                                     Cell(Median(times.track), 1),
-                                     Cell(Median(times.fuse), 1),
-                                     Cell(median_ms, 1),
-                                     Cell(late_ms, 1),
-                                     Cell(times.all.back(), 1),
-                                     Cell(1e3 / late_ms, 1),
-                                     Cell(open3d_ms, 1),
-                                     Cell(median_ms / open3d_ms, 2),
-                                     Cell(late_ms / open3d_ms, 2)};
+  return {Median(times.segment),
+          Median(times.associate),
+          Median(times.track),
+          Median(times.fuse),
+          median_ms,
+          late_ms,
+          times.all.back(),
+          1e3 / late_ms,
+          open3d_ms,
+          median_ms / open3d_ms,
+          late_ms / open3d_ms};
+}
+const std::vector<std::string> kColumns{"images",
+                                        "setting",
+                                        "segment",
+                                        "associate",
+                                        "track",
+                                        "update and fuse",
+                                        "all: median",
+                                        "95th percentile",
+                                        "worst",
+                                        "frames a second at the 95th percentile",
+                                        "Open3D's integration",
+                                        "median over Open3D's",
+                                        "95th percentile over Open3D's"};
+constexpr std::size_t kRatios = 2;  // the last columns
+
+// The median of each figure over the runs.
+void AddRow(const std::string& size, const std::string& setting,
+            const std::vector<std::vector<double>>& runs, FigureTable& table) {
+  std::vector<std::string> row{size, setting};
+  const std::size_t figures = kColumns.size() - row.size();
+  for (std::size_t i = 0; i < figures; ++i) {
+    std::vector<double> values;
+    for (const std::vector<double>& run : runs) values.push_back(run[i]);
+    row.push_back(Cell(Median(values), i + kRatios < figures ? 1 : 2));
+  }
   std::printf("%s\n", fmt::format("{}", fmt::join(row, ",")).c_str());
   std::fflush(stdout);
   table.Add(row);
@@ -143,18 +167,20 @@ Expected<void> RunWholeBench(const WholeBenchOptions& options) {
     TSDFPP_ASSIGN(PipelineConfig config, ConfigOf(setting, options));
     configs.push_back(std::move(config));
   }
-  FigureTable table({"images", "setting", "segment", "associate", "track", "update and fuse",
-                     "all: median", "95th percentile", "worst",
-                     "frames a second at the 95th percentile", "Open3D's integration",
-                     "median over Open3D's", "95th percentile over Open3D's"});
+  FigureTable table(kColumns);
   for (const double scale : options.scales) {
     TSDFPP_ASSIGN(const Shown shown, Render(options, scale));
-    const double open3d_ms = Open3dMilliseconds(shown, MapConfig{}, options.warm_up);
+    std::vector<std::vector<std::vector<double>>> figures(configs.size());  // by setting and run
+    for (int run = 0; run < options.runs; ++run) {
+      const double open3d_ms = Open3dMilliseconds(shown, MapConfig{}, options.warm_up);
+      for (std::size_t i = 0; i < configs.size(); ++i) {
+        TSDFPP_ASSIGN(Times times, TimesOf(shown, configs[i], options.warm_up));
+        figures[i].push_back(FiguresOf(std::move(times), open3d_ms));
+      }
+    }
     const Intrinsics& k = shown.info.intrinsics;
     for (std::size_t i = 0; i < configs.size(); ++i) {
-      TSDFPP_ASSIGN(Times times, TimesOf(shown, configs[i], options.warm_up));
-      AddRow(fmt::format("{}x{}", k.width, k.height), options.settings[i], std::move(times),
-             open3d_ms, table);
+      AddRow(fmt::format("{}x{}", k.width, k.height), options.settings[i], figures[i], table);
     }
   }
   if (options.out.empty()) return {};

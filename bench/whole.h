@@ -18,6 +18,7 @@ struct WholeBenchOptions {
   int first = 20;    // frames of the sequence that are left out
   int frames = 200;  // mapped
   int warm_up = 20;  // of these, the first ones, not counted
+  int runs = 3;      // of Open3D and all settings, in turn; figures are medians over them
   int threads = 2;   // of the mapper and of Open3D; the network's own of `beside` is one more
   std::string out;   // where given, the table is written into this folder as well
 };
