@@ -148,6 +148,7 @@ void AddRow(const std::string& size, const std::string& setting,
   const std::size_t figures = kColumns.size() - row.size();
   for (std::size_t i = 0; i < figures; ++i) {
     std::vector<double> values;
+    values.reserve(runs.size());
     for (const std::vector<double>& run : runs) values.push_back(run[i]);
     row.push_back(Cell(Median(values), i + kRatios < figures ? 1 : 2));
   }
