@@ -225,7 +225,7 @@ void AddWhole(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<WholeBenchOptions>();
   CLI::App* command = app.add_subcommand(
       "whole", "What a frame costs the whole system, from segmentation to fusion, beside Open3D");
-  AddScene(command, options->scene);
+  command->add_option("--scene", options->scene, "Scene file")->capture_default_str();
   command->add_option("--scales", options->scales, "Images so many times the scene's size")
       ->delimiter(',')
       ->check(CLI::Range(0.05, 4.0))

@@ -154,11 +154,6 @@ SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m) const {
   return At(p_L, sag_m, cube);
 }
 
-float SurfaceReader::SagAt(const Eigen::Vector3d& p_L) const {
-  SagCache cache;
-  return SagAt(p_L, cache);
-}
-
 float SurfaceReader::SagAt(const Eigen::Vector3d& p_L, SagCache& cache) const {
   const Eigen::Vector3d q = p_L * per_voxel_;
   if (voxels_.empty() || !(q.cwiseAbs().maxCoeff() < kFurthestVoxel)) return 0;

@@ -90,11 +90,9 @@ class SurfaceReader {
   // rays bend where a surface does, upwards over convex ones, and the more the flatter the rays
   // fall; without this the interpolated surface lies inside the object
   // (docs/tracking.md). Lines of voxels that go on on neither side count as straight. 0 where a
-  // corner is unobserved.
-  float SagAt(const Eigen::Vector3d& p_L) const;
-
-  // The same for points that lie close to each other one after the other, as those of an image do:
-  // what one cube of voxels has of it is kept for the next point in it. `cache` is this reader's.
+  // corner is unobserved. Metres, of a point of the lattice's frame, metres. Points often lie close
+  // to those before, as an image's do: `cache`, which is this reader's, keeps what a cube of voxels
+  // has of it for the next point in it.
   class SagCache;
   float SagAt(const Eigen::Vector3d& p_L, SagCache& cache) const;
 
