@@ -14,6 +14,10 @@ UNKNOWN = 255
 LEAST_PIXELS = 12    # a thing that shows less has no centre
 BUMP_PX = 2.5        # standard deviation of a centre's bump
 REACH_PX = 8         # a bump ends here
+# A thing of so many pixels counts as often as its pixels; what is smaller more, what is larger less: by the square root of its
+# share, within limits. Quality is counted by things, and a large one has a hundred times a small one's pixels.
+WEIGHED_PIXELS = 600
+LEAST_WEIGHT, MOST_WEIGHT = 0.5, 4.0
 
 
 def read_exr(file):
@@ -92,12 +96,11 @@ class Store:
 
 
 def targets_of(ids):
-    """Of ids (batch x height x width, integers): whether a pixel is a thing's, whether that is known, the centres' bumps, the
-    ways to them (columns, rows), and whether there is a way."""
+    """Of ids (batch x height x width, integers): whether a pixel is a thing's, how much that counts (0: not known), the centres'
+    bumps, the ways to them (columns, rows), and how much these count (0: there is none)."""
     batch, height, width = ids.shape
     device = ids.device
-    known = ids != UNKNOWN
-    thing = (ids > 0) & known
+    thing = (ids > 0) & (ids != UNKNOWN)
     flat = (torch.arange(batch, device=device)[:, None, None] * 256 + ids).reshape(-1)
     row = torch.arange(height, device=device, dtype=torch.float32)[None, :, None].expand(batch, height, width).reshape(-1)
     column = torch.arange(width, device=device, dtype=torch.float32)[None, None, :].expand(batch, height, width).reshape(-1)
@@ -107,6 +110,8 @@ def targets_of(ids):
     number = torch.arange(256 * batch, device=device)
     counts = (count >= LEAST_PIXELS) & (number % 256 > 0) & (number % 256 != UNKNOWN)
     has_way = (thing.reshape(-1) & counts[flat]).reshape(ids.shape)
+    of_thing = (WEIGHED_PIXELS / count.clamp(min=1)).sqrt().clamp(LEAST_WEIGHT, MOST_WEIGHT)[flat].reshape(ids.shape)
+    weight = torch.where(thing, of_thing, (ids != UNKNOWN).float())
     way = torch.stack([(u[flat] - column).reshape(ids.shape), (v[flat] - row).reshape(ids.shape)], dim=1)
     way = way * has_way[:, None]
     things = torch.nonzero(counts)[:, 0]
@@ -119,7 +124,7 @@ def targets_of(ids):
     to = ((things // 256)[:, None, None] * height + to_v) * width + to_u
     inside = (to_v >= 0) & (to_v < height) & (to_u >= 0) & (to_u < width)
     bumps = bumps.scatter_reduce(0, to[inside], value[inside], "amax").reshape(ids.shape)
-    return thing.float(), known.float(), bumps, way, has_way.float()
+    return thing.float(), weight, bumps, way, has_way * of_thing
 
 
 class Draws:

@@ -4,9 +4,10 @@
     /usr/bin/python3 tools/segmenter/make_data.py --out out/segmenter/data [--seeds 1:600] [--jobs 2]
 
 No named scene is looked at. Every seed gives a scene with its own field of view, distance, number and sizes of things,
-patterns, lights and sensor, and of it 12 images, half a second apart. In a third of the scenes things stand apart and move, as
-in scenes/random.toml; in a third they are set beside, on and into one another so that they touch; in a quarter they fall onto
-one another; in a tenth large ones stand on the floor of a room. The same seeds give the same images. OUT/<seed>/ is a sequence
+patterns, lights and sensor, and of it 12 images, half a second apart. In a quarter of the scenes things stand apart and move, as
+in scenes/random.toml; in a quarter many small and flat ones stand or lie close together; in a quarter they are set beside, on and
+into one another so that they touch; in some they fall onto one another, or are large and stand on the floor of a room. The same
+seeds give the same images. OUT/<seed>/ is a sequence
 as `tsdfpp generate` leaves it; seeds that are there already are left alone.
 """
 import argparse
@@ -281,6 +282,44 @@ def touching(seed, draw):
     return scene(draw, seed, lens, radius, (draw.uniform(-0.05, 0.1), draw.uniform(-0.1, 0.1), TABLE_TOP_M + 0.02), things)
 
 
+def crowd(seed, draw):
+    """Many things close together, small ones as seen; a good part of them lies flat."""
+    lens, far = camera_of(draw)
+    things = Things(draw)
+    flat = draw.uniform(0.1, 0.6)
+    factor = draw.uniform(0.45, 1.0)
+    gap = draw.choice([0.002, 0.008, 0.02, 0.04])
+    reach_x, reach_y = draw.uniform(0.15, 0.42), draw.uniform(0.12, 0.3)
+    placed = []
+    for _ in range(draw.choice([8, 16, 24, 34])):
+        if draw.random() < flat:
+            name = draw.choice(["card", "card", "card", "book", "plate", "tray", "plank", "domino"])
+        else:
+            name = draw.choice(list(SOLIDS) + list(TOYS))
+        if name in SOLIDS:
+            size = [max(0.012, factor * draw.uniform(0.6, 1.3) * side) for side in SOLIDS[name]]
+            if name in ("cylinder", "sphere", "cone", "capsule", "hexagon"):
+                size[1] = size[0]
+            if name == "sphere":
+                size[2] = size[0]
+            if name == "capsule":
+                size[2] = max(size[2], 1.3 * size[0])
+            how, solid = size, True
+        else:
+            # A card is as small as it is.
+            how = draw.uniform(0.7, 1.3) if name == "card" else factor * draw.uniform(0.7, 1.1)
+            size, solid = [how * side for side in (TOYS[name] if name in TOYS else OPEN[name][0])], False
+        radius = 0.5 * math.hypot(size[0], size[1])
+        for _ in range(20):
+            x, y = draw.uniform(-reach_x, reach_x), draw.uniform(-reach_y, reach_y)
+            if all(math.hypot(x - other[0], y - other[1]) > radius + other[2] + gap for other in placed):
+                placed.append((x, y, radius))
+                things.add(name, how, x, y, TABLE_TOP_M, draw.uniform(-180, 180), solid)
+                break
+    radius = min(1.6, draw.uniform(0.5, 1.15) * far)
+    return scene(draw, seed, lens, radius, (draw.uniform(-0.05, 0.05), draw.uniform(-0.05, 0.05), TABLE_TOP_M), things)
+
+
 def floor(seed, draw):
     """Large things on the floor of a room without a table."""
     lens, far = camera_of(draw)
@@ -290,8 +329,8 @@ def floor(seed, draw):
                             "crate", "bottle"])
         things.add(name, draw.uniform(1.2, 3), draw.uniform(-1.4, 1.4), draw.uniform(-1.4, 1.4), 0.001,
                    draw.uniform(-180, 180))
-    room = (f"table = false\nhalf_x = {draw.uniform(2.3, 3.2):.2f}\nhalf_y = {draw.uniform(2.3, 3.2):.2f}\n"
-            f"height = {draw.uniform(2.5, 3):.2f}\n")
+    room = (f"table = false\nhalf_x = {draw.uniform(2.4, 3.2):.2f}\nhalf_y = {draw.uniform(2.3, 3.2):.2f}\n"
+            f"height = {draw.uniform(2.6, 3):.2f}\n")
     radius = min(1.7, draw.uniform(1.2, 1.7) * max(1, far))
     return scene(draw, seed, lens, radius, (0, 0, draw.uniform(0.2, 0.4)), things, room)
 
@@ -299,7 +338,7 @@ def floor(seed, draw):
 def scene_of(seed):
     """The scene's text, and its sensor."""
     draw = random.Random(seed)
-    (kind,) = draw.choices([apart, touching, heap, floor], [35, 30, 25, 10])
+    (kind,) = draw.choices([apart, crowd, touching, heap, floor], [22, 24, 22, 14, 18])
     return kind(seed, draw), draw.choice(SENSORS)
 
 

@@ -33,15 +33,15 @@ HELD_OUT = 10
 MOST_CHECKED = 24  # scenes that are held out
 
 
-def loss_of(maps, thing, known, bumps, way, has_way):
+def loss_of(maps, thing, weight, bumps, way, way_weight):
     of_thing = functional.binary_cross_entropy_with_logits(maps[:, 0], thing, reduction="none")
-    of_thing = (of_thing * known).sum() / known.sum()
+    of_thing = (of_thing * weight).sum() / weight.sum()
     of_centre = functional.binary_cross_entropy_with_logits(maps[:, 1], bumps, reduction="none")
     # What is nearly all background must not drown the bumps.
-    weight = known * (0.1 + 10 * bumps)
-    of_centre = (of_centre * weight).sum() / weight.sum()
+    of_bumps = (weight > 0) * (0.1 + 10 * bumps)
+    of_centre = (of_centre * of_bumps).sum() / of_bumps.sum()
     off = (maps[:, 2:] - way).abs().sum(dim=1) / 16
-    of_way = (off * has_way).sum() / has_way.sum().clamp(min=1)
+    of_way = (off * way_weight).sum() / way_weight.sum().clamp(min=1)
     return of_thing + of_centre + 0.3 * of_way
 
 
@@ -74,23 +74,26 @@ def export(network, file):
                       input_names=["frame"], output_names=["maps"], opset_version=11)
 
 
-def read_for_ever(folder, read):
+def read_for_ever(folder, read, place, readers):
+    """Every so-many-th of the folder's sequences, as they appear."""
     seen = set()
     while True:
         for path in sorted(folder.iterdir()):
-            if path.name not in seen and (path / "sequence.json").exists():
+            is_here = path.name.isdigit() and int(path.name) // HELD_OUT % readers == place
+            if is_here and path.name not in seen and (path / "sequence.json").exists():
                 seen.add(path.name)
                 read.put((int(path.name), frames.read_sequence(path)))
         time.sleep(1)
 
 
 class Data:
-    """Sequences as they appear in the folder, read by a process of its own; every tenth is held out."""
+    """Sequences as they appear in the folder, read by processes of their own; every tenth is held out."""
 
-    def __init__(self, folder, most, device):
+    def __init__(self, folder, most, device, readers):
         self.read = multiprocessing.Queue(maxsize=32)
         # Before a GPU is looked at: what has one cannot be forked.
-        multiprocessing.Process(target=read_for_ever, args=(folder, self.read), daemon=True).start()
+        for place in range(readers):
+            multiprocessing.Process(target=read_for_ever, args=(folder, self.read, place, readers), daemon=True).start()
         self.store = frames.Store(most, *SIZE, device)
         self.scenes, self.held_out = 0, []
 
@@ -118,8 +121,10 @@ def main():
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--most-frames", type=int, default=12000, help="that are kept; further scenes are left out")
+    parser.add_argument("--readers", type=int, default=1, help="processes that read scenes")
     parser.add_argument("--wait-for", type=int, default=20, help="scenes to begin with")
     parser.add_argument("--export-only", action="store_true", help="write segmenter.onnx of last.pt")
+    parser.add_argument("--start", type=pathlib.Path, help="last.pt of an earlier run, whose network this one begins with")
     parser.add_argument("--rate", type=float, default=2e-3, help="of learning, at first; it falls to 0 along a cosine")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
@@ -127,7 +132,7 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     draw = np.random.default_rng(options.seed)
     on_gpu = options.device != "cpu"
-    data = None if options.export_only else Data(options.data, options.most_frames, options.device)
+    data = None if options.export_only else Data(options.data, options.most_frames, options.device, options.readers)
     torch.manual_seed(options.seed)
     network = Segmenter().to(options.device, memory_format=torch.channels_last)
     optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=1e-4)
@@ -140,6 +145,8 @@ def main():
         step, spent_s = state["step"], state["spent_s"]
         draw = np.random.default_rng([options.seed, step])
         torch.manual_seed(options.seed + step)
+    elif options.start:
+        network.load_state_dict(torch.load(options.start, map_location=options.device)["network"])
     elif options.export_only:
         parser.error(f"--export-only: there is no {last}")
     if options.export_only:
@@ -176,7 +183,8 @@ def main():
             if share == 1:
                 break
         for group in optimiser.param_groups:
-            group["lr"] = options.rate * min(1, (step + 1) / 100) * 0.5 * (1 + np.cos(np.pi * share))
+            # A number of Python's own: newer PyTorch reads no other from a file.
+            group["lr"] = float(options.rate * min(1, (step + 1) / 100) * 0.5 * (1 + np.cos(np.pi * share)))
         numbers = torch.from_numpy(draw.integers(data.store.count, size=options.batch)).to(options.device)
         x, *targets = frames.examples_of(data.store, numbers, *SIZE)
         optimiser.zero_grad(set_to_none=True)
