@@ -126,6 +126,7 @@ std::vector<double> FiguresOf(Times times, double open3d_ms) {
           median_ms / open3d_ms,
           late_ms / open3d_ms};
 }
+
 const std::vector<std::string> kColumns{"images",
                                         "setting",
                                         "segment",

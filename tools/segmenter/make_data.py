@@ -7,8 +7,7 @@ No named scene is looked at. Every seed gives a scene with its own field of view
 patterns, lights and sensor, and of it 12 images, half a second apart. In a quarter of the scenes things stand apart and move, as
 in scenes/random.toml; in a quarter many small and flat ones stand or lie close together; in a quarter they are set beside, on and
 into one another so that they touch; in some they fall onto one another, or are large and stand on the floor of a room. The same
-seeds give the same images. OUT/<seed>/ is a sequence
-as `tsdfpp generate` leaves it; seeds that are there already are left alone.
+seeds give the same images. OUT/<seed>/ is a sequence as `tsdfpp generate` leaves it; seeds that are there already are left alone.
 """
 import argparse
 import concurrent.futures
@@ -139,18 +138,23 @@ roll_deg = {roll_deg:.2f}
 {physics}""")
 
 
+def solid_of(draw, name, factor, least, most):
+    """Its length, width and height, each times `factor` and a draw of its own."""
+    size = [max(0.012, side * factor * draw.uniform(least, most)) for side in SOLIDS[name]]
+    if name in ("cylinder", "sphere", "cone", "capsule", "hexagon"):
+        size[1] = size[0]
+    if name == "sphere":
+        size[2] = size[0]
+    if name == "capsule":
+        size[2] = max(size[2], 1.3 * size[0])
+    return size
+
+
 def some_thing(draw, models=None):
     """A model, its factor (solids: its sides), its length, width and height, and whether it is a solid."""
     name = draw.choice(models or list(SOLIDS) + list(TOYS))
     if name in SOLIDS:
-        factor = draw.uniform(0.7, 1.8)
-        size = [max(0.012, side * factor * draw.uniform(0.7, 1.4)) for side in SOLIDS[name]]
-        if name in ("cylinder", "sphere", "cone", "capsule", "hexagon"):
-            size[1] = size[0]
-        if name == "sphere":
-            size[2] = size[0]
-        if name == "capsule":
-            size[2] = max(size[2], 1.3 * size[0])
+        size = solid_of(draw, name, draw.uniform(0.7, 1.8), 0.7, 1.4)
         return name, size, size, True
     sides = TOYS[name] if name in TOYS else OPEN[name][0]
     factor = draw.uniform(0.4, 1.0)
@@ -297,14 +301,8 @@ def crowd(seed, draw):
         else:
             name = draw.choice(list(SOLIDS) + list(TOYS))
         if name in SOLIDS:
-            size = [max(0.012, factor * draw.uniform(0.6, 1.3) * side) for side in SOLIDS[name]]
-            if name in ("cylinder", "sphere", "cone", "capsule", "hexagon"):
-                size[1] = size[0]
-            if name == "sphere":
-                size[2] = size[0]
-            if name == "capsule":
-                size[2] = max(size[2], 1.3 * size[0])
-            how, solid = size, True
+            size = how = solid_of(draw, name, factor, 0.6, 1.3)
+            solid = True
         else:
             # A card is as small as it is.
             how = draw.uniform(0.7, 1.3) if name == "card" else factor * draw.uniform(0.7, 1.1)
