@@ -114,7 +114,7 @@ Expected<Seen> MapAgain(const ExperimentConfig& config, const CellSettings& sett
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
   Seen seen;
   TSDFPP_ASSIGN(seen.truth, SabotagedTruth(variant.sabotage, source.source(), variant.voxel_m));
-  CellMapper mapper(settings, source.info().objects);
+  TSDFPP_ASSIGN(CellMapper mapper, CellMapper::Make(settings, source.info().objects));
   std::vector<ObjectInfo> names;
   for (std::size_t i = 0; i < seen.truth->trackers().size(); ++i) {
     names.push_back(seen.truth->surface(i).model().info);
@@ -124,9 +124,11 @@ Expected<Seen> MapAgain(const ExperimentConfig& config, const CellSettings& sett
     if (index > last) break;
     TSDFPP_ASSIGN(VariantFrame both, source.Read(index));
     TSDFPP_RETURN_IF_ERROR(seen.truth->Observe(both.truth));
-    TSDFPP_RETURN_IF_ERROR(mapper.Process(both.frame));
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(both));
+    if (variant.IsEvaluated(index)) mapper.SettleIds();
     seen.frame = std::move(both.frame);
   }
+  mapper.SettleIds();
   seen.movers = MoversNow(source.info(), *seen.truth);
   SceneMeshes meshes = mapper.Meshes(seen.movers);
   SabotageMeshes(settings.sabotage, meshes);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <random>
 
+#include "mapper/instance_network.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -14,33 +16,48 @@ std::string NameOfThisRun() {
 
 }  // namespace
 
-CellMapper::CellMapper(const CellSettings& settings, const std::vector<ObjectInfo>& objects)
-    : config_(*settings.Pipeline()) {
+Expected<CellMapper> CellMapper::Make(const CellSettings& settings,
+                                      const std::vector<ObjectInfo>& objects) {
+  CellMapper mapper(*settings.Pipeline());
+  PipelineConfig& config = mapper.config_;
   if (settings.is_open3d()) {
     SetOpen3dThreads(1);  // workers run side by side
-    open3d_ = std::make_unique<Open3dVolume>(config_.map.voxel_m,
-                                             config_.map.trunc_front_voxels * config_.map.voxel_m,
-                                             Open3dColour::kNone);
-  } else {
-    pipeline_ = std::make_unique<class Pipeline>(config_, objects);
+    mapper.open3d_ = std::make_unique<Open3dVolume>(
+        config.map.voxel_m, config.map.trunc_front_voxels * config.map.voxel_m,
+        Open3dColour::kNone);
+    return mapper;
   }
+  if (UsesNetwork(config.segmentation)) {
+    TSDFPP_ASSIGN(config.segmenter.finder, OwnInstanceNetwork(config.segmenter.network));
+  }
+  mapper.pipeline_ = std::make_unique<class Pipeline>(
+      config, mapper.HasOwnIds() ? std::vector<ObjectInfo>{} : objects);
+  return mapper;
 }
 
-Expected<void> CellMapper::Process(const Frame& frame) {
+Expected<void> CellMapper::Process(const VariantFrame& both) {
   if (pipeline_) {
-    TSDFPP_ASSIGN(const StepTimes step, pipeline_->Process(frame));
+    TSDFPP_ASSIGN(const StepTimes step, pipeline_->Process(both.frame));
     times_.Add(step);
     frame_s_.push_back(step.Total_s());
+    if (HasOwnIds() && !both.truth.mask.empty()) {
+      matching_.Observe(pipeline_->labels(), both.truth.mask);
+    }
   } else {
-    frame_s_.push_back(open3d_->Integrate(frame));
+    frame_s_.push_back(open3d_->Integrate(both.frame));
   }
   return {};
+}
+
+void CellMapper::SettleIds() {
+  if (HasOwnIds()) matching_.Settle();
 }
 
 SceneMeshes CellMapper::Meshes(const std::set<InstanceId>& movers) {
   SceneMeshes meshes;
   if (pipeline_) {
-    meshes = MeshesOf(pipeline_->map(), movers, mesher_);
+    meshes = HasOwnIds() ? MeshesOf(pipeline_->map(), movers, matching_, mesher_)
+                         : MeshesOf(pipeline_->map(), movers, mesher_);
     times_.mesh_s.push_back(meshes.mesh_s);
   } else {
     meshes.scene = open3d_->Triangles();
@@ -74,6 +91,7 @@ struct TruthNow {
 };
 
 Expected<void> EvaluateCell(CellRun& run, int index, const TruthNow& now) {
+  run.mapper.SettleIds();
   SceneMeshes meshes = run.mapper.Meshes(now.movers);
   SabotageMeshes(run.sabotage, meshes);
   std::optional<SceneTruth> visible;
@@ -122,21 +140,18 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
   }
   std::vector<CellRun> runs;
   for (const Cell* cell : cells) {
-    runs.push_back({cell->settings.sabotage,
-                    {cell->settings, source.info().objects},
-                    MakeLastSeenStores(truth),
-                    {}});
+    TSDFPP_ASSIGN(CellMapper mapper, CellMapper::Make(cell->settings, source.info().objects));
+    runs.push_back({cell->settings.sabotage, std::move(mapper), MakeLastSeenStores(truth), {}});
   }
   std::map<int, std::string> digests;
   for (const int index : variant.frames) {
     TSDFPP_ASSIGN(const VariantFrame both, source.Read(index));
     digests[index] = ImageDigest(both.frame);
     TSDFPP_RETURN_IF_ERROR(truth.Observe(both.truth));
-    const bool evaluated =
-        std::binary_search(variant.evaluated.begin(), variant.evaluated.end(), index);
+    const bool evaluated = variant.IsEvaluated(index);
     now.movers = MoversNow(source.info(), truth);
     for (CellRun& run : runs) {
-      TSDFPP_RETURN_IF_ERROR(run.mapper.Process(both.frame));
+      TSDFPP_RETURN_IF_ERROR(run.mapper.Process(both));
       if (evaluated) TSDFPP_RETURN_IF_ERROR(EvaluateCell(run, index, now));
     }
     if (progress) progress();

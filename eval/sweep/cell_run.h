@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "eval/adapters/open3d_peer.h"
+#include "eval/score/id_matching.h"
 #include "eval/sweep/cell.h"
 #include "eval/sweep/sequence_variant.h"
 #include "mapper/pipeline.h"
@@ -15,12 +16,17 @@ namespace tsdfpp {
 // The mapper of a cell: ours behind the pipeline, or Open3D's volume of a static world.
 class CellMapper {
  public:
-  // The settings must be valid.
-  CellMapper(const CellSettings& settings, const std::vector<ObjectInfo>& objects);
+  // The settings must be valid. Errors: those of OwnInstanceNetwork.
+  static Expected<CellMapper> Make(const CellSettings& settings,
+                                   const std::vector<ObjectInfo>& objects);
 
   // Errors: those of Pipeline::Process.
-  Expected<void> Process(const Frame& frame);
-  // What an evaluation looks at, after the removals that it needs. Open3D's mesh has no labels.
+  Expected<void> Process(const VariantFrame& both);
+  // To be called at each evaluated frame, before its meshes: where the map's ids are its own, those
+  // that came since the last call are matched with the truth's.
+  void SettleIds();
+  // What an evaluation looks at, after the removals that it needs, with the truth's ids. Open3D's
+  // mesh has no labels.
   SceneMeshes Meshes(const std::set<InstanceId>& movers);
   RunCosts costs() const;
   double voxel_m() const { return config_.map.voxel_m; }
@@ -28,9 +34,13 @@ class CellMapper {
   const MapRepresentation* map() const { return pipeline_ ? &pipeline_->map() : nullptr; }
 
  private:
+  explicit CellMapper(PipelineConfig config) : config_(std::move(config)) {}
+  bool HasOwnIds() const { return config_.associate == AssociationMode::kVotes; }
+
   PipelineConfig config_;
   std::unique_ptr<Pipeline> pipeline_;
-  SceneMesher mesher_;  // of its map
+  SceneMesher mesher_;   // of its map
+  IdMatching matching_;  // with votes
   std::unique_ptr<Open3dVolume> open3d_;
   RunTimes times_;               // not of Open3D
   std::vector<double> frame_s_;  // of each frame

@@ -227,8 +227,9 @@ Expected<Remade> MapAgain(const Recorded& recorded, const std::vector<int>& fram
   Remade remade;
   for (const int index : frames) {
     TSDFPP_ASSIGN(remade.both, source.Read(index));
-    TSDFPP_RETURN_IF_ERROR(mapper.Process(remade.both.frame));
+    TSDFPP_RETURN_IF_ERROR(mapper.Process(remade.both));
     ++result.frames;
+    if (recorded.variant.IsEvaluated(index)) mapper.SettleIds();
     if (index == result.compared_map_frame || index == options.frame) {
       remade.scene = mapper.Meshes({}).scene;
       result.map_digest = MeshDigest(remade.scene);
@@ -273,7 +274,7 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   TSDFPP_ASSIGN(const Recorded recorded, Load(options));
   TSDFPP_ASSIGN(const std::vector<int> frames, FramesUpTo(options.frame, recorded));
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(recorded.variant));
-  CellMapper mapper(recorded.settings, source.info().objects);
+  TSDFPP_ASSIGN(CellMapper mapper, CellMapper::Make(recorded.settings, source.info().objects));
   ReplayResult result{recorded.settings, recorded.id, 0, std::nullopt, {}, {}, {}};
   result.compared_map_frame = LastEvaluated(recorded.variant.evaluated, options.frame);
   TSDFPP_ASSIGN(const Remade remade, MapAgain(recorded, frames, source, mapper, options, result));

@@ -139,6 +139,10 @@ void Blind(Frame& frame) {
 
 }  // namespace
 
+bool SequenceVariant::IsEvaluated(int frame) const {
+  return std::binary_search(evaluated.begin(), evaluated.end(), frame);
+}
+
 std::string SequenceVariant::Key() const {
   std::string key = fmt::format("fuse_until {}\nobject_error {}\nframes", fuse_until, object_error);
   for (const int frame : frames) key += fmt::format(" {}", frame);

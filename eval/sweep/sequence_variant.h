@@ -26,6 +26,7 @@ struct SequenceVariant {
   std::vector<int> evaluated;                           // of those
   int examined = 0;  // the reveal, where it is among the frames, else the last
 
+  bool IsEvaluated(int frame) const;
   // What determines the frames and the truth that they are scored against, but for the program.
   std::string Key() const;
 };

@@ -112,6 +112,17 @@ Expected<void> SetPoses(Settings& settings, const AxisValue& value) {
   return known ? Expected<void>{} : Because(value, known.error());
 }
 
+Expected<void> SetSegmentation(Settings& settings, const AxisValue& value) {
+  TSDFPP_ASSIGN(settings.segmentation, Text(value, "gt, depth or full"));
+  const auto known = SegmentationFromName(settings.segmentation);
+  if (!known) return Because(value, known.error());
+  if (*known != Segmentation::kGiven && *known != Segmentation::kDepth &&
+      *known != Segmentation::kFull) {
+    return Wrong(value, "gt, depth or full");
+  }
+  return {};
+}
+
 Expected<void> SetResampling(Settings& settings, const AxisValue& value) {
   TSDFPP_ASSIGN(settings.resampling, Text(value, "all or observed"));
   const auto known = ResamplingFromName(settings.resampling);
@@ -183,6 +194,8 @@ std::vector<Axis> MakeAxes() {
       {"layers", [](Settings& s, V v) { return SetWhole<&Settings::layers>(s, v, 1, kMaxLayers); },
        [](const Settings& s) -> AxisValue { return static_cast<double>(s.layers); }},
       {"poses", SetPoses, [](const Settings& s) -> AxisValue { return s.poses; }},
+      {"segmentation", SetSegmentation,
+       [](const Settings& s) -> AxisValue { return s.segmentation; }},
       {"mask_repair", SetMaskRepair, [](const Settings& s) -> AxisValue { return s.mask_repair; }},
       {"resampling", SetResampling, [](const Settings& s) -> AxisValue { return s.resampling; }},
       {"moved_voxels", SetMovedVoxels,
@@ -243,8 +256,25 @@ Expected<PipelineConfig> CellSettings::Pipeline() const {
   TSDFPP_ASSIGN(config.poses, PoseSourceFromName(poses));
   TSDFPP_RETURN_IF_ERROR(CheckPoses(config.method, config.poses));
   TSDFPP_RETURN_IF_ERROR(CheckMaskRepair(config.method, config.mask_repair));
-  if (config.mask_repair == MaskRepairMode::kOn && Open3dBand_voxels(method)) {
-    return UsageError("method '{}' is given no masks that could be repaired, expected off", method);
+  if (Open3dBand_voxels(method)) {
+    if (config.mask_repair == MaskRepairMode::kOn) {
+      return UsageError("method '{}' is given no masks that could be repaired, expected off",
+                        method);
+    }
+    if (segmentation != CellSettings().segmentation) {
+      return UsageError("method '{}' has no objects, expected segmentation gt, found {}", method,
+                        segmentation);
+    }
+  }
+  TSDFPP_ASSIGN(config.segmentation, SegmentationFromName(segmentation));
+  if (IdsAreOfOneFrame(config.segmentation)) {
+    if (config.poses == PoseSource::kGiven || !InfoOf(config.method).has_voxels) {
+      return UsageError(
+          "segmentation '{}' gives objects ids of its own: expected poses icp or track, and a "
+          "method with voxels, found poses {} and method '{}'",
+          segmentation, poses, method);
+    }
+    config.associate = AssociationMode::kVotes;
   }
   SabotageMap(sabotage, config);
   TSDFPP_RETURN_IF_ERROR(config.map.Validate());
@@ -294,9 +324,12 @@ std::string MapKey(const CellSettings& settings) {
                        PoseSourceName(config.poses), sabotage);
   }
   return fmt::format(
-      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}{}", info.name, config.map.voxel_m,
+      "{} voxel_m {} front {} back {} layers {} poses {}{}{}{}{}{}", info.name, config.map.voxel_m,
       config.map.trunc_front_voxels, config.map.trunc_back_voxels,
       LayersOf(config.method, config.map), PoseSourceName(config.poses),
+      config.segmentation == Segmentation::kGiven
+          ? ""
+          : fmt::format(" segmentation {}", SegmentationName(config.segmentation)),
       config.mask_repair == MaskRepairMode::kOn ? " mask_repair on" : "",
       info.moves_values ? fmt::format(" resampling {}", ResamplingName(config.map.resampling)) : "",
       IsOneField(config.method)

@@ -40,6 +40,8 @@ struct CellSettings {
   double voxel_m = 0.01;
   int layers = 0;  // K; 0: the method's own
   std::string poses = "gt";
+  // What finds the objects; "depth" and "full" have ids of their own, associated by votes.
+  std::string segmentation = "gt";
   std::string mask_repair = "off";
   std::string resampling = "all";
   // Of one field:
@@ -50,8 +52,8 @@ struct CellSettings {
   // What is broken on purpose, of either or of the scoring (eval/sweep/sabotage.h).
   Sabotage sabotage = Sabotage::kNone;
 
-  // The map's configuration; of Open3D voxel size and, front and back, its own band alone.
-  // Errors: kUsage.
+  // The map's configuration; of Open3D voxel size and, front and back, its own band alone. It
+  // lacks the network that segmentation "full" needs. Errors: kUsage.
   Expected<PipelineConfig> Pipeline() const;
   bool is_open3d() const { return method.starts_with(kOpen3dMethod); }
 };

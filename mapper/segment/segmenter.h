@@ -4,7 +4,6 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -12,6 +11,7 @@
 #include "mapper/segment/depth_segments_config.h"
 #include "mapper/segment/instance_finder.h"
 #include "mapper/segment/network_config.h"
+#include "mapper/segment/segmentation.h"
 
 namespace tsdfpp {
 
@@ -39,25 +39,6 @@ class Segmenter {
   // sentence that begins with the frame's number.
   virtual Expected<Segments> Segment(const Frame& frame) = 0;
 };
-
-enum class Segmentation {
-  kGiven,  // Frame::mask
-  kNone,   // Frame::mask is not read
-  // Nor is it by these, whose ids are of one frame alone:
-  kDepth,    // convex parts of the depth image
-  kNetwork,  // instances that a network finds
-  kFull,     // both, joined (paper III-B)
-};
-
-// "gt", "none", "depth", "network" or "full". Errors: kUsage.
-Expected<Segmentation> SegmentationFromName(std::string_view name);
-std::string_view SegmentationName(Segmentation segmentation);
-
-// Whether segments have new ids in every frame, so that they must be associated by votes.
-bool IdsAreOfOneFrame(Segmentation segmentation);
-// Whether it takes settings of depth, and a network.
-bool UsesDepth(Segmentation segmentation);
-bool UsesNetwork(Segmentation segmentation);
 
 // What a segmenter is told besides.
 struct SegmenterParts {

@@ -134,21 +134,26 @@ TEST(Experiment, TheReadyOnesFitTheirScenes) {
 
 // Values that are sound one by one; a cell of them has no map.
 TEST(Experiment, SettingsThatDoNotGoTogetherAreRefused) {
-  const auto config = Parse(R"(name = "e"
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"method = [\"surfels\", \"tsdf\"]\nposes = \"track\"",
+       "grid '1': poses 'track' are tracked by signed distances"},
+      {"method = \"tsdf++\"\nsegmentation = \"depth\"",
+       "grid '1': segmentation 'depth' gives objects ids of its own"},
+      {"method = \"open3d/3\"\nsegmentation = \"full\"", "'open3d/3' has no objects"},
+  };
+  for (const auto& [settings, sentence] : cases) {
+    const auto config = Parse(R"(name = "e"
 question = "?"
 metrics = ["fuse_ms"]
 [[grid]]
 scene = "mini.toml"
-method = ["surfels", "tsdf"]
-poses = "track"
-)");
-  ASSERT_TRUE(config.has_value()) << config.error().message;
-  const auto plan = PlanSweep(*config);
-  ASSERT_FALSE(plan.has_value());
-  EXPECT_EQ(plan.error().kind, ErrorKind::kUsage);
-  EXPECT_NE(plan.error().message.find("grid '1': poses 'track' are tracked by signed distances"),
-            std::string::npos)
-      << plan.error().message;
+)" + settings);
+    ASSERT_TRUE(config.has_value()) << config.error().message;
+    const auto plan = PlanSweep(*config);
+    ASSERT_FALSE(plan.has_value()) << settings;
+    EXPECT_EQ(plan.error().kind, ErrorKind::kUsage);
+    EXPECT_NE(plan.error().message.find(sentence), std::string::npos) << plan.error().message;
+  }
 }
 
 // Masks whose ids are of one frame alone are no objects' masks.
@@ -223,59 +228,6 @@ except = [{ method = ["tsdf++", "open3d/10"], profile = "paper" }]
                       "a.toml close tsdf", "a.toml close tsdf++", "a.toml close open3d/3",
                       "a.toml close open3d/10", "b.toml paper tsdf", "b.toml close tsdf",
                       "b.toml close tsdf++", "b.toml close open3d/3", "b.toml close open3d/10"}));
-}
-
-TEST(Experiment, SettingsComeBackFromJson) {
-  CellSettings settings;
-  settings.scene = "a.toml";
-  settings.seed = 77;
-  settings.sensor = "kinect";
-  settings.noise = 0;
-  settings.layers = 3;
-  settings.trunc_back = 5;
-  settings.resampling = "observed";
-  const auto back = SettingsFromJson(SettingsJson(settings));
-  ASSERT_TRUE(back.has_value()) << back.error().message;
-  EXPECT_EQ(SettingsJson(*back), SettingsJson(settings));
-  nlohmann::json broken = SettingsJson(settings);
-  broken["voxel_m"] = 7;
-  EXPECT_FALSE(SettingsFromJson(broken).has_value());
-  broken.erase("voxel_m");
-  EXPECT_FALSE(SettingsFromJson(broken).has_value());
-}
-
-// What makes no difference to a method makes no cell; what does, does.
-TEST(Experiment, TheKeyOfAMapIsWhatItDependsOn) {
-  const auto key = [](const std::string& method, const auto& change) {
-    CellSettings settings;
-    settings.method = method;
-    change(settings);
-    return MapKey(settings);
-  };
-  const auto nothing = [](CellSettings&) {};
-  const auto layers = [](int k) { return [k](CellSettings& s) { s.layers = k; }; };
-  EXPECT_EQ(key("tsdf", nothing), key("tsdf", layers(4)));
-  EXPECT_EQ(key("tsdf++", nothing), key("tsdf++", layers(2)));
-  EXPECT_NE(key("tsdf++", nothing), key("tsdf++", layers(4)));
-  EXPECT_EQ(key("tsdf++/anchored", nothing), key("tsdf++/anchored", layers(4)));
-  const auto back = [](CellSettings& s) { s.trunc_back = 10; };
-  const auto paper = [](CellSettings& s) { s.profile = "paper"; };
-  EXPECT_EQ(key("tsdf", back), key("tsdf", paper));
-  EXPECT_NE(key("tsdf", back), key("tsdf", nothing));
-  // Open3D's band is its own, and all that tells two of its maps apart but the voxel.
-  EXPECT_NE(key("open3d/3", nothing), key("open3d/10", nothing));
-  EXPECT_EQ(key("open3d/3", paper), key("open3d/3", nothing));
-  EXPECT_EQ(key("open3d/10", back), key("open3d/10", nothing));
-  EXPECT_EQ(key("open3d/10", layers(4)), key("open3d/10", nothing));
-  const auto observed = [](CellSettings& s) { s.resampling = "observed"; };
-  EXPECT_EQ(key("tsdf++/anchored", observed), key("tsdf++/anchored", nothing));
-  EXPECT_NE(key("tsdf++", observed), key("tsdf++", nothing));
-  const auto icp = [](CellSettings& s) { s.poses = "icp"; };
-  EXPECT_NE(key("tsdf", icp), key("tsdf", nothing));
-  const auto voxel = [](CellSettings& s) { s.voxel_m = 0.02; };
-  for (const char* method : {"tsdf", "tsdf++", "tsdf++/anchored", "volumes", "open3d/10"}) {
-    EXPECT_NE(key(method, voxel), key(method, nothing)) << method;
-  }
 }
 
 // A cell's id changes with program, renderer, frames and map, and with nothing else.
