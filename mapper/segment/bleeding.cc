@@ -43,10 +43,15 @@ enum class Verdict : std::uint8_t {
   kBleeds  // ... or with that of the other
 };
 
-Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_m) {
+struct Judged {
+  Verdict verdict = Verdict::kNothing;
+  bool is_stray = false;
+};
+
+Judged Judge(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_m) {
   const InstanceId id = ids.at<InstanceId>(v, u);
   const float z = depth.at<float>(v, u);
-  if (id == kNoInstance || !IsValidDepth(z)) return Verdict::kNothing;
+  if (id == kNoInstance || !IsValidDepth(z)) return {};
   Depths own;
   Depths others;
   for (int y = std::max(0, v - kBleedingReach_px);
@@ -59,11 +64,13 @@ Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float 
       (labels[x] == id ? own : others).Add(depths[x]);
     }
   }
-  if (own.empty() || others.empty()) return Verdict::kNothing;
+  if (own.empty() || others.empty()) return {};
   const float of_own = own.Median();
   const float of_others = others.Median();
-  if (!(std::abs(of_own - of_others) > step_m)) return Verdict::kNothing;
-  return std::abs(z - of_others) < std::abs(z - of_own) ? Verdict::kBleeds : Verdict::kHolds;
+  const float from_own = std::abs(z - of_own);
+  const bool is_stray = from_own > kStray_steps * step_m;
+  if (!(std::abs(of_own - of_others) > step_m)) return {Verdict::kNothing, is_stray};
+  return {std::abs(z - of_others) < from_own ? Verdict::kBleeds : Verdict::kHolds, is_stray};
 }
 
 // 255 at all pixels whose windows have more than one id, and at some beside them; most have one.
@@ -122,9 +129,9 @@ cv::Mat WithoutBleeding(const cv::Mat& depth, const cv::Mat& ids, float step_m) 
           auto* row = bleeds.ptr<std::uint8_t>(v);
           for (int u = 0; u < ids.cols; ++u) {
             if (is_near[u] == 0) continue;
-            const Verdict verdict = VerdictOf(depth, ids, v, u, step_m);
-            ++counts[static_cast<std::size_t>(verdict)];
-            if (verdict == Verdict::kBleeds) row[u] = 255;
+            const Judged judged = Judge(depth, ids, v, u, step_m);
+            ++counts[static_cast<std::size_t>(judged.verdict)];
+            if (judged.verdict == Verdict::kBleeds || judged.is_stray) row[u] = 255;
           }
         }
         const std::int64_t bleed = counts[static_cast<std::size_t>(Verdict::kBleeds)];

@@ -29,6 +29,11 @@ inline constexpr int kBleedingReach_px = 2;
 // Nearer to each other than this both sides of an outline are one surface, voxels.
 inline constexpr double kBleedingStep_voxels = 2;
 
+// So many steps from the depth of its own side a pixel bleeds whatever the other side seems to
+// have, as where pixels of the other side bleed, too. A toy's own parts are not so far apart in so
+// small a part of the picture.
+inline constexpr float kStray_steps = 5;
+
 // A camera that bleeds does so along all outlines: 0.14 to 0.20 of the pixels beside steps did with
 // a Kinect's noise, and at most 0.012 seemed to with exact depth, where an object hides itself
 // (five scenes). A frame in which fewer than this share do is taken as it is.
@@ -37,10 +42,11 @@ inline constexpr double kLeastBleedingShare = 0.05;
 // `ids` (CV_16UC1) with kNoInstance where `depth` (CV_32FC1, metres, of the same size) bleeds: of
 // the valid depths of the pixels within kBleedingReach_px rows and columns those with the pixel's
 // id and those with another have medians (of an even number the upper one) that are more than
-// `step_m` apart, and the pixel's own is nearer to that of the others. Pixels without valid depth,
-// and those that are kNoInstance, are neither looked at nor counted. Where fewer than
-// kLeastBleedingShare of the pixels with medians so far apart bleed, or none, the result shares its
-// pixels with `ids`. In parallel, the same for any number of threads.
+// `step_m` apart, and the pixel's own is nearer to that of the others, or it is more than
+// kStray_steps times `step_m` from that of its own id. Pixels without valid depth, and those that
+// are kNoInstance, are neither looked at nor counted. Where fewer than kLeastBleedingShare of the
+// pixels with medians so far apart bleed, or none, the result shares its pixels with `ids`. In
+// parallel, the same for any number of threads.
 cv::Mat WithoutBleeding(const cv::Mat& depth, const cv::Mat& ids, float step_m);
 
 }  // namespace tsdfpp

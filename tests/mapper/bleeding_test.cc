@@ -25,10 +25,12 @@ float UpperMedian(std::vector<float> values) {
   return values[values.size() / 2];
 }
 
-// The rule, pixel by pixel: whether it lies beside a step, and whether it bleeds.
+// The rule, pixel by pixel: whether it lies beside a step, whether it bleeds, and whether it is far
+// from its own side.
 struct Verdict {
   bool is_beside_step = false;
   bool bleeds = false;
+  bool is_stray = false;
 };
 
 Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u) {
@@ -47,22 +49,25 @@ Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u) {
   }
   if (own.empty() || others.empty()) return {};
   const float z = depth.at<float>(v, u);
-  if (std::abs(UpperMedian(own) - UpperMedian(others)) <= kStep_m) return {};
-  return {true, std::abs(z - UpperMedian(others)) < std::abs(z - UpperMedian(own))};
+  const bool is_stray = std::abs(z - UpperMedian(own)) > kStray_steps * kStep_m;
+  if (std::abs(UpperMedian(own) - UpperMedian(others)) <= kStep_m) return {false, false, is_stray};
+  return {true, std::abs(z - UpperMedian(others)) < std::abs(z - UpperMedian(own)), is_stray};
 }
 
 // Of the whole image: what waits.
 cv::Mat Waiting(const cv::Mat& depth, const cv::Mat& ids) {
   cv::Mat waits(ids.size(), CV_8UC1, cv::Scalar(0));
   int beside_steps = 0;
+  int bleeding = 0;
   for (int v = 0; v < ids.rows; ++v) {
     for (int u = 0; u < ids.cols; ++u) {
       const Verdict verdict = VerdictOf(depth, ids, v, u);
       beside_steps += verdict.is_beside_step ? 1 : 0;
-      waits.at<std::uint8_t>(v, u) = verdict.bleeds ? 255 : 0;
+      bleeding += verdict.bleeds ? 1 : 0;
+      waits.at<std::uint8_t>(v, u) = verdict.bleeds || verdict.is_stray ? 255 : 0;
     }
   }
-  if (cv::countNonZero(waits) < kLeastBleedingShare * beside_steps) waits.setTo(0);
+  if (bleeding == 0 || bleeding < kLeastBleedingShare * beside_steps) waits.setTo(0);
   return waits;
 }
 
@@ -123,6 +128,22 @@ TEST(Bleeding, TrueDepthStaysAsItIs) {
 
 // At the box's corners the median of the few pixels inside may be one of the shifted ones.
 constexpr double kMisjudged = 0.02;
+
+// Where the wall has the box's depth, its median says nothing of a box's pixel that has the wall's.
+TEST(Bleeding, StraysWaitWhereTheOtherSideBleedsToo) {
+  View view;
+  const cv::Rect above(20, 10, 24, 2);
+  view.depth(above) = kBox_m;
+  const cv::Point stray(32, 12);
+  view.depth.at<float>(stray) = kWall_m;
+  const cv::Mat rest = WithoutBleeding(view.depth, view.ids, kStep_m);
+  EXPECT_EQ(rest.at<InstanceId>(stray), kNoInstance);
+  EXPECT_EQ(rest.at<InstanceId>(stray + cv::Point(1, 0)), kBox);
+  // No camera bleeds at one pixel alone.
+  View exact;
+  exact.depth.at<float>(stray) = kWall_m;
+  EXPECT_EQ(WithoutBleeding(exact.depth, exact.ids, kStep_m).data, exact.ids.data);
+}
 
 // A third of the pixels have the depth of up to two pixels off: those to which that makes a
 // difference are found, and no others.
