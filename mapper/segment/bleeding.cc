@@ -68,7 +68,9 @@ Judged Judge(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_
   const float of_own = own.Median();
   const float of_others = others.Median();
   const float from_own = std::abs(z - of_own);
-  const bool is_stray = from_own > kStray_steps * step_m;
+  // Where a thing is thin, most of its pixels may have the depth behind it: what is nearer is
+  // right.
+  const bool is_stray = z - of_own > kStray_steps * step_m;
   if (!(std::abs(of_own - of_others) > step_m)) return {Verdict::kNothing, is_stray};
   return {std::abs(z - of_others) < from_own ? Verdict::kBleeds : Verdict::kHolds, is_stray};
 }

@@ -29,7 +29,7 @@ inline constexpr int kBleedingReach_px = 2;
 // Nearer to each other than this both sides of an outline are one surface, voxels.
 inline constexpr double kBleedingStep_voxels = 2;
 
-// So many steps from the depth of its own side a pixel bleeds whatever the other side seems to
+// So many steps behind the depth of its own side a pixel bleeds whatever the other side seems to
 // have, as where pixels of the other side bleed, too. A toy's own parts are not so far apart in so
 // small a part of the picture.
 inline constexpr float kStray_steps = 5;
@@ -43,7 +43,7 @@ inline constexpr double kLeastBleedingShare = 0.05;
 // the valid depths of the pixels within kBleedingReach_px rows and columns those with the pixel's
 // id and those with another have medians (of an even number the upper one) that are more than
 // `step_m` apart, and the pixel's own is nearer to that of the others, or it is more than
-// kStray_steps times `step_m` from that of its own id. Pixels without valid depth, and those that
+// kStray_steps times `step_m` behind that of its own id. Pixels without valid depth, and those that
 // are kNoInstance, are neither looked at nor counted. Where fewer than kLeastBleedingShare of the
 // pixels with medians so far apart bleed, or none, the result shares its pixels with `ids`. In
 // parallel, the same for any number of threads.

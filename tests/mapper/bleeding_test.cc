@@ -49,7 +49,7 @@ Verdict VerdictOf(const cv::Mat& depth, const cv::Mat& ids, int v, int u) {
   }
   if (own.empty() || others.empty()) return {};
   const float z = depth.at<float>(v, u);
-  const bool is_stray = std::abs(z - UpperMedian(own)) > kStray_steps * kStep_m;
+  const bool is_stray = z - UpperMedian(own) > kStray_steps * kStep_m;
   if (std::abs(UpperMedian(own) - UpperMedian(others)) <= kStep_m) return {false, false, is_stray};
   return {true, std::abs(z - UpperMedian(others)) < std::abs(z - UpperMedian(own)), is_stray};
 }
@@ -139,6 +139,12 @@ TEST(Bleeding, StraysWaitWhereTheOtherSideBleedsToo) {
   const cv::Mat rest = WithoutBleeding(view.depth, view.ids, kStep_m);
   EXPECT_EQ(rest.at<InstanceId>(stray), kNoInstance);
   EXPECT_EQ(rest.at<InstanceId>(stray + cv::Point(1, 0)), kBox);
+  // What is nearer than its own side may be a thin thing's, of which the other pixels bleed.
+  const cv::Point thin(32, 11);
+  view.ids.at<InstanceId>(thin) = kBox;
+  view.ids(cv::Rect(31, 10, 3, 1)) = kBox;
+  view.depth(cv::Rect(30, 9, 5, 2)) = kWall_m;
+  EXPECT_EQ(WithoutBleeding(view.depth, view.ids, kStep_m).at<InstanceId>(thin), kBox);
   // No camera bleeds at one pixel alone.
   View exact;
   exact.depth.at<float>(stray) = kWall_m;
