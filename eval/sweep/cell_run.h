@@ -20,7 +20,8 @@ class CellMapper {
   static Expected<CellMapper> Make(const CellSettings& settings,
                                    const std::vector<ObjectInfo>& objects);
 
-  // Errors: those of Pipeline::Process.
+  // Maps the frame; of its truth only the mask is looked at, by the matching of ids that are the
+  // map's own. Errors: those of Pipeline::Process.
   Expected<void> Process(const VariantFrame& both);
   // To be called at each evaluated frame, before its meshes: where the map's ids are its own, those
   // that came since the last call are matched with the truth's.

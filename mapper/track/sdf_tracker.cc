@@ -205,8 +205,6 @@ SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistratio
   const std::optional<Vector6> leant = std::exchange(memory.leaning, std::nullopt);
   Rest rest;
   if ((config_.rest_evidence <= 0 && !waits_) || nearest.counts.observed == 0) return rest;
-  // A place that was searched is not as good as one that was fused: nothing says to stay there.
-  if (memory.is_placed && (!waits_ || memory.has_moved)) return rest;
   if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) return rest;
   rest.T_LC = sight.T_WL.inverse() * sight.frame->T_WC;
   const OtherPlace there = ComparePlace(task, rest.T_LC, nearest, config_);
@@ -308,7 +306,6 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
       memory.keyframe = KeyframeOf(*sight.points, T_OC, sight.frame->intrinsics);
     }
   }
-  memory.is_placed = false;
   memory.frame = sight.frame->index;
   memory.centre_L = found.T_LC * sight.centre_C;
   const Pose motion_L = MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC);

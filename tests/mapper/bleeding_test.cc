@@ -126,9 +126,6 @@ TEST(Bleeding, TrueDepthStaysAsItIs) {
   EXPECT_EQ(rest.data, view.ids.data);
 }
 
-// At the box's corners the median of the few pixels inside may be one of the shifted ones.
-constexpr double kMisjudged = 0.02;
-
 // Where the wall has the box's depth, its median says nothing of a box's pixel that has the wall's.
 TEST(Bleeding, StraysWaitWhereTheOtherSideBleedsToo) {
   View view;
@@ -150,6 +147,9 @@ TEST(Bleeding, StraysWaitWhereTheOtherSideBleedsToo) {
   exact.depth.at<float>(stray) = kWall_m;
   EXPECT_EQ(WithoutBleeding(exact.depth, exact.ids, kStep_m).data, exact.ids.data);
 }
+
+// At the box's corners the median of the few pixels inside may be one of the shifted ones.
+constexpr double kMisjudged = 0.02;
 
 // A third of the pixels have the depth of up to two pixels off: those to which that makes a
 // difference are found, and no others.
