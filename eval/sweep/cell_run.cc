@@ -157,6 +157,7 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
     if (progress) progress();
   }
   std::vector<CellResult> results;
+  results.reserve(runs.size());
   for (CellRun& run : runs) results.push_back(Finished(run, digests, timed_in));
   return results;
 }
