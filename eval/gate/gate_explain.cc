@@ -177,10 +177,10 @@ WorstPlace FindWorst(const GateOutcome& outcome, const GateReference* reference)
   const std::vector<double>& values = outcome.judgement.values;
   double most = 0;
   std::size_t i = 0;
-  const GatePair* pair = nullptr;
+  const GatePair* pair = &outcome.data.begin()->second;  // a gate that was judged has some
   for (const auto& [replicate, of_replicate] : outcome.data) {
     const double excess = Excess(values.at(i++), outcome.gate.bounds);
-    if (pair != nullptr && excess <= most) continue;
+    if (i > 1 && excess <= most) continue;
     most = excess;
     worst.replicate = replicate;
     pair = &of_replicate;

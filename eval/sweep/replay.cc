@@ -263,6 +263,7 @@ Expected<void> WriteNote(const Recorded& recorded, int frame, const ReplayResult
 Expected<std::vector<std::string>> NamesBelow(const fs::path& folder) {
   TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFilesBelow(folder));
   std::vector<std::string> names;
+  names.reserve(files.size());
   for (const fs::path& file : files) names.push_back(file.lexically_relative(folder).string());
   std::sort(names.begin(), names.end());
   return names;

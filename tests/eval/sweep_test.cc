@@ -39,7 +39,7 @@ removed = ["car"]
                     .has_value());
   }
   fs::path Experiment(const std::string& grid, const std::string& frames = "every = 2") {
-    const fs::path file = folder_ / "e.toml";
+    fs::path file = folder_ / "e.toml";
     EXPECT_TRUE(WriteFile(file, fmt::format(R"(name = "e"
 question = "Does it run?"
 metrics = ["table_preservation_behind_other", "movers_completion"]
@@ -246,7 +246,7 @@ TEST_F(Sweep, AnyFrameCanBeMadeAgain) {
       "out");
   for (const auto& [id, cell] : swept.at("cells").items()) {
     for (const int frame : {3, 6}) {  // evaluated; not evaluated
-      const auto replay = [&](const std::string& out) {
+      const auto replay = [&, id = id](const std::string& out) {
         const auto ran =
             RunTsdfpp({"replay", folder_ / "out", "--cell", id.substr(0, 12), "--frame",
                        std::to_string(frame), "--out", folder_ / out, "--json"},
