@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <vector>
 
 #include "core/types.h"
 
@@ -23,17 +24,25 @@ class Depths {
  public:
   void Add(float z) { values_[count_++] = z; }
   bool empty() const { return count_ == 0; }
-  // Of an even number the upper one. There must be one.
-  float Median() {
-    const auto middle = values_.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
-    std::nth_element(values_.begin(), middle,
-                     values_.begin() + static_cast<std::ptrdiff_t>(count_));
-    return *middle;
+  // Of an even number the upper one. There must be one. The numbers are few: to count for each how
+  // many are less takes no branches.
+  float Median() const {
+    const int middle = count_ / 2;
+    for (int i = 0; i < count_; ++i) {
+      int less = 0;
+      int no_more = 0;
+      for (int k = 0; k < count_; ++k) {
+        less += values_[k] < values_[i] ? 1 : 0;
+        no_more += values_[k] <= values_[i] ? 1 : 0;
+      }
+      if (less <= middle && middle < no_more) return values_[i];
+    }
+    std::abort();  // NaN, which is no valid depth
   }
 
  private:
-  std::array<float, std::size_t{kSide} * kSide> values_{};
-  std::size_t count_ = 0;
+  std::array<float, std::size_t{kSide} * kSide> values_;
+  int count_ = 0;
 };
 
 // What a pixel says of the camera.
@@ -54,6 +63,8 @@ Judged Judge(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_
   if (id == kNoInstance || !IsValidDepth(z)) return {};
   Depths own;
   Depths others;
+  float nearest = z;
+  float farthest = z;
   for (int y = std::max(0, v - kBleedingReach_px);
        y <= std::min(depth.rows - 1, v + kBleedingReach_px); ++y) {
     const auto* depths = depth.ptr<float>(y);
@@ -62,9 +73,12 @@ Judged Judge(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_
          x <= std::min(depth.cols - 1, u + kBleedingReach_px); ++x) {
       if ((y == v && x == u) || labels[x] == kNoInstance || !IsValidDepth(depths[x])) continue;
       (labels[x] == id ? own : others).Add(depths[x]);
+      nearest = std::min(nearest, depths[x]);
+      farthest = std::max(farthest, depths[x]);
     }
   }
-  if (own.empty() || others.empty()) return {};
+  // Most outlines are no steps; no two medians of these depths are more apart than all of them.
+  if (own.empty() || others.empty() || !(farthest - nearest > step_m)) return {};
   const float of_own = own.Median();
   const float of_others = others.Median();
   const float from_own = std::abs(z - of_own);
@@ -75,25 +89,40 @@ Judged Judge(const cv::Mat& depth, const cv::Mat& ids, int v, int u, float step_
   return {std::abs(z - of_others) < from_own ? Verdict::kBleeds : Verdict::kHolds, is_stray};
 }
 
-// 255 at all pixels whose windows have more than one id, and at some beside them; most have one.
-cv::Mat NearOutlines(const cv::Mat& ids) {
-  cv::Mat near(ids.size(), CV_8UC1, cv::Scalar(0));
-  for (int v = 0; v < ids.rows; ++v) {
-    const auto* row = ids.ptr<InstanceId>(v);
-    const auto* below = ids.ptr<InstanceId>(std::min(v + 1, ids.rows - 1));
-    for (int u = 0; u < ids.cols; ++u) {
-      const bool differs = row[u] != below[u] || (u + 1 < ids.cols && row[u] != row[u + 1]);
-      if (!differs) continue;
-      const int left = std::max(0, u - kBleedingReach_px);
-      const int right = std::min(ids.cols - 1, u + kBleedingReach_px);
-      for (int y = std::max(0, v - kBleedingReach_px);
-           y <= std::min(ids.rows - 1, v + kBleedingReach_px); ++y) {
-        auto* to = near.ptr<std::uint8_t>(y);
-        std::fill(to + left, to + right + 1, std::uint8_t{255});
+template <typename Rows>
+void ForRows(int rows, const Rows& of) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, rows, kRowsPerTask), of, tbb::simple_partitioner());
+}
+
+// 255 where in this row, within kBleedingReach_px columns, a pixel has another id than the one on
+// its right or the one below it.
+cv::Mat BesideOutlines(const cv::Mat& ids) {
+  cv::Mat beside(ids.size(), CV_8UC1, cv::Scalar(0));
+  ForRows(ids.rows, [&](const tbb::blocked_range<int>& range) {
+    for (int v = range.begin(); v != range.end(); ++v) {
+      const auto* row = ids.ptr<InstanceId>(v);
+      const auto* below = ids.ptr<InstanceId>(std::min(v + 1, ids.rows - 1));
+      auto* to = beside.ptr<std::uint8_t>(v);
+      for (int u = 0; u < ids.cols; ++u) {
+        const bool differs = row[u] != below[u] || (u + 1 < ids.cols && row[u] != row[u + 1]);
+        if (!differs) continue;
+        std::fill(to + std::max(0, u - kBleedingReach_px),
+                  to + std::min(ids.cols, u + kBleedingReach_px + 1), std::uint8_t{255});
       }
     }
+  });
+  return beside;
+}
+
+// Not 0 at all pixels of row `v` whose windows have more than one id, and at some beside them; most
+// have one.
+void NearOutlines(const cv::Mat& beside, int v, std::vector<std::uint8_t>& near) {
+  near.assign(static_cast<std::size_t>(beside.cols), 0);
+  for (int y = std::max(0, v - kBleedingReach_px);
+       y <= std::min(beside.rows - 1, v + kBleedingReach_px); ++y) {
+    const auto* row = beside.ptr<std::uint8_t>(y);
+    for (std::size_t u = 0; u < near.size(); ++u) near[u] |= row[u];
   }
-  return near;
 }
 
 }  // namespace
@@ -118,29 +147,27 @@ std::string_view BleedingPixelsName(BleedingPixels bleeding) {
 }
 
 cv::Mat WithoutBleeding(const cv::Mat& depth, const cv::Mat& ids, float step_m) {
-  const cv::Mat near = NearOutlines(ids);
+  const cv::Mat beside = BesideOutlines(ids);
   cv::Mat bleeds(ids.size(), CV_8UC1, cv::Scalar(0));
   std::atomic<std::int64_t> beside_steps = 0;
   std::atomic<std::int64_t> bleeding = 0;
-  tbb::parallel_for(
-      tbb::blocked_range<int>(0, ids.rows, kRowsPerTask),
-      [&](const tbb::blocked_range<int>& range) {
-        std::array<std::int64_t, 3> counts{};
-        for (int v = range.begin(); v != range.end(); ++v) {
-          const auto* is_near = near.ptr<std::uint8_t>(v);
-          auto* row = bleeds.ptr<std::uint8_t>(v);
-          for (int u = 0; u < ids.cols; ++u) {
-            if (is_near[u] == 0) continue;
-            const Judged judged = Judge(depth, ids, v, u, step_m);
-            ++counts[static_cast<std::size_t>(judged.verdict)];
-            if (judged.verdict == Verdict::kBleeds || judged.is_stray) row[u] = 255;
-          }
-        }
-        const std::int64_t bleed = counts[static_cast<std::size_t>(Verdict::kBleeds)];
-        beside_steps += bleed + counts[static_cast<std::size_t>(Verdict::kHolds)];
-        bleeding += bleed;
-      },
-      tbb::simple_partitioner());
+  ForRows(ids.rows, [&](const tbb::blocked_range<int>& range) {
+    std::array<std::int64_t, 3> counts{};
+    std::vector<std::uint8_t> is_near;
+    for (int v = range.begin(); v != range.end(); ++v) {
+      NearOutlines(beside, v, is_near);
+      auto* row = bleeds.ptr<std::uint8_t>(v);
+      for (int u = 0; u < ids.cols; ++u) {
+        if (is_near[static_cast<std::size_t>(u)] == 0) continue;
+        const Judged judged = Judge(depth, ids, v, u, step_m);
+        ++counts[static_cast<std::size_t>(judged.verdict)];
+        if (judged.verdict == Verdict::kBleeds || judged.is_stray) row[u] = 255;
+      }
+    }
+    const std::int64_t bleed = counts[static_cast<std::size_t>(Verdict::kBleeds)];
+    beside_steps += bleed + counts[static_cast<std::size_t>(Verdict::kHolds)];
+    bleeding += bleed;
+  });
   const auto least = kLeastBleedingShare * static_cast<double>(beside_steps);
   if (bleeding == 0 || static_cast<double>(bleeding) < least) return ids;
   cv::Mat rest = ids.clone();
