@@ -12,15 +12,16 @@ struct WholeBenchOptions {
   std::string scene = "scenes/toycar3.toml";
   // Images that many times the scene's size.
   std::vector<double> scales{1, 2.0 / 3};
-  // Some of: given, depth, full, beside.
-  std::vector<std::string> settings{"given", "depth", "full", "beside"};
-  int every = 5;     // of `beside`: the network sees every n-th frame
-  int first = 20;    // frames of the sequence that are left out
-  int frames = 200;  // mapped
-  int warm_up = 20;  // of these, the first ones, not counted
-  int runs = 3;      // of Open3D and all settings, in turn; figures are medians over them
-  int threads = 2;   // of the mapper and of Open3D; the network's own of `beside` is one more
-  std::string out;   // where given, the table is written into this folder as well
+  // Some of: given, depth, full, beside, live.
+  std::vector<std::string> settings{"given", "depth", "full", "beside", "live"};
+  std::vector<double> rates{15, 30};  // of `live`, frames a second, by scale
+  int every = 5;                      // of `beside` and `live`: the network sees every n-th frame
+  int first = 20;                     // frames of the sequence that are left out
+  int frames = 200;                   // mapped
+  int warm_up = 20;                   // of these, the first ones, not counted
+  int runs = 3;     // of Open3D and all settings, in turn; figures are medians over them
+  int threads = 2;  // of the mapper and of Open3D; the network's own of the last two is one more
+  std::string out;  // where given, the table is written into this folder as well
 };
 
 // Prints milliseconds a frame of the pipeline (`tsdf++/anchored`, objects tracked by `track`), by
@@ -31,9 +32,12 @@ struct WholeBenchOptions {
 // colours two voxels beside the surface, Open3D the whole band. Settings: `given` tracks the true
 // masks' objects, `depth` segments of depth (`--track moving`), `full` what our own network finds
 // in each frame, joined with depth, `beside` the same with the network on a thread of its own at
-// every n-th frame, known as many frames later. `out` gets whole.csv. Errors: those of the scene,
-// the network and the pipeline; kUsage for a setting that there is not, or too few frames;
-// kEnvironment where `out` cannot be written.
+// every n-th frame, known as many frames later. These frames come as fast as they are mapped.
+// Those of `live`, which is `beside` with a network that gives way (NetworkConfig), come at their
+// rate, as from a camera: its milliseconds of all steps begin when a frame's time has come, though
+// the one before may not be done. `out` gets whole.csv. Errors: those of the scene, the network and
+// the pipeline; kUsage for a setting that there is not, too few frames, or not as many rates as
+// scales; kEnvironment where `out` cannot be written.
 Expected<void> RunWholeBench(const WholeBenchOptions& options);
 
 }  // namespace tsdfpp

@@ -29,8 +29,8 @@ Expected<std::shared_ptr<InstanceFinder>> FinderOf(const SegmentationOptions& op
   return loaded;
 }
 
-constexpr std::array kOfFull{"latency", "join_overlap", "join_iou", "mask_score",
-                             "unknown_objects"};
+constexpr std::array kOfFull{"latency",  "gives_way",  "join_overlap",
+                             "join_iou", "mask_score", "unknown_objects"};
 
 bool IsOfFull(std::string_view key) {
   return std::find(kOfFull.begin(), kOfFull.end(), key) != kOfFull.end();

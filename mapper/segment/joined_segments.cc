@@ -1,11 +1,14 @@
 #include "mapper/segment/joined_segments.h"
 
+#include <sched.h>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <numeric>
+#include <opencv2/core/utility.hpp>
 
 #include "mapper/segment/pixel_rays.h"
 
@@ -78,6 +81,18 @@ std::size_t InstanceOf(const Overlaps& overlaps, std::span<const std::int64_t> a
     }
   }
   return 0;
+}
+
+// On one thread, this one, which is not needed again.
+Expected<std::vector<Instance>> FindGivingWay(InstanceFinder& finder, const Frame& frame) {
+  // Linux has a policy for each thread; that of 0 is the one that calls. Such a one has a core
+  // where nobody else wants it, and others that wake have it at once.
+  const sched_param none{};
+  sched_setscheduler(0, SCHED_IDLE, &none);
+  // A loop of OpenCV's within another is run by the thread that is in it.
+  std::optional<Expected<std::vector<Instance>>> found;
+  cv::parallel_for_(cv::Range(0, 1), [&](const cv::Range&) { found = finder.Find(frame); });
+  return *std::move(found);
 }
 
 }  // namespace
@@ -237,8 +252,9 @@ JoinedSegments::Search JoinedSegments::Begin(const Frame& frame) const {
   copy.colour = frame.colour.clone();
   Search search;
   search.frame = frames_;
-  search.found = std::async(std::launch::async, [finder = finder_, copy = std::move(copy)] {
-    return finder->Find(copy);
+  search.found = std::async(std::launch::async, [finder = finder_, copy = std::move(copy),
+                                                 gives_way = config_.gives_way] {
+    return gives_way ? FindGivingWay(*finder, copy) : finder->Find(copy);
   });
   return search;
 }

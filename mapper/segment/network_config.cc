@@ -50,6 +50,10 @@ Expected<void> NetworkConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_overlap", join_overlap, 0.5, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_iou", join_iou, 0.5, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_score", mask_score, 0, 1));
+  if (gives_way && latency == 0) {
+    return UsageError(
+        "network setting 'gives_way' is true, but 'latency' is 0: the frames wait for the network");
+  }
   if (classes.size() > kMostClasses) {
     return UsageError("network setting 'classes' has {} names, expected {} at most", classes.size(),
                       kMostClasses);
@@ -75,6 +79,7 @@ Expected<NetworkConfig> NetworkConfig::FromToml(const toml::table& table,
       .Get("mask_share", config.mask_share)
       .Get("every", config.every)
       .Get("latency", config.latency)
+      .Get("gives_way", config.gives_way)
       .Get("join_overlap", config.join_overlap)
       .Get("join_iou", config.join_iou)
       .Get("mask_score", config.mask_score)
@@ -102,6 +107,7 @@ toml::table NetworkConfig::ToToml() const {
                      {"mask_share", mask_share},
                      {"every", every},
                      {"latency", latency},
+                     {"gives_way", gives_way},
                      {"join_overlap", join_overlap},
                      {"join_iou", join_iou},
                      {"mask_score", mask_score},

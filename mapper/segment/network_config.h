@@ -35,9 +35,11 @@ struct NetworkConfig {
   // Of kFull (mapper/segment/joined_segments.h):
   int latency = 0;  // frames after which instances are known, while the network runs beside them;
                     // 0: the frame waits for it; at most `every`
-  double join_overlap = 0.8;     // tau_overlap of paper III-B
-  double join_iou = 0.5;         // 1: never by this
-  double mask_score = 0.7;       // an instance that is less sure needs segments
+  bool gives_way = false;     // with latency: the network has one thread, where nobody else wants a
+                              // core; false: all cores, as urgently as the frames
+  double join_overlap = 0.8;  // tau_overlap of paper III-B
+  double join_iou = 0.5;      // 1: never by this
+  double mask_score = 0.7;    // an instance that is less sure needs segments
   bool unknown_objects = false;  // segments that no instance claims are objects, as in III-B
 
   // Errors: kUsage, naming the field, what was found and what was expected.

@@ -253,15 +253,17 @@ TEST(NetworkConfig, ComesBackFromToml) {
   config.mask_share = 0.4;
   config.every = 5;
   config.latency = 4;
+  config.gives_way = true;
   config.join_overlap = 0.7;
   config.join_iou = 0.6;
   config.mask_score = 0.9;
   config.unknown_objects = true;
   EXPECT_EQ(NetworkConfig::FromToml(config.ToToml(), "x").value(), config);
-  const auto refused = [](NetworkConfig wrong) { return !wrong.Validate().has_value(); };
+  const auto refused = [](const NetworkConfig& wrong) { return !wrong.Validate().has_value(); };
   EXPECT_TRUE(refused({.width = -1}));
   EXPECT_TRUE(refused({.every = 0}));
   EXPECT_TRUE(refused({.every = 2, .latency = 3}));
+  EXPECT_TRUE(refused({.every = 2, .gives_way = true}));
   EXPECT_TRUE(refused({.join_overlap = 0.4}));
   EXPECT_TRUE(refused({.join_iou = 0.4}));
   EXPECT_TRUE(refused({.mask_score = 1.1}));

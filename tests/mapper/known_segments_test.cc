@@ -2,10 +2,15 @@
 // looks, and known with a latency where it runs beside them; against the same step by step.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <opencv2/core/utility.hpp>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -130,6 +135,7 @@ TEST(JoinedSegments, WhatIsFoundBecomesKnownWithItsLatency) {
       NetworkConfig config;
       config.every = every;
       config.latency = latency;
+      config.gives_way = latency > 0 && every == 4;
       const auto finder = std::make_shared<MovingBoxFinder>();
       auto segmenter = std::make_unique<JoinedSegments>(finder, config, DepthSegmentsConfig{});
       std::vector<int> asked;
@@ -151,6 +157,55 @@ TEST(JoinedSegments, WhatIsFoundBecomesKnownWithItsLatency) {
       segmenter.reset();  // waits for the last search
       EXPECT_EQ(finder->asked, asked);
     }
+  }
+}
+
+// Which thread looks, by which policy, and on how many it could run OpenCV's loops.
+class WatchingFinder : public InstanceFinder {
+ public:
+  struct Look {
+    std::thread::id thread;
+    int policy = 0;
+    std::set<std::thread::id> helpers;
+  };
+
+  Expected<std::vector<Instance>> Find(const Frame& frame) override {
+    Look look{std::this_thread::get_id(), sched_getscheduler(0), {}};
+    std::mutex mutex;
+    cv::parallel_for_(cv::Range(0, 64), [&](const cv::Range&) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      const std::lock_guard lock(mutex);
+      look.helpers.insert(std::this_thread::get_id());
+    });
+    looks.push_back(std::move(look));
+    return std::vector<Instance>{BoxOf({4 + frame.index, 10, 20, 20}, "book", 1)};
+  }
+  std::vector<Look> looks;
+};
+
+TEST(JoinedSegments, ANetworkThatGivesWayHasOneLessUrgentThread) {
+  const int policy = sched_getscheduler(0);
+  for (const bool gives_way : {false, true}) {
+    NetworkConfig config;
+    config.every = 2;
+    config.latency = 2;
+    config.gives_way = gives_way;
+    const auto finder = std::make_shared<WatchingFinder>();
+    auto segmenter = std::make_unique<JoinedSegments>(finder, config, DepthSegmentsConfig{});
+    for (int i = 0; i < 5; ++i) ASSERT_TRUE(segmenter->Segment(BoxFrame(i)).has_value());
+    segmenter.reset();  // waits for the last search
+    ASSERT_EQ(finder->looks.size(), 3U);
+    // Of the first image something must be known at once.
+    EXPECT_EQ(finder->looks[0].thread, std::this_thread::get_id());
+    for (const std::size_t i : {1U, 2U}) {
+      const WatchingFinder::Look& look = finder->looks[i];
+      EXPECT_NE(look.thread, std::this_thread::get_id());
+      EXPECT_EQ(look.policy, gives_way ? SCHED_IDLE : policy);
+      if (gives_way) {
+        EXPECT_EQ(look.helpers, std::set{look.thread});
+      }
+    }
+    EXPECT_EQ(sched_getscheduler(0), policy);
   }
 }
 
