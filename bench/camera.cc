@@ -6,7 +6,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <utility>
 
+#include "bench/camera_clock.h"
 #include "bench/figure_runs.h"
 #include "core/toml_reader.h"
 #include "mapper/pipeline.h"
@@ -17,6 +19,8 @@
 
 namespace tsdfpp {
 namespace {
+
+namespace fs = std::filesystem;
 
 // Some 2 cm and 1 degree along and about all axes together: of each frame alone, and of a walk at
 // its 256th frame.
@@ -160,23 +164,31 @@ Expected<void> RunScene(const CameraBenchOptions& options, const CameraPlan& pla
   return {};
 }
 
-Expected<void> RunRecording(const CameraBenchOptions& options, const CameraPlan& plan,
-                            FigureTable& table) {
-  TSDFPP_ASSIGN(const auto source, OpenSequence(options.recording, {}));
-  const SequenceInfo& info = source->info();
+// What `refine` found from the poses as given, and `track`.
+Expected<std::vector<FoundCamera>> RunRecording(const CameraBenchOptions& options,
+                                                const CameraPlan& plan, FrameSource& source,
+                                                FigureTable& table) {
+  const SequenceInfo& info = source.info();
   const int last = std::min(options.until, info.first_index + info.frame_count - 1);
+  std::vector<FoundCamera> found;
   for (const double voxel_m : options.voxels_m) {
     const Stretch stretch{info.name, "real", info, 1, voxel_m, Segmentation::kNone};
     std::vector<CameraRun> runs = RunsOf(stretch, plan);
     Trajectory truth;
     for (int index = info.first_index; index <= last; ++index) {
-      TSDFPP_ASSIGN(const Frame frame, source->Read(index));
+      TSDFPP_ASSIGN(const Frame frame, source.Read(index));
       truth[index] = frame.T_WC;
       TSDFPP_RETURN_IF_ERROR(Feed(stretch, frame, runs));
     }
     Judge(stretch, runs, truth, table);
+    for (const CameraRun& run : runs) {
+      if (run.given != Given::kTrue) continue;
+      const char* source_name = run.source == CameraSource::kTrack ? "track" : "refine";
+      found.push_back({fmt::format("`--camera {}`, voxels of {:g} mm", source_name, 1e3 * voxel_m),
+                       run.pipeline->camera_log().T_WC});
+    }
   }
-  return {};
+  return found;
 }
 
 }  // namespace
@@ -200,7 +212,12 @@ Expected<void> RunCameraBench(const CameraBenchOptions& options) {
     TSDFPP_RETURN_IF_ERROR(RunScene(options, plan, file, table));
   }
   if (!options.recording.empty()) {
-    TSDFPP_RETURN_IF_ERROR(RunRecording(options, plan, table));
+    TSDFPP_ASSIGN(const auto source, OpenSequence(options.recording, {}));
+    TSDFPP_ASSIGN(std::vector<FoundCamera> found, RunRecording(options, plan, *source, table));
+    if (fs::exists(fs::path(options.recording) / "groundtruth.txt")) {
+      TSDFPP_RETURN_IF_ERROR(
+          JudgeClock(options.recording, *source, options.until, std::move(found), options.out));
+    }
   }
   return table.Write(options.out, "camera");
 }

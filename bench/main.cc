@@ -165,6 +165,7 @@ void AddTrack(CLI::App& app, Chosen& chosen) {
                    "that bleed: 'track tsdf++ keep'")
       ->delimiter(',')
       ->capture_default_str();
+  AddCount(command, "--seeds", options->seeds, "Draws of the noise", 1, 1000);
   command->add_option("--track-config", options->settings, "Settings of track and known, TOML");
   AddCount(command, "--until", options->until, "The last frame", 1, 100000);
   command->callback([=, &chosen] { chosen = [=] { return RunTrackBench(*options); }; });
@@ -226,6 +227,10 @@ void AddWhole(CLI::App& app, Chosen& chosen) {
   CLI::App* command = app.add_subcommand(
       "whole", "What a frame costs the whole system, from segmentation to fusion, beside Open3D");
   command->add_option("--scene", options->scene, "Scene file")->capture_default_str();
+  command->add_option("--rates", options->rates, "Of live, frames a second, one for each scale")
+      ->delimiter(',')
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
   command->add_option("--scales", options->scales, "Images so many times the scene's size")
       ->delimiter(',')
       ->check(CLI::Range(0.05, 4.0))

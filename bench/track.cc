@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "bench/figure_runs.h"
 #include "bench/track_runs.h"
@@ -29,6 +32,7 @@ constexpr double kFixedTurn = 0.01;
 // Between these the squared errors of motions are called as large as the covariance says.
 constexpr double kLeastNees = 0.5;
 constexpr double kMostNees = 2;
+constexpr const char* kNoise = "noise";  // the depth that is drawn
 
 struct RunPlan {
   std::string name;  // as given
@@ -63,10 +67,11 @@ struct Plan {
   std::vector<RunPlan> runs;
   SdfTrackConfig settings;
   int until = 0;
+  int seeds = 1;
 };
 
 Expected<Plan> PlanOf(const TrackBenchOptions& options) {
-  Plan plan{{}, options.depths, {}, {}, options.until};
+  Plan plan{{}, options.depths, {}, {}, options.until, options.seeds};
   for (const std::string& name : options.runs) {
     TSDFPP_ASSIGN(RunPlan run, PlanOf(name));
     plan.runs.push_back(std::move(run));
@@ -94,6 +99,7 @@ Expected<Plan> PlanOf(const TrackBenchOptions& options) {
 // What one depth is mapped by: the runs, and what is needed to judge them.
 struct Stage {
   std::string depth;
+  std::uint64_t seed = 0;  // of the noise
   std::vector<std::unique_ptr<TrackRun>> runs{};
   std::map<InstanceId, std::set<int>> shown{};
   std::map<InstanceId, std::vector<double>> shift_shares{};
@@ -103,6 +109,7 @@ struct Stage {
 struct Row {
   std::string scene;
   std::string depth;
+  std::uint64_t seed = 0;
   std::string run;
   std::string object;
   TrackScores scores{};
@@ -143,7 +150,8 @@ std::vector<Row> Judge(const std::string& scene, const Plan& plan, const Stage& 
                            SomePoints(model.mesh_O)};
       const auto motions = run.log().motions().find(id);
       if (motions != run.log().motions().end()) object.motions = motions->second;
-      Row row{scene, stage.depth, plan.runs[i].name, model.info.name, ScoreTracked(object)};
+      Row row{scene,           stage.depth,         stage.seed, plan.runs[i].name,
+              model.info.name, ScoreTracked(object)};
       if (row.scores.moved_m < kLeastMoved_m) continue;
       row.span = run.log().objects().at(id);
       row.shown = stage.shown.at(id).size();
@@ -165,8 +173,8 @@ Expected<std::vector<Row>> RunScene(const fs::path& file, const Plan& plan) {
   const double voxel_m = MapConfig{}.voxel_m;
   const KnownModels known = KnownModelsOf(models, voxel_m);
   std::vector<Stage> stages;
-  for (const std::string& depth : plan.depths) {
-    Stage& stage = stages.emplace_back(Stage{depth});
+  const auto add_stage = [&](const std::string& depth, std::uint64_t seed) {
+    Stage& stage = stages.emplace_back(Stage{depth, seed});
     for (const RunPlan& run : plan.runs) {
       stage.runs.push_back(run.is_known ? MakeKnownRun(known, voxel_m, plan.settings)
                                         : MakeMapRun(info.objects, {.method = run.method,
@@ -175,6 +183,10 @@ Expected<std::vector<Row>> RunScene(const fs::path& file, const Plan& plan) {
                                                                     .tracked = TrackChoice::kAll,
                                                                     .track = plan.settings}));
     }
+  };
+  for (const std::string& depth : plan.depths) {
+    const int draws = depth == kNoise ? plan.seeds : 1;
+    for (int i = 0; i < draws; ++i) add_stage(depth, scene.seed + static_cast<std::uint64_t>(i));
   }
   std::map<InstanceId, Trajectory> truth;
   const int last = std::min(plan.until, info.first_index + info.frame_count - 1);
@@ -183,8 +195,8 @@ Expected<std::vector<Row>> RunScene(const fs::path& file, const Plan& plan) {
     for (const auto& [id, T_WO] : frame.T_WO) truth[id][index] = T_WO;
     for (Stage& stage : stages) {
       Frame sensed = frame;
-      if (stage.depth == "noise") {
-        TSDFPP_ASSIGN(const SensedTruth ignored, ApplySensor(noisy, scene.seed, info, sensed));
+      if (stage.depth == kNoise) {
+        TSDFPP_ASSIGN(const SensedTruth ignored, ApplySensor(noisy, stage.seed, info, sensed));
       }
       TSDFPP_RETURN_IF_ERROR(Feed(sensed, known, plan, stage));
     }
@@ -201,16 +213,36 @@ std::string Scaled(const Measured& value, double factor, int digits) {
 }
 
 Expected<void> WriteObjects(const std::vector<Row>& rows, const fs::path& out) {
-  FigureTable table(
-      {"scene",           "depth",          "run",     "object",         "moved cm",
-       "ATE mm",          "farthest mm",    "end mm",  "rotation deg",   "Co-Fusion ATE mm",
-       "RPE mm",          "RPE deg",        "ADD mm",  "ADD-S mm",       "within 5 mm",
-       "within 2 cm",     "shown",          "tracked", "stayed",         "frozen",
-       "known of shifts", "known of turns", "NEES",    "free directions"});
+  FigureTable table({"scene",
+                     "depth",
+                     "seed",
+                     "run",
+                     "object",
+                     "moved cm",
+                     "ATE mm",
+                     "farthest mm",
+                     "end mm",
+                     "rotation deg",
+                     "Co-Fusion ATE mm",
+                     "RPE mm",
+                     "RPE deg",
+                     "ADD mm",
+                     "ADD-S mm",
+                     "within 5 mm",
+                     "within 2 cm",
+                     "shown",
+                     "tracked",
+                     "stayed",
+                     "frozen",
+                     "known of shifts",
+                     "known of turns",
+                     "NEES",
+                     "free directions"});
   for (const Row& row : rows) {
     const TrackScores& s = row.scores;
     table.Add({row.scene,
                row.depth,
+               std::to_string(row.seed),
                row.run,
                row.object,
                Cell(100 * s.moved_m, 1),
@@ -237,6 +269,32 @@ Expected<void> WriteObjects(const std::vector<Row>& rows, const fs::path& out) {
   return table.Write(out, "objects");
 }
 
+// The median over the seeds of the medians over their objects, with the least and the largest of
+// these where they are several; and the worst of all objects.
+struct SeedCells {
+  std::size_t objects = 0;  // of one seed, the most
+  std::string median;
+  std::string worst;
+};
+SeedCells CellsOf(const std::map<std::uint64_t, std::vector<double>>& by_seed, int digits) {
+  SeedCells cells;
+  std::vector<double> medians;
+  double worst = 0;
+  for (const auto& [seed, values] : by_seed) {
+    cells.objects = std::max(cells.objects, values.size());
+    medians.push_back(MedianOf(values));
+    worst = std::max(worst, *std::ranges::max_element(values));
+  }
+  if (medians.empty()) return cells;
+  cells.median = Cell(MedianOf(medians), digits);
+  cells.worst = Cell(worst, digits);
+  if (medians.size() > 1) {
+    cells.median += fmt::format(" [{} to {}]", Cell(*std::ranges::min_element(medians), digits),
+                                Cell(*std::ranges::max_element(medians), digits));
+  }
+  return cells;
+}
+
 // A row a scene and depth: of each run the median and the largest over the objects.
 template <typename ValueOf>
 Expected<void> WriteByScene(const std::vector<Row>& rows, const Plan& plan, const fs::path& out,
@@ -255,14 +313,15 @@ Expected<void> WriteByScene(const std::vector<Row>& rows, const Plan& plan, cons
   for (const auto& [scene, depth] : keys) {
     std::vector<std::string> cells{scene, depth, ""};
     for (const RunPlan& run : plan.runs) {
-      std::vector<double> values;
+      std::map<std::uint64_t, std::vector<double>> by_seed;
       for (const Row& row : rows) {
         if (row.scene != scene || row.depth != depth || row.run != run.name) continue;
-        if (const std::optional<double> value = value_of(row)) values.push_back(*value);
+        if (const std::optional<double> value = value_of(row)) by_seed[row.seed].push_back(*value);
       }
-      cells[2] = std::to_string(values.size());
-      cells.push_back(values.empty() ? "" : Cell(MedianOf(values), digits));
-      cells.push_back(values.empty() ? "" : Cell(*std::ranges::max_element(values), digits));
+      SeedCells of_run = CellsOf(by_seed, digits);
+      cells[2] = std::to_string(of_run.objects);
+      cells.push_back(std::move(of_run.median));
+      cells.push_back(std::move(of_run.worst));
     }
     table.Add(std::move(cells));
   }
@@ -270,12 +329,15 @@ Expected<void> WriteByScene(const std::vector<Row>& rows, const Plan& plan, cons
 }
 
 Expected<void> WriteTimes(const std::vector<Row>& rows, const fs::path& out) {
-  FigureTable table({"scene", "depth", "run", "ms an object and frame"});
+  FigureTable table({"scene", "depth", "seed", "run", "ms an object and frame"});
   const Row* before = nullptr;  // rows of a run follow each other
   for (const Row& row : rows) {
     const bool is_same = before != nullptr && before->scene == row.scene &&
-                         before->depth == row.depth && before->run == row.run;
-    if (!is_same) table.Add({row.scene, row.depth, row.run, Cell(row.ms, 2)});
+                         before->depth == row.depth && before->seed == row.seed &&
+                         before->run == row.run;
+    if (!is_same) {
+      table.Add({row.scene, row.depth, std::to_string(row.seed), row.run, Cell(row.ms, 2)});
+    }
     before = &row;
   }
   return table.Write(out, "times");
@@ -325,9 +387,9 @@ Expected<void> RunTrackBench(const TrackBenchOptions& options) {
   for (const fs::path& file : plan.scenes) {
     TSDFPP_ASSIGN(const std::vector<Row> of_scene, RunScene(file, plan));
     for (const Row& row : of_scene) {
-      std::printf("%s, %s, %s, %s: ATE %s mm, %s deg\n", row.scene.c_str(), row.depth.c_str(),
-                  row.run.c_str(), row.object.c_str(),
-                  Scaled(row.scores.trajectory.ate_rmse_m, 1e3, 2).c_str(),
+      std::printf("%s, %s, seed %s, %s, %s: ATE %s mm, %s deg\n", row.scene.c_str(),
+                  row.depth.c_str(), std::to_string(row.seed).c_str(), row.run.c_str(),
+                  row.object.c_str(), Scaled(row.scores.trajectory.ate_rmse_m, 1e3, 2).c_str(),
                   Scaled(row.scores.trajectory.rotation_rmse_deg, 1, 2).c_str());
       rows.push_back(row);
     }

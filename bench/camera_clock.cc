@@ -1,0 +1,170 @@
+#include "bench/camera_clock.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "bench/figure_runs.h"
+#include "bench/median.h"
+#include "bench/open3d_icp.h"
+#include "mapper/pipeline.h"
+#include "mapper/rays/ray_cast.h"
+#include "sequence/text_lines.h"
+
+namespace tsdfpp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kSteps = 16;  // to either side
+constexpr double kStep_s = 0.005;
+constexpr int kPixelStep = 4;  // of rows and columns whose depth is compared with a map's
+
+// The stamp of the first frame, whose time is 0: that of a depth image which has its very pose.
+Expected<double> StampOf(const Frame& first, const fs::path& depth_list, const TimedPoses& poses) {
+  TSDFPP_ASSIGN(const std::vector<TextLine> lines, ReadTextLines(depth_list));
+  for (const TextLine& line : lines) {
+    const auto stamp_s = ParseNumber(line.words.front());
+    const auto pose = stamp_s ? PoseAt(poses, *stamp_s) : std::nullopt;
+    if (pose && pose->matrix() == first.T_WC.matrix()) return *stamp_s;
+  }
+  return DataError("{}: no image at whose time the first frame's pose is", depth_list.string());
+}
+
+// Millimetres, the median over every fourth pixel of every fourth row that has depth and a surface.
+Expected<double> DepthBesideMap(const std::vector<Frame>& frames, const Trajectory& T_WC) {
+  PipelineConfig config;
+  config.segmentation = Segmentation::kNone;
+  Pipeline pipeline(config, {});
+  std::vector<Frame> posed;
+  for (const Frame& frame : frames) {
+    const auto pose = T_WC.find(frame.index);
+    if (pose == T_WC.end()) continue;
+    posed.push_back(frame);
+    posed.back().T_WC = pose->second;
+    if (auto mapped = pipeline.Process(posed.back()); !mapped) {
+      return tl::unexpected(std::move(mapped.error()));
+    }
+  }
+  std::vector<double> errors_mm;
+  for (const Frame& frame : posed) {
+    const cv::Mat depth =
+        pipeline.map().CastRays(frame.intrinsics, frame.T_WC, {.colour = false}).front().depth;
+    for (int v = 0; v < depth.rows; v += kPixelStep) {
+      for (int u = 0; u < depth.cols; u += kPixelStep) {
+        const float seen = frame.depth.at<float>(v, u);
+        const float cast = depth.at<float>(v, u);
+        if (IsValidDepth(seen) && cast > 0)
+          errors_mm.push_back(1e3 * std::abs(double{seen} - cast));
+      }
+    }
+  }
+  return errors_mm.empty() ? 0 : Median(std::move(errors_mm));
+}
+
+Trajectory TimedAt(double offset_s, const std::map<int, double>& times_s, const TimedPoses& poses) {
+  Trajectory T_WC;
+  for (const auto& [frame, time_s] : times_s) {
+    if (const auto pose = PoseAt(poses, time_s + offset_s)) T_WC[frame] = *pose;
+  }
+  return T_WC;
+}
+
+}  // namespace
+
+MotionErrors MotionErrorsBetween(const Trajectory& T_WC, const Trajectory& T_WC_other) {
+  MotionErrors errors;
+  const PosePairs both = PairByFrame(T_WC, T_WC_other);
+  double turns = 0;
+  double shifts = 0;
+  for (std::size_t i = 0; i + 1 < both.size(); ++i) {
+    const Pose here = both.estimate[i].inverse() * both.estimate[i + 1];
+    const Pose there = both.truth[i].inverse() * both.truth[i + 1];
+    const Pose error = there.inverse() * here;
+    const double turn_rad = RotationAngle_rad(error.linear());
+    turns += turn_rad * turn_rad;
+    shifts += error.translation().squaredNorm();
+    ++errors.pairs;
+  }
+  if (errors.pairs == 0) return errors;
+  const auto pairs = static_cast<double>(errors.pairs);
+  errors.turn_deg = std::sqrt(turns / pairs) * 180 / std::numbers::pi;
+  errors.shift_mm = 1e3 * std::sqrt(shifts / pairs);
+  return errors;
+}
+
+MotionErrors MotionErrorsAt(double offset_s, const Trajectory& T_WC,
+                            const std::map<int, double>& times_s, const TimedPoses& poses) {
+  MotionErrors errors = MotionErrorsBetween(T_WC, TimedAt(offset_s, times_s, poses));
+  errors.offset_s = offset_s;
+  return errors;
+}
+
+MotionErrors AtBestOffset(const Trajectory& T_WC, const std::map<int, double>& times_s,
+                          const TimedPoses& poses) {
+  MotionErrors best = MotionErrorsAt(0, T_WC, times_s, poses);
+  for (int i = -kSteps; i <= kSteps; ++i) {
+    const MotionErrors errors = MotionErrorsAt(i * kStep_s, T_WC, times_s, poses);
+    if (errors.turn_deg < best.turn_deg) best = errors;
+  }
+  return best;
+}
+
+Expected<void> JudgeClock(const std::string& recording, FrameSource& source, int until,
+                          std::vector<FoundCamera> found, const std::string& out) {
+  const fs::path folder = recording;
+  const SequenceInfo& info = source.info();
+  TSDFPP_ASSIGN(const TimedPoses poses, ReadTimedPoses(folder / "groundtruth.txt"));
+  const int last = std::min(until, info.first_index + info.frame_count - 1);
+  std::vector<Frame> frames;
+  std::map<int, double> times_s;
+  Trajectory by_open3d;
+  double stamp_s = 0;
+  for (int index = info.first_index; index <= last; ++index) {
+    TSDFPP_ASSIGN(Frame frame, source.Read(index));
+    if (frames.empty()) {
+      TSDFPP_ASSIGN(stamp_s, StampOf(frame, folder / "depth.txt", poses));
+      by_open3d[index] = frame.T_WC;
+    } else {
+      const Frame& before = frames.back();
+      const Pose T_guess = before.T_WC.inverse() * frame.T_WC;
+      by_open3d[index] = by_open3d.at(before.index) * MotionByOpen3dIcp(before, frame, T_guess);
+    }
+    times_s[index] = stamp_s + frame.time_s;
+    frames.push_back(std::move(frame));
+  }
+  found.push_back({"Open3D's ICP", by_open3d});
+  FigureTable table({"who", "from motion capture: turn deg", "shift mm", "best offset ms",
+                     "at that: turn deg", "shift at that mm", "from Open3D's: turn deg",
+                     "depth beside the map mm"});
+  const auto add = [&](const std::string& who, const Trajectory& T_WC,
+                       std::vector<std::string> beside_capture) -> Expected<void> {
+    TSDFPP_ASSIGN(const double beside_map_mm, DepthBesideMap(frames, T_WC));
+    std::vector<std::string> row{who};
+    row.insert(row.end(), beside_capture.begin(), beside_capture.end());
+    row.push_back(Cell(MotionErrorsBetween(T_WC, by_open3d).turn_deg, 2));
+    row.push_back(Cell(beside_map_mm, 1));
+    table.Add(std::move(row));
+    return {};
+  };
+  const double best_s = AtBestOffset(by_open3d, times_s, poses).offset_s;
+  TSDFPP_RETURN_IF_ERROR(
+      add("motion capture, as stamped", TimedAt(0, times_s, poses), {"-", "-", "-", "-", "-"}));
+  TSDFPP_RETURN_IF_ERROR(add(fmt::format("motion capture at {:+.0f} ms", 1e3 * best_s),
+                             TimedAt(best_s, times_s, poses), {"-", "-", "-", "-", "-"}));
+  for (const auto& [who, T_WC] : found) {
+    const MotionErrors stamped = MotionErrorsAt(0, T_WC, times_s, poses);
+    const MotionErrors best = AtBestOffset(T_WC, times_s, poses);
+    TSDFPP_RETURN_IF_ERROR(
+        add(who, T_WC,
+            {Cell(stamped.turn_deg, 2), Cell(stamped.shift_mm, 1), Cell(1e3 * best.offset_s, 0),
+             Cell(best.turn_deg, 2), Cell(best.shift_mm, 1)}));
+  }
+  return table.Write(out, "clock");
+}
+
+}  // namespace tsdfpp
