@@ -27,6 +27,7 @@ constexpr double kSettled_voxels = 0.02;
 
 SdfTrackConfig OfRoom(SdfTrackConfig config) {
   config.rest_voxels = 0;
+  config.rest_evidence = 0;
   config.settled_voxels = std::max(config.settled_voxels, kSettled_voxels);
   config.huber_voxels = std::max(config.huber_voxels, kHuber_voxels);
   config.max_translation_voxels = std::max(config.max_translation_voxels, kMaxTranslation_voxels);
