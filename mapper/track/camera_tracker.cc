@@ -25,9 +25,10 @@ constexpr int kCoarsePoints = 1500;
 // Over a room's radius, several times an object's.
 constexpr double kSettled_voxels = 0.02;
 
-SdfTrackConfig OfRoom(SdfTrackConfig config) {
+SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   config.rest_voxels = 0;
-  config.rest_evidence = 0;
+  // Where a camera was is no reason to think that it is there still; a given pose is one.
+  if (source == CameraSource::kTrack) config.rest_evidence = 0;
   config.settled_voxels = std::max(config.settled_voxels, kSettled_voxels);
   config.huber_voxels = std::max(config.huber_voxels, kHuber_voxels);
   config.max_translation_voxels = std::max(config.max_translation_voxels, kMaxTranslation_voxels);
@@ -53,7 +54,7 @@ cv::Mat RoomOf(const cv::Mat& segments) {
 
 CameraTracker::CameraTracker(CameraSource source, const SdfTrackConfig& config)
     : source_(source),
-      tracker_(OfRoom(config),
+      tracker_(OfRoom(config, source),
                [this](const MapRepresentation& map, InstanceId) -> std::optional<ObjectModel> {
                  auto model = ModelOf(map, kBackground);
                  if (model) model->T_WL = T_WB_;

@@ -95,21 +95,6 @@ TEST(CameraTracker, TakesAwayWhatIsAnewInEveryFrame) {
   ExpectFound(pipeline, kFrames);
 }
 
-// Objects rest, and are left where they are while nothing speaks against it. Given poses that are a
-// little off are no such places.
-TEST(CameraTracker, LeavesNoGivenPoseAsItIs) {
-  constexpr double kLittle_m = 0.01 * kToyVoxel_m;
-  Pipeline pipeline(ConfigOf(CameraSource::kRefine), Toys());
-  for (int i = 1; i <= kFrames; ++i) {
-    Frame frame = Room(i);
-    frame.T_WC.translation().x() += i % 2 == 0 ? kLittle_m : 0;
-    ASSERT_TRUE(pipeline.Process(frame));
-    const Pose& found = pipeline.camera_log().T_WC.at(i);
-    EXPECT_TRUE(i == 1 || found.matrix() != frame.T_WC.matrix()) << i;
-  }
-  ExpectFound(pipeline, kFrames);
-}
-
 TEST(CameraTracker, FindsTheCameraFromItsFirstPoseAlone) {
   Pipeline pipeline(ConfigOf(CameraSource::kTrack), Toys());
   for (int i = 1; i <= kFrames; ++i) {
