@@ -184,7 +184,7 @@ Expected<std::vector<FoundCamera>> RunRecording(const CameraBenchOptions& option
     for (const CameraRun& run : runs) {
       if (run.given != Given::kTrue) continue;
       const char* source_name = run.source == CameraSource::kTrack ? "track" : "refine";
-      found.push_back({fmt::format("`--camera {}`, voxels of {:g} mm", source_name, 1e3 * voxel_m),
+      found.push_back({fmt::format("`--camera {}` at {:g} mm", source_name, 1e3 * voxel_m),
                        run.pipeline->camera_log().T_WC});
     }
   }
@@ -214,7 +214,8 @@ Expected<void> RunCameraBench(const CameraBenchOptions& options) {
   if (!options.recording.empty()) {
     TSDFPP_ASSIGN(const auto source, OpenSequence(options.recording, {}));
     TSDFPP_ASSIGN(std::vector<FoundCamera> found, RunRecording(options, plan, *source, table));
-    if (fs::exists(fs::path(options.recording) / "groundtruth.txt")) {
+    const fs::path folder = options.recording;
+    if (fs::exists(folder / "groundtruth.txt") && fs::exists(folder / "depth.txt")) {
       TSDFPP_RETURN_IF_ERROR(
           JudgeClock(options.recording, *source, options.until, std::move(found), options.out));
     }

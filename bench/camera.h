@@ -25,11 +25,11 @@ struct CameraBenchOptions {
 // camera.csv, a row a sequence, depth and voxel size: how far the poses of `--camera refine` and
 // `track` are off (RMSE over the frames, millimetres / degrees, nothing aligned), those that drift
 // and jitter as "given to found", and in how many frames the camera was not found. Of the recording
-// clock.csv as well: how far the motions from frame to frame of `track` and of Open3D's ICP are
-// from those of its groundtruth.txt, where it has one, which may have been written by another clock
-// than the images' times: as stamped, and with the offset that fits best (bench/camera_clock.h).
-// Errors: kUsage for wrong settings; those of scenes, renderer and recording; kEnvironment where
-// `out` cannot be written.
+// clock.csv as well: how far the motions from frame to frame of `refine`, `track` and Open3D's ICP
+// are from those of its groundtruth.txt, where it is TUM's and has one, which may have been written
+// by another clock than the images' times: as stamped, and with the offset that fits best
+// (bench/camera_clock.h). Errors: kUsage for wrong settings; those of scenes, renderer and
+// recording; kEnvironment where `out` cannot be written.
 Expected<void> RunCameraBench(const CameraBenchOptions& options);
 
 }  // namespace tsdfpp

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <filesystem>
 #include <numbers>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "bench/open3d_icp.h"
 #include "mapper/pipeline.h"
 #include "mapper/rays/ray_cast.h"
+#include "metrics/relative_error.h"
 #include "sequence/text_lines.h"
 
 namespace tsdfpp {
@@ -58,8 +58,8 @@ Expected<double> DepthBesideMap(const std::vector<Frame>& frames, const Trajecto
       for (int u = 0; u < depth.cols; u += kPixelStep) {
         const float seen = frame.depth.at<float>(v, u);
         const float cast = depth.at<float>(v, u);
-        if (IsValidDepth(seen) && cast > 0)
-          errors_mm.push_back(1e3 * std::abs(double{seen} - cast));
+        if (!IsValidDepth(seen) || cast <= 0) continue;
+        errors_mm.push_back(1e3 * std::abs(double{seen} - cast));
       }
     }
   }
@@ -77,24 +77,11 @@ Trajectory TimedAt(double offset_s, const std::map<int, double>& times_s, const 
 }  // namespace
 
 MotionErrors MotionErrorsBetween(const Trajectory& T_WC, const Trajectory& T_WC_other) {
-  MotionErrors errors;
-  const PosePairs both = PairByFrame(T_WC, T_WC_other);
-  double turns = 0;
-  double shifts = 0;
-  for (std::size_t i = 0; i + 1 < both.size(); ++i) {
-    const Pose here = both.estimate[i].inverse() * both.estimate[i + 1];
-    const Pose there = both.truth[i].inverse() * both.truth[i + 1];
-    const Pose error = there.inverse() * here;
-    const double turn_rad = RotationAngle_rad(error.linear());
-    turns += turn_rad * turn_rad;
-    shifts += error.translation().squaredNorm();
-    ++errors.pairs;
-  }
-  if (errors.pairs == 0) return errors;
-  const auto pairs = static_cast<double>(errors.pairs);
-  errors.turn_deg = std::sqrt(turns / pairs) * 180 / std::numbers::pi;
-  errors.shift_mm = 1e3 * std::sqrt(shifts / pairs);
-  return errors;
+  const RelativeErrors errors = RelativePoseErrors(PairByFrame(T_WC, T_WC_other), 1);
+  const auto turns = SummariseErrors(errors.rotation_rad);
+  const auto shifts = SummariseErrors(errors.translation_m);
+  if (!turns || !shifts) return {};
+  return {0, turns->rmse * 180 / std::numbers::pi, 1e3 * shifts->rmse};
 }
 
 MotionErrors MotionErrorsAt(double offset_s, const Trajectory& T_WC,
@@ -153,7 +140,7 @@ Expected<void> JudgeClock(const std::string& recording, FrameSource& source, int
   };
   const double best_s = AtBestOffset(by_open3d, times_s, poses).offset_s;
   TSDFPP_RETURN_IF_ERROR(
-      add("motion capture, as stamped", TimedAt(0, times_s, poses), {"-", "-", "-", "-", "-"}));
+      add("motion capture as stamped", TimedAt(0, times_s, poses), {"-", "-", "-", "-", "-"}));
   TSDFPP_RETURN_IF_ERROR(add(fmt::format("motion capture at {:+.0f} ms", 1e3 * best_s),
                              TimedAt(best_s, times_s, poses), {"-", "-", "-", "-", "-"}));
   for (const auto& [who, T_WC] : found) {

@@ -1,7 +1,6 @@
 // Whether the poses of a recording are those of its images' times.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <string>
 #include <vector>
@@ -19,14 +18,13 @@ struct MotionErrors {
   double offset_s = 0;  // timed poses are read that much after the frames' times
   double turn_deg = 0;
   double shift_mm = 0;
-  std::size_t pairs = 0;
 };
 
 // Between two trajectories of the camera, over the frames that both have; zeros where there are
 // fewer than two.
 MotionErrors MotionErrorsBetween(const Trajectory& T_WC, const Trajectory& T_WC_other);
 
-// Between a trajectory and timed poses, the frames' times in seconds by frame. A frame at whose
+// Between a trajectory and timed poses; the frames' times in seconds by frame. A frame at whose
 // time there is no pose (PoseAt) is left out.
 MotionErrors MotionErrorsAt(double offset_s, const Trajectory& T_WC,
                             const std::map<int, double>& times_s, const TimedPoses& poses);
