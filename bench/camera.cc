@@ -166,13 +166,16 @@ Expected<void> RunScene(const CameraBenchOptions& options, const CameraPlan& pla
 
 // What `refine` found from the poses as given, and `track`.
 Expected<std::vector<FoundCamera>> RunRecording(const CameraBenchOptions& options,
-                                                const CameraPlan& plan, FrameSource& source,
-                                                FigureTable& table) {
+                                                const CameraPlan& plan, double pose_offset_s,
+                                                FrameSource& source, FigureTable& table) {
   const SequenceInfo& info = source.info();
+  const std::string name = pose_offset_s == 0
+                               ? info.name
+                               : fmt::format("{} at {:+g} ms", info.name, 1e3 * pose_offset_s);
   const int last = std::min(options.until, info.first_index + info.frame_count - 1);
   std::vector<FoundCamera> found;
   for (const double voxel_m : options.voxels_m) {
-    const Stretch stretch{info.name, "real", info, 1, voxel_m, Segmentation::kNone};
+    const Stretch stretch{name, "real", info, 1, voxel_m, Segmentation::kNone};
     std::vector<CameraRun> runs = RunsOf(stretch, plan);
     Trajectory truth;
     for (int index = info.first_index; index <= last; ++index) {
@@ -191,6 +194,31 @@ Expected<std::vector<FoundCamera>> RunRecording(const CameraBenchOptions& option
   return found;
 }
 
+// The recording with each offset, and with the first one whose clock is right.
+Expected<void> RunRecordings(const CameraBenchOptions& options, const CameraPlan& plan,
+                             FigureTable& table) {
+  SequenceOptions reading;
+  TSDFPP_ASSIGN(const auto as_read, OpenSequence(options.recording, reading));
+  if (!options.camera.empty()) {
+    reading.intrinsics = {
+        0, 0, options.camera[0], options.camera[1], options.camera[2], options.camera[3]};
+  }
+  bool is_first = true;
+  for (const double offset_s : options.pose_offsets_s) {
+    reading.pose_offset_s = offset_s;
+    TSDFPP_ASSIGN(const auto source, OpenSequence(options.recording, reading));
+    TSDFPP_ASSIGN(std::vector<FoundCamera> found,
+                  RunRecording(options, plan, offset_s, *source, table));
+    const fs::path folder = options.recording;
+    if (is_first && fs::exists(folder / "groundtruth.txt") && fs::exists(folder / "depth.txt")) {
+      TSDFPP_RETURN_IF_ERROR(JudgeClock(options.recording, *source, as_read->info().intrinsics,
+                                        options.until, std::move(found), options.out));
+    }
+    is_first = false;
+  }
+  return {};
+}
+
 }  // namespace
 
 Expected<void> RunCameraBench(const CameraBenchOptions& options) {
@@ -200,6 +228,9 @@ Expected<void> RunCameraBench(const CameraBenchOptions& options) {
   if (!options.settings.empty()) {
     TSDFPP_ASSIGN(const toml::table settings, ParseTomlFile(options.settings));
     TSDFPP_ASSIGN(plan.settings, SdfTrackConfig::FromToml(settings, options.settings));
+  }
+  if (!options.camera.empty() && options.camera.size() != 4) {
+    return UsageError("--camera: {} numbers, expected fx,fy,cx,cy or ''", options.camera.size());
   }
   for (const double voxel_m : options.voxels_m) {
     MapConfig map;
@@ -212,13 +243,7 @@ Expected<void> RunCameraBench(const CameraBenchOptions& options) {
     TSDFPP_RETURN_IF_ERROR(RunScene(options, plan, file, table));
   }
   if (!options.recording.empty()) {
-    TSDFPP_ASSIGN(const auto source, OpenSequence(options.recording, {}));
-    TSDFPP_ASSIGN(std::vector<FoundCamera> found, RunRecording(options, plan, *source, table));
-    const fs::path folder = options.recording;
-    if (fs::exists(folder / "groundtruth.txt") && fs::exists(folder / "depth.txt")) {
-      TSDFPP_RETURN_IF_ERROR(
-          JudgeClock(options.recording, *source, options.until, std::move(found), options.out));
-    }
+    TSDFPP_RETURN_IF_ERROR(RunRecordings(options, plan, table));
   }
   return table.Write(options.out, "camera");
 }

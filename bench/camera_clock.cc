@@ -74,6 +74,15 @@ Trajectory TimedAt(double offset_s, const std::map<int, double>& times_s, const 
   return T_WC;
 }
 
+// Millimetres, RMSE.
+std::string AlignedPlaces(const Trajectory& T_WC, const Trajectory& truth) {
+  const PosePairs pairs = PairByFrame(T_WC, truth);
+  const auto alignment = AlignHorn(pairs);
+  if (!alignment) return "-";
+  const auto errors = PoseErrorsOf(Aligned(pairs, *alignment));
+  return errors ? Cell(1e3 * errors->translation_m.rmse, 1) : "-";
+}
+
 }  // namespace
 
 MotionErrors MotionErrorsBetween(const Trajectory& T_WC, const Trajectory& T_WC_other) {
@@ -101,8 +110,9 @@ MotionErrors AtBestOffset(const Trajectory& T_WC, const std::map<int, double>& t
   return best;
 }
 
-Expected<void> JudgeClock(const std::string& recording, FrameSource& source, int until,
-                          std::vector<FoundCamera> found, const std::string& out) {
+Expected<void> JudgeClock(const std::string& recording, FrameSource& source,
+                          const Intrinsics& other_camera, int until, std::vector<FoundCamera> found,
+                          const std::string& out) {
   const fs::path folder = recording;
   const SequenceInfo& info = source.info();
   TSDFPP_ASSIGN(const TimedPoses poses, ReadTimedPoses(folder / "groundtruth.txt"));
@@ -126,8 +136,8 @@ Expected<void> JudgeClock(const std::string& recording, FrameSource& source, int
   }
   found.push_back({"Open3D's ICP", by_open3d});
   FigureTable table({"who", "from motion capture: turn deg", "shift mm", "best offset ms",
-                     "at that: turn deg", "shift at that mm", "from Open3D's: turn deg",
-                     "depth beside the map mm"});
+                     "at that: turn deg", "shift at that mm", "places at that mm: aligned",
+                     "from Open3D's: turn deg", "depth beside the map mm"});
   const auto add = [&](const std::string& who, const Trajectory& T_WC,
                        std::vector<std::string> beside_capture) -> Expected<void> {
     TSDFPP_ASSIGN(const double beside_map_mm, DepthBesideMap(frames, T_WC));
@@ -138,18 +148,25 @@ Expected<void> JudgeClock(const std::string& recording, FrameSource& source, int
     table.Add(std::move(row));
     return {};
   };
+  const std::vector<std::string> no_other(6, "-");
   const double best_s = AtBestOffset(by_open3d, times_s, poses).offset_s;
-  TSDFPP_RETURN_IF_ERROR(
-      add("motion capture as stamped", TimedAt(0, times_s, poses), {"-", "-", "-", "-", "-"}));
+  TSDFPP_RETURN_IF_ERROR(add("motion capture as stamped", TimedAt(0, times_s, poses), no_other));
   TSDFPP_RETURN_IF_ERROR(add(fmt::format("motion capture at {:+.0f} ms", 1e3 * best_s),
-                             TimedAt(best_s, times_s, poses), {"-", "-", "-", "-", "-"}));
+                             TimedAt(best_s, times_s, poses), no_other));
+  for (Frame& frame : frames) frame.intrinsics = other_camera;
+  TSDFPP_RETURN_IF_ERROR(
+      add(fmt::format("the same by a camera of {:g} {:g} {:g} {:g}", other_camera.fx,
+                      other_camera.fy, other_camera.cx, other_camera.cy),
+          TimedAt(best_s, times_s, poses), no_other));
+  for (Frame& frame : frames) frame.intrinsics = info.intrinsics;
   for (const auto& [who, T_WC] : found) {
     const MotionErrors stamped = MotionErrorsAt(0, T_WC, times_s, poses);
     const MotionErrors best = AtBestOffset(T_WC, times_s, poses);
     TSDFPP_RETURN_IF_ERROR(
         add(who, T_WC,
             {Cell(stamped.turn_deg, 2), Cell(stamped.shift_mm, 1), Cell(1e3 * best.offset_s, 0),
-             Cell(best.turn_deg, 2), Cell(best.shift_mm, 1)}));
+             Cell(best.turn_deg, 2), Cell(best.shift_mm, 1),
+             AlignedPlaces(T_WC, TimedAt(best.offset_s, times_s, poses))}));
   }
   return table.Write(out, "clock");
 }

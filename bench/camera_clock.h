@@ -40,13 +40,16 @@ struct FoundCamera {
 
 // Writes clock.csv into `out`: of each found trajectory, and of what Open3D's ICP makes of each
 // frame and the next (it begins at the recording's own motions), how far its motions are from those
-// of groundtruth.txt as stamped, and at the offset that fits best; how far its turns are from
-// Open3D's; and how far the frames' depth is from a map of voxels of 1 cm that was made with these
-// poses, the median over their pixels. The last two also of groundtruth.txt itself, as stamped and
-// at the offset that fits Open3D's motions best. `until`: the last frame. Errors: the recording's,
-// kData where depth.txt has no image with the first frame's pose; kEnvironment where `out` cannot
-// be written.
-Expected<void> JudgeClock(const std::string& recording, FrameSource& source, int until,
-                          std::vector<FoundCamera> found, const std::string& out);
+// of groundtruth.txt as stamped, and at the offset that fits best; how far its places are from
+// those of groundtruth.txt at that offset after alignment (Horn), the RMSE that TUM's
+// evaluate_ate.py gives; how far its turns are from Open3D's; and how far the frames' depth is from
+// a map of voxels of 1 cm that was made with these poses, the median over their pixels. The last
+// two also of groundtruth.txt itself, as stamped, at the offset that fits Open3D's motions best,
+// and so with `other_camera` in place of the frames'. `source`'s poses are those of the images'
+// times. `until`: the last frame. Errors: the recording's, kData where depth.txt has no image with
+// the first frame's pose; kEnvironment where `out` cannot be written.
+Expected<void> JudgeClock(const std::string& recording, FrameSource& source,
+                          const Intrinsics& other_camera, int until, std::vector<FoundCamera> found,
+                          const std::string& out);
 
 }  // namespace tsdfpp

@@ -213,6 +213,16 @@ void AddCamera(CLI::App& app, Chosen& chosen) {
       ->capture_default_str();
   command->add_option("--recording", options->recording, "Folder of a sequence, or ''")
       ->capture_default_str();
+  command
+      ->add_option("--camera", options->camera,
+                   "The recording's fx,fy,cx,cy; '' for what its reader takes")
+      ->delimiter(',')
+      ->capture_default_str();
+  command
+      ->add_option("--pose-offsets", options->pose_offsets_s,
+                   "Seconds from the images' times to those of the recording's poses")
+      ->delimiter(',')
+      ->capture_default_str();
   command->add_option("--method", options->method, "The map")->capture_default_str();
   command->add_option("--voxels", options->voxels_m, "Voxel sizes, metres")
       ->delimiter(',')

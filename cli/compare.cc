@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/command.h"
+#include "cli/mapping_options.h"
 #include "cli/pose_choice.h"
 #include "cli/segmentation_options.h"
 #include "cli/sequence_options.h"
@@ -27,8 +28,9 @@ struct CompareArguments {
   std::string profiles = "paper,close";
   std::string camera = "gt";
   std::string bleeding = "auto";
-  std::string mask_repair = "off";
+  RepairOptions repair;
   std::string poses;
+  TrackingOptions tracking;
   std::string associate;
   SegmentationOptions segmentation{.segmentation = "gt"};
   std::vector<std::string> adapters;
@@ -125,6 +127,15 @@ Expected<void> ReadPoses(const std::string& names, CompareConfig& config) {
   return {};
 }
 
+// What is tracked, and how, where something is.
+Expected<void> ChooseTracking(const CompareArguments& options, CompareConfig& config) {
+  TSDFPP_ASSIGN(const TrackWishes wishes, ReadTracking(options.tracking));
+  TSDFPP_RETURN_IF_ERROR(CheckTracking(wishes, config.poses, config.camera));
+  config.tracked = wishes.tracked;
+  if (wishes.config) config.track = *wishes.config;
+  return {};
+}
+
 // Whether each list has something, and nothing twice, and the profiles fit the voxels.
 Expected<void> CheckLists(const CompareArguments& options, const std::string& pose_names,
                           const CompareConfig& config) {
@@ -167,9 +178,7 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
   if (options.bleeding != BleedingPixelsName(BleedingPixels::kAuto)) {
     command += " --bleeding " + options.bleeding;
   }
-  if (options.mask_repair != MaskRepairModeName(MaskRepairMode::kOff)) {
-    command += " --mask-repair " + options.mask_repair;
-  }
+  command += options.repair.Text() + options.tracking.Text();
   if (const std::string& name = options.segmentation.segmentation;
       name != SegmentationName(Segmentation::kGiven)) {
     command += " --segmentation " + name;
@@ -228,9 +237,12 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
   TSDFPP_ASSIGN(config.camera, CameraSourceFromName(options.camera));
   TSDFPP_ASSIGN(config.bleeding, BleedingPixelsFromName(options.bleeding));
-  TSDFPP_ASSIGN(config.mask_repair, MaskRepairModeFromName(options.mask_repair));
+  TSDFPP_ASSIGN(const RepairWishes repair, ReadRepair(options.repair));
+  config.mask_repair = repair.mode;
+  config.repair = repair.config;
   const std::string pose_names = PoseNames(options, config, *opened.source);
   TSDFPP_RETURN_IF_ERROR(ReadPoses(pose_names, config));
+  TSDFPP_RETURN_IF_ERROR(ChooseTracking(options, config));
   TSDFPP_RETURN_IF_ERROR(CheckLists(options, pose_names, config));
   TSDFPP_ASSIGN(auto source, WithExperiment(std::move(opened.source), options, config));
   if (!opened.remark.empty()) {
@@ -273,11 +285,7 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
                  "the camera are tracked by signed distances)")
       ->check(OneOf({"auto", "keep", "wait"}))
       ->capture_default_str();
-  app.add_option("--mask-repair", options->mask_repair,
-                 "For our maps, whether their surfaces and steps in depth correct the masks before "
-                 "they are mapped: off or on (docs/segmentation.md)")
-      ->check(OneOf({"off", "on"}))
-      ->capture_default_str();
+  AddRepairOptions(app, options->repair);
   app.add_option("--camera", options->camera,
                  "Camera poses of our maps: gt (given), refine (given and then corrected by the "
                  "map's background), track (the first one given, the others found by it)")
@@ -288,6 +296,7 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
          std::string("Object poses: gt (given), icp or track (tracked, docs/tracking.md); ") +
              kDefaultPosesHelp)
       ->check(NotEmpty("one of gt, icp and track at least"));
+  AddTrackingOptions(app, options->tracking);
   app.add_option("--voxel", options->config.map.voxel_m, "Voxel size, metres")
       ->capture_default_str();
   app.add_option("--every", options->config.every, "Frames between evaluations")

@@ -31,11 +31,9 @@ struct MapArguments {
   std::string associate;
   std::string camera = "gt";
   std::string bleeding = "auto";
-  std::string mask_repair = "off";
-  std::string mask_repair_config;
+  RepairOptions repair;
   std::string poses;
-  std::string track = "auto";
-  std::string track_config;
+  TrackingOptions tracking;  // a loaded map does not keep it, so it may be given again
   std::string profile = "close";
   std::string remove;
   std::string out;
@@ -53,28 +51,6 @@ struct MapArguments {
 constexpr std::array<const char*, 8> kSettingsOfTheMap = {
     "--method", "--profile", "--trunc-front", "--trunc-back",
     "--layers", "--voxel",   "--poses",       "--associate"};
-
-// What is tracked, and how. A loaded map does not keep it, so it may be given again.
-Expected<TrackWishes> ReadTracking(const MapArguments& options) {
-  TrackWishes wishes;
-  TSDFPP_ASSIGN(wishes.tracked, TrackChoiceFromName(options.track));
-  if (options.track_config.empty()) return wishes;
-  TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.track_config));
-  TSDFPP_ASSIGN(wishes.config, SdfTrackConfig::FromToml(table, options.track_config));
-  return wishes;
-}
-
-Expected<RepairWishes> ReadMaskRepair(const MapArguments& options) {
-  RepairWishes wishes;
-  TSDFPP_ASSIGN(wishes.mode, MaskRepairModeFromName(options.mask_repair));
-  if (options.mask_repair_config.empty()) return wishes;
-  if (wishes.mode == MaskRepairMode::kOff) {
-    return UsageError("--mask-repair-config needs --mask-repair on");
-  }
-  TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.mask_repair_config));
-  TSDFPP_ASSIGN(wishes.config, MaskRepairConfig::FromToml(table, options.mask_repair_config));
-  return wishes;
-}
 
 Expected<PipelineConfig> ConfigOf(const MapArguments& options) {
   PipelineConfig config;
@@ -103,7 +79,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   }
   TSDFPP_ASSIGN(wishes.camera, CameraSourceFromName(options.camera));
   TSDFPP_ASSIGN(wishes.bleeding, BleedingPixelsFromName(options.bleeding));
-  TSDFPP_ASSIGN(wishes.repair, ReadMaskRepair(options));
+  TSDFPP_ASSIGN(wishes.repair, ReadRepair(options.repair));
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
@@ -114,7 +90,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
     }
   }
   TSDFPP_ASSIGN(wishes.segmenter, ReadSegmenterParts(options.segmentation, wishes.segmentation));
-  TSDFPP_ASSIGN(wishes.track, ReadTracking(options));
+  TSDFPP_ASSIGN(wishes.track, ReadTracking(options.tracking));
   if (options.load.empty()) {
     if (options.source.path.empty()) {
       return UsageError("SCENE-or-SEQ is missing: what to map, or --load FILE (see --help)");
@@ -317,14 +293,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "are tracked by signed distances)")
       ->check(OneOf({"auto", "keep", "wait"}))
       ->capture_default_str();
-  app.add_option("--mask-repair", options->mask_repair,
-                 "Whether the map's surfaces and steps in depth correct the masks before they are "
-                 "mapped: off or on (docs/segmentation.md)")
-      ->check(OneOf({"off", "on"}))
-      ->capture_default_str();
-  app.add_option("--mask-repair-config", options->mask_repair_config,
-                 "Settings of --mask-repair on, a TOML file (docs/segmentation.md)")
-      ->check(NotEmpty("a file"));
+  AddRepairOptions(app, options->repair);
   app.add_option("--camera", options->camera,
                  "Camera poses: gt (given), refine (given and then corrected by the map's "
                  "background), track (the first one given, the others found by it)")
@@ -335,16 +304,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                              "(tracked by signed distances, docs/tracking.md); ") +
                      kDefaultPosesHelp)
       ->check(NotEmpty("gt, icp or track"));
-  app.add_option(
-         "--track", options->track,
-         "Which objects are tracked: classified (those with a class), all (whatever is not "
-         "background), moving (the same, once it is seen to move), auto (moving with "
-         "--segmentation depth --poses track; else classified where a class is known, else all)")
-      ->check(OneOf({"auto", "classified", "all", "moving"}))
-      ->capture_default_str();
-  app.add_option("--track-config", options->track_config,
-                 "Settings of --poses track and --camera, a TOML file (docs/tracking.md)")
-      ->check(NotEmpty("a file"));
+  AddTrackingOptions(app, options->tracking);
   app.add_option("--profile", options->profile,
                  "Truncation: paper (10 voxels in front, 10 behind) or close (10, 3)")
       ->capture_default_str();

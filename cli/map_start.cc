@@ -81,15 +81,7 @@ Expected<void> ChoosePoses(MapStart& start, const MapWishes& wishes) {
 
 // What is tracked, and how.
 Expected<void> ChooseTracking(MapStart& start, const TrackWishes& wishes) {
-  const PoseSource poses = start.config.poses;
-  const bool camera_is_given = start.config.camera == CameraSource::kGiven;
-  if (poses == PoseSource::kGiven && wishes.tracked != TrackChoice::kAuto) {
-    return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
-                      TrackChoiceName(wishes.tracked));
-  }
-  if (poses != PoseSource::kTrack && camera_is_given && wishes.config) {
-    return UsageError("--track-config needs --poses track, or --camera refine or track");
-  }
+  TSDFPP_RETURN_IF_ERROR(CheckTracking(wishes, {start.config.poses}, start.config.camera));
   start.config.tracked = wishes.tracked;
   if (wishes.config) start.config.track = *wishes.config;
   return {};

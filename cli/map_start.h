@@ -5,23 +5,12 @@
 #include <optional>
 #include <string>
 
+#include "cli/mapping_options.h"
 #include "cli/sequence_options.h"
 #include "mapper/map_file.h"
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {
-
-// Of poses that are tracked.
-struct TrackWishes {
-  TrackChoice tracked = TrackChoice::kAuto;
-  std::optional<SdfTrackConfig> config;
-};
-
-// Of masks that are repaired.
-struct RepairWishes {
-  MaskRepairMode mode = MaskRepairMode::kOff;
-  MaskRepairConfig config{};
-};
 
 // What was asked for beside a config; nothing: as the sequence is.
 struct MapWishes {

@@ -11,6 +11,12 @@
 #include "sequence/calibration.h"
 
 namespace tsdfpp {
+namespace {
+
+// Clocks that are further apart belong to different recordings.
+constexpr double kMostPoseOffset_s = 10;
+
+}  // namespace
 
 CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
                                   SequenceArguments& arguments) {
@@ -32,6 +38,10 @@ CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
       ->check(AboveZero());
   app.add_flag("--fixed-camera", arguments.fixed_camera,
                "Take a camera without poses on disk as one that does not move");
+  app.add_option("--pose-offset", arguments.pose_offset_s,
+                 "Seconds to add to an image's time before its camera pose is looked up in "
+                 "groundtruth.txt, for clocks that do not agree (tum, klg)")
+      ->check(Between(-kMostPoseOffset_s, kMostPoseOffset_s));
   app.add_flag("--unchecked", arguments.unchecked,
                "Do not look for wrong units and inverted poses");
   app.add_option("--sensor", arguments.scene.sensor,
@@ -51,6 +61,9 @@ std::string TextOf(const SequenceArguments& arguments) {
   if (!arguments.calibration.empty()) text += " --calibration " + arguments.calibration;
   if (arguments.depth_units > 0) text += fmt::format(" --depth-units {}", arguments.depth_units);
   if (arguments.fixed_camera) text += " --fixed-camera";
+  if (arguments.pose_offset_s != 0) {
+    text += fmt::format(" --pose-offset {}", arguments.pose_offset_s);
+  }
   if (arguments.unchecked) text += " --unchecked";
   if (!arguments.scene.sensor.empty()) text += " --sensor " + arguments.scene.sensor;
   if (arguments.scene.seed) text += fmt::format(" --seed {}", *arguments.scene.seed);
@@ -72,6 +85,7 @@ Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& ar
   }
   if (arguments.depth_units > 0) options.depth_units_per_m = arguments.depth_units;
   options.fixed_camera = arguments.fixed_camera;
+  options.pose_offset_s = arguments.pose_offset_s;
   options.check = !arguments.unchecked;
   SequenceNotes notes;
   TSDFPP_ASSIGN(auto source, OpenSource(arguments.path, options, &notes, arguments.scene));

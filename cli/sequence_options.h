@@ -18,6 +18,7 @@ struct SequenceArguments {
   std::string calibration;  // --calibration
   double depth_units = 0;   // --depth-units
   bool fixed_camera = false;
+  double pose_offset_s = 0;  // --pose-offset
   bool unchecked = false;
   SceneOptions scene;  // --sensor, --seed
 };

@@ -170,6 +170,7 @@ class KlgSource : public DatasetSource {
     const fs::path file = folder / "groundtruth.txt";
     std::error_code code;
     const bool known = fs::exists(file, code);
+    TSDFPP_RETURN_IF_ERROR(RemarkOnPoseOffset(file, options.pose_offset_s, notes));
     if (!known && !options.fixed_camera) {
       return DataError(
           "{}: a .klg holds no camera poses, expected groundtruth.txt (t tx ty tz qx qy qz qw) "
@@ -183,7 +184,7 @@ class KlgSource : public DatasetSource {
     for (std::size_t i = 0; i < index.entries.size(); ++i) {
       Pose T_WC = Pose::Identity();
       if (known) {
-        const auto pose = PoseAt(poses, Seconds(index.entries[i]));
+        const auto pose = PoseAt(poses, Seconds(index.entries[i]) + options.pose_offset_s);
         if (!pose) continue;
         T_WC = mirrored_ ? MirroredInY(*pose) : *pose;
       }
@@ -208,7 +209,6 @@ class KlgSource : public DatasetSource {
       for (const InstanceId id : cv::Mat_<InstanceId>(*mask)) ids.insert(id);
     }
     ids.erase(kBackground);
-    ids.erase(kNoInstance);
     ids.erase(kNoInstance);
     return {ids.begin(), ids.end()};
   }

@@ -171,6 +171,11 @@ Expected<std::unique_ptr<FrameSource>> OpenSequence(const fs::path& path,
   } else {
     TSDFPP_ASSIGN(format, DetectFormat(path));
   }
+  const bool timed = format == DatasetFormat::kTum || format == DatasetFormat::kKlg;
+  if (options.pose_offset_s != 0 && !timed) {
+    return UsageError("{}: a {} set has poses of frames, not of times, expected no offset of them",
+                      path.string(), DatasetFormatName(format));
+  }
   if (fs::is_directory(path, code)) TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(path));
   if (format == DatasetFormat::kCofusion) return OpenCofusionSet(path, options);
   SequenceNotes unheard;

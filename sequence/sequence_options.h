@@ -31,6 +31,9 @@ struct SequenceOptions {
   // Take a camera whose poses are not on disk as one that does not move. Without it that is an
   // error.
   bool fixed_camera = false;
+  // Seconds. An image's camera pose is that of groundtruth.txt this much after the image's time
+  // (negative: before it), where the two were written by clocks that do not agree. Of tum and klg.
+  double pose_offset_s = 0;
   // Look at a few frames for wrong units, inverted poses and the like (sequence/plausibility.h).
   bool check = true;
 };

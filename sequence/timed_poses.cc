@@ -71,6 +71,18 @@ Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path,
   return poses;
 }
 
+Expected<void> RemarkOnPoseOffset(const fs::path& path, double offset_s,
+                                  std::vector<std::string>& remarks) {
+  if (offset_s == 0) return {};
+  std::error_code code;
+  if (!fs::exists(path, code)) {
+    return UsageError("{}: no such file, expected no offset of poses without it", path.string());
+  }
+  remarks.push_back(fmt::format("{}: read {:g} s {} the images' times", path.string(),
+                                std::abs(offset_s), offset_s > 0 ? "after" : "before"));
+  return {};
+}
+
 std::optional<Pose> PoseAt(const TimedPoses& poses, double time_s) {
   const auto after = poses.lower_bound(time_s);
   if (after != poses.end() && after->first == time_s) return after->second;

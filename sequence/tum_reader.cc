@@ -173,6 +173,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenTum(const fs::path& folder,
   TSDFPP_ASSIGN(const std::vector<Association> pairs, Pairs(folder, notes));
   std::error_code code;
   const fs::path truth = folder / "groundtruth.txt";
+  TSDFPP_RETURN_IF_ERROR(RemarkOnPoseOffset(truth, options.pose_offset_s, notes));
   TimedPoses poses;
   if (fs::exists(truth, code) || !options.fixed_camera) {
     TSDFPP_ASSIGN(poses, ReadTimedPoses(truth, &notes));
@@ -198,7 +199,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenTum(const fs::path& folder,
     frame.camera = camera;
     frame.depth_units_per_m = kTumUnitsPerMetre;
     if (!poses.empty()) {
-      const auto pose = PoseAt(poses, pair.depth.time_s);
+      const auto pose = PoseAt(poses, pair.depth.time_s + options.pose_offset_s);
       if (!pose) continue;
       frame.T_WC = *pose;
     }
@@ -209,9 +210,12 @@ Expected<std::unique_ptr<DatasetSource>> OpenTum(const fs::path& folder,
   if (sequence.frames.empty()) {
     return DataError(
         "{}: no image is within its times, {:.3f} to {:.3f} s; images are from {:.3f} "
-        "to {:.3f} s",
+        "to {:.3f} s{}",
         truth.string(), poses.begin()->first, poses.rbegin()->first, pairs.front().depth.time_s,
-        pairs.back().depth.time_s);
+        pairs.back().depth.time_s,
+        options.pose_offset_s == 0
+            ? ""
+            : fmt::format(", and looked up with an offset of {:g} s", options.pose_offset_s));
   }
   if (sequence.frames.size() < pairs.size()) {
     notes.push_back(

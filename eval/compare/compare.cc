@@ -80,9 +80,12 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
                                 .bleeding = config.bleeding,
                                 .associate = AssociationOf(config, info),
                                 .mask_repair = config.mask_repair,
+                                .repair = config.repair,
                                 .camera = config.camera,
                                 .poses = poses,
-                                .icp = config.icp};
+                                .tracked = config.tracked,
+                                .icp = config.icp,
+                                .track = config.track};
         TSDFPP_RETURN_IF_ERROR(pipeline.map.SetProfile(profile));
         TSDFPP_RETURN_IF_ERROR(pipeline.Validate());
         const std::vector<ObjectInfo> nobody;

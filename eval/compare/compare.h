@@ -26,7 +26,11 @@ struct CompareConfig {
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
   MaskRepairMode mask_repair = MaskRepairMode::kOff;
+  MaskRepairConfig repair{};
   std::vector<PoseSource> poses{PoseSource::kGiven};
+  // Of poses that are tracked: which objects, and by signed distances how (and how the camera is).
+  TrackChoice tracked = TrackChoice::kAuto;
+  SdfTrackConfig track;
   MapConfig map;  // truncation is the profile's
   IcpConfig icp;
   int every = 10;  // frames between evaluations; the reveal and the last frame are always evaluated

@@ -72,6 +72,12 @@ nlohmann::json CameraJson(const CompareResult& result, const CompareRun& run) {
   return camera;
 }
 
+// Which objects; null with given poses.
+nlohmann::json TrackedJson(const CompareRun& run) {
+  if (run.config.poses == PoseSource::kGiven) return nullptr;
+  return TrackChoiceName(run.pipeline.tracked().choice());
+}
+
 nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run) {
   nlohmann::json trajectories;
   for (const InstanceId id : result.movers) {
@@ -105,6 +111,7 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"segmentation", SegmentationName(run.config.segmentation)},
           {"mask_repair", MaskRepairModeName(run.config.mask_repair)},
           {"poses", PoseSourceName(run.config.poses)},
+          {"tracked", TrackedJson(run)},
           {"associate", AssociationModeName(run.config.associate)},
           {"settings",
            {{"voxel_m", map.voxel_m},

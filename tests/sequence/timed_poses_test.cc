@@ -92,5 +92,73 @@ TEST(TimedPoses, PosesAreInterpolatedOnlyAcrossShortGaps) {
   EXPECT_EQ(x(2.03), -1);
 }
 
+// Images whose clock runs behind that of the poses: the same set with other stamps of the poses is
+// the reference. An offset between two poses is interpolated.
+TEST(TimedPoses, AnOffsetIsThatOfAnotherClock) {
+  constexpr double kOffset_s = 0.25;
+  constexpr double kSpeed_mps = 0.125;  // along x, in numbers that are exact
+  const TempFolder folder;
+  BoxSource source(4);
+  for (const DatasetFormat format : {DatasetFormat::kTum, DatasetFormat::kKlg}) {
+    const fs::path set = folder / DatasetFormatName(format);
+    ASSERT_TRUE(ExportSequence(source, format, set).has_value());
+    const fs::path opened = format == DatasetFormat::kKlg ? set / "sequence.klg" : set;
+    const auto stamped = [&](double first_s) {
+      std::ofstream file(set / "groundtruth.txt");
+      for (int i = 0; i < 64; ++i) {
+        const double since_s = i / 64.;
+        file << fmt::format("{} {} 0 0 0 0 0 1\n", first_s + since_s, kSpeed_mps * since_s);
+      }
+    };
+    const auto places = [&](double offset_s, SequenceNotes* notes) {
+      std::vector<double> x;
+      SequenceOptions options;
+      options.check = false;
+      options.pose_offset_s = offset_s;
+      const auto read = OpenSequence(opened, options, notes);
+      EXPECT_TRUE(read.has_value()) << read.error().message;
+      for (int i = 0; read && i < 4; ++i)
+        x.push_back(read.value()->Read(i)->T_WC.translation().x());
+      return x;
+    };
+    stamped(0);
+    SequenceNotes notes;
+    const std::vector<double> offset = places(kOffset_s, &notes);
+    EXPECT_TRUE(NotesSay(notes, "groundtruth.txt: read 0.25 s after the images' times"));
+    stamped(-kOffset_s);
+    notes.clear();
+    const std::vector<double> by_other_stamps = places(0, &notes);
+    EXPECT_FALSE(NotesSay(notes, "the images' times"));
+    ASSERT_EQ(offset.size(), 4U);
+    ASSERT_EQ(by_other_stamps.size(), 4U);
+    for (std::size_t i = 0; i < offset.size(); ++i) {
+      EXPECT_NEAR(offset[i], by_other_stamps[i], 1e-12);
+      EXPECT_NEAR(offset[i], kSpeed_mps * (kOffset_s + static_cast<double>(i) / 30), 1e-6);
+    }
+
+    fs::remove(set / "groundtruth.txt");
+    SequenceOptions none;
+    none.fixed_camera = true;
+    none.pose_offset_s = kOffset_s;
+    const auto without = OpenSequence(opened, none);
+    ASSERT_FALSE(without.has_value());
+    EXPECT_EQ(without.error().kind, ErrorKind::kUsage);
+    EXPECT_EQ(without.error().message,
+              (set / "groundtruth.txt").string() +
+                  ": no such file, expected no offset of poses without it");
+  }
+
+  const fs::path set = folder / "bop";
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kBop, set).has_value());
+  SequenceOptions options;
+  options.pose_offset_s = kOffset_s;
+  const auto bop = OpenSequence(set, options);
+  ASSERT_FALSE(bop.has_value());
+  EXPECT_EQ(bop.error().kind, ErrorKind::kUsage);
+  EXPECT_TRUE(bop.error().message.ends_with(
+      "a bop set has poses of frames, not of times, expected no offset of them"))
+      << bop.error().message;
+}
+
 }  // namespace
 }  // namespace tsdfpp
