@@ -136,7 +136,7 @@ Expected<void> JudgeClock(const std::string& recording, FrameSource& source,
   }
   found.push_back({"Open3D's ICP", by_open3d});
   FigureTable table({"who", "from motion capture: turn deg", "shift mm", "best offset ms",
-                     "at that: turn deg", "shift at that mm", "places at that mm: aligned",
+                     "at that: turn deg", "shift at that mm", "at that: places aligned mm",
                      "from Open3D's: turn deg", "depth beside the map mm"});
   const auto add = [&](const std::string& who, const Trajectory& T_WC,
                        std::vector<std::string> beside_capture) -> Expected<void> {

@@ -33,8 +33,8 @@ Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path,
 // kAssociationLimit_s; nothing where there is none.
 std::optional<Pose> PoseAt(const TimedPoses& poses, double time_s);
 
-// Where poses are read at another time than the images' (SequenceOptions::pose_offset_s), a sentence
-// that says so. Errors: kUsage where there is an offset and no file of poses.
+// Where poses are read at another time than the images' (SequenceOptions::pose_offset_s), a
+// sentence that says so. Errors: kUsage where there is an offset and no file of poses.
 Expected<void> RemarkOnPoseOffset(const std::filesystem::path& path, double offset_s,
                                   std::vector<std::string>& remarks);
 
