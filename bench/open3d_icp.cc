@@ -8,6 +8,7 @@
 
 #include <memory>
 
+#include "core/pixel_ray.h"
 namespace tsdfpp {
 namespace {
 
@@ -27,7 +28,7 @@ std::shared_ptr<PointCloud> CloudOf(const Frame& frame) {
     const auto* row = frame.depth.ptr<float>(v);
     for (int u = 0; u < frame.depth.cols; ++u) {
       const double z = row[u];
-      if (z > 0) cloud.points_.emplace_back((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
+      if (z > 0) cloud.points_.emplace_back(z * PixelRay(k, u, v));
     }
   }
   auto thin = cloud.VoxelDownSample(kThin_m);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "bench/clocks.h"
+#include "core/pixel_ray.h"
 #include "mapper/map_representation.h"
 #include "mapper/voxel_inspection.h"
 
@@ -21,8 +22,7 @@ cv::Mat SplitLabels(const Frame& frame, const Eigen::AlignedBox2d& ground, int s
     for (int u = 0; u < k.width; ++u) {
       const double z = frame.depth.at<float>(v, u);
       if (!IsValidDepth(static_cast<float>(z))) continue;
-      const Eigen::Vector3d p_W =
-          frame.T_WC * Eigen::Vector3d(z * (u - k.cx) / k.fx, z * (v - k.cy) / k.fy, z);
+      const Eigen::Vector3d p_W = frame.T_WC * (z * PixelRay(k, u, v));
       const Eigen::Vector2d share =
           (p_W.head<2>() - ground.min()).cwiseQuotient(ground.sizes()) * side;
       const int x = std::clamp(static_cast<int>(std::floor(share.x())), 0, side - 1);
@@ -41,8 +41,7 @@ Eigen::AlignedBox2d GroundOf(const Frame& frame) {
     for (int u = 0; u < k.width; u += 4) {
       const double z = frame.depth.at<float>(v, u);
       if (!IsValidDepth(static_cast<float>(z))) continue;
-      const Eigen::Vector3d p_W =
-          frame.T_WC * Eigen::Vector3d(z * (u - k.cx) / k.fx, z * (v - k.cy) / k.fy, z);
+      const Eigen::Vector3d p_W = frame.T_WC * (z * PixelRay(k, u, v));
       along[0].push_back(p_W.x());
       along[1].push_back(p_W.y());
     }

@@ -6,6 +6,7 @@
 #include "bench/figure_runs.h"
 #include "bench/scaling.h"
 #include "bench/scaling_runs.h"
+#include "core/pixel_ray.h"
 
 namespace tsdfpp {
 namespace {
@@ -29,9 +30,8 @@ Frame Windowed(const Frame& frame, int eighths) {
 double VisibleSurface_m2(const Frame& frame) {
   constexpr double kJump = 0.05;  // of the depth; more is an edge
   const Intrinsics& k = frame.intrinsics;
-  const auto point = [&](int u, int v) {
-    const double z = frame.depth.at<float>(v, u);
-    return Eigen::Vector3d(z * (u - k.cx) / k.fx, z * (v - k.cy) / k.fy, z);
+  const auto point = [&](int u, int v) -> Eigen::Vector3d {
+    return frame.depth.at<float>(v, u) * PixelRay(k, u, v);
   };
   double area = 0;
   for (int v = 0; v + 1 < k.height; ++v) {

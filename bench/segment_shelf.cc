@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "core/pixel_ray.h"
 #include "eval/score/label_image.h"
 #include "mapper/segment/depth_segments.h"
 #include "sequence/open_sequence.h"
@@ -36,7 +37,7 @@ cv::Mat InBin(const Frame& frame, const cv::Mat& labels) {
   for (int v = 0; v < labels.rows; ++v) {
     for (int u = 0; u < labels.cols; ++u) {
       const double z = frame.depth.at<float>(v, u);
-      const Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1);
+      const Eigen::Vector3d ray = PixelRay(k, u, v);
       const Eigen::Vector3d p_B = T_BC * (z * ray);
       const bool is_in =
           (p_B.array() > kBin.low.array()).all() && (p_B.array() < kBin.high.array()).all();

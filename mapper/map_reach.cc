@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "core/farthest.h"
+#include "core/pixel_ray.h"
 #include "mapper/block_moves.h"
 #include "mapper/volume/lattice_range.h"
 
@@ -26,7 +27,7 @@ struct RayEnds {
 
 RayEnds EndsOfRay(const Intrinsics& k, double u, double v, double depth_m,
                   const MapConfig& config) {
-  const Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1);
+  const Eigen::Vector3d ray = PixelRay(k, u, v);
   const double range_m = depth_m * ray.norm();
   const Eigen::Vector3d unit = ray.normalized();
   const double front_m = config.trunc_front_voxels * config.voxel_m;
@@ -44,7 +45,7 @@ bool HoldsView(const LatticeRange& range, const Frame& frame, const Pose& T_LC,
   for (int i = 0; i < 4; ++i) {
     const double u = (i & 1) != 0 ? k.width - 1 : 0;
     const double v = (i & 2) != 0 ? k.height - 1 : 0;
-    const Eigen::Vector3d ray((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1);
+    const Eigen::Vector3d ray = PixelRay(k, u, v);
     if (!range.Holds(T_LC * (depth_m * ray))) return false;
   }
   return true;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "core/pixel_ray.h"
 #include "metrics/visibility.h"
 
 namespace tsdfpp {
@@ -93,8 +94,7 @@ cv::Mat SeenByAll(const std::deque<Frame>& recent, double voxel_m) {
       const float z = now.depth.at<float>(v, u);
       if (!IsValidDepth(z)) continue;
       const InstanceId id = now.mask.at<std::uint16_t>(v, u);
-      const Eigen::Vector3d p_W =
-          now.T_WC * Eigen::Vector3d((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
+      const Eigen::Vector3d p_W = now.T_WC * (z * PixelRay(k, u, v));
       bool by_all = true;
       for (std::size_t i = 0; i + 1 < recent.size() && by_all; ++i) {
         if (id != last_id) {

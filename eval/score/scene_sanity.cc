@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/pixel_ray.h"
 #include "eval/score/mapped_pixels.h"
 
 namespace tsdfpp {
@@ -16,7 +17,7 @@ bool SeenSquarely(const Frame& frame, int v, int u) {
   const Intrinsics& k = frame.intrinsics;
   const auto point = [&](int pv, int pu) -> Eigen::Vector3d {
     const double z = frame.depth.at<float>(pv, pu);
-    return {(pu - k.cx) / k.fx * z, (pv - k.cy) / k.fy * z, z};
+    return z * PixelRay(k, pu, pv);
   };
   const Eigen::Vector3d right =
       point(v, std::min(u + 1, k.width - 1)) - point(v, std::max(u - 1, 0));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/pixel_ray.h"
 #include "eval/score/mapped_pixels.h"
 
 namespace tsdfpp {
@@ -13,10 +14,7 @@ class SurfaceOfPixels {
  public:
   SurfaceOfPixels(const Frame& frame, double voxel_m) : frame_(frame), jump_m_(2 * voxel_m) {}
 
-  Eigen::Vector3d Ray(int v, int u) const {
-    const Intrinsics& k = frame_.intrinsics;
-    return {(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1};
-  }
+  Eigen::Vector3d Ray(int v, int u) const { return PixelRay(frame_.intrinsics, u, v); }
 
   // Nothing where the neighbours do not tell.
   std::optional<Eigen::Vector3d> Normal(int v, int u) const {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "core/pixel_ray.h"
 #include "mapper/associate/outline_surfaces.h"
 #include "mapper/associate/take_out.h"
 
@@ -22,9 +23,7 @@ constexpr double kLeastShare = 0.01;
 
 Eigen::Vector3d PointAt(const Frame& frame, int v, int u) {
   const double z = frame.depth.at<float>(v, u);
-  const Intrinsics& camera = frame.intrinsics;
-  return frame.T_WC *
-         Eigen::Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+  return frame.T_WC * (z * PixelRay(frame.intrinsics, u, v));
 }
 
 // 255 where a pixel has a label and depth.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/pixel_ray.h"
 namespace tsdfpp {
 namespace {
 
@@ -16,9 +17,7 @@ Eigen::Vector3d PointOf(const Frame& frame, int pixel) {
   const int v = pixel / frame.depth.cols;
   const int u = pixel % frame.depth.cols;
   const double z = frame.depth.at<float>(v, u);
-  const Intrinsics& camera = frame.intrinsics;
-  return frame.T_WC *
-         Eigen::Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+  return frame.T_WC * (z * PixelRay(frame.intrinsics, u, v));
 }
 
 bool IsShare(int count, double share, std::size_t of) {

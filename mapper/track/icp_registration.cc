@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/pixel_ray.h"
 namespace tsdfpp {
 namespace {
 
@@ -192,8 +193,7 @@ std::vector<Eigen::Vector3d> SegmentPoints(const Frame& frame, const std::vector
     const int at = valid[i * valid.size() / count];
     const cv::Point pixel(at % cols, at / cols);
     const double z = frame.depth.at<float>(pixel);
-    const Eigen::Vector3d p_C((pixel.x - camera.cx) / camera.fx * z,
-                              (pixel.y - camera.cy) / camera.fy * z, z);
+    const Eigen::Vector3d p_C = z * PixelRay(camera, pixel.x, pixel.y);
     points_W.emplace_back(frame.T_WC * p_C);
   }
   return points_W;

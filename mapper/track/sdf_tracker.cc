@@ -168,7 +168,7 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
   if (found.converged) Calibrate(sight, memory, found);
   const Rest rest = StayAtRest(sight, task, nearest, memory, found);
   if (!rest.is_kept && !found.converged) return std::nullopt;
-  if (!PassesGates(sight, found)) return std::nullopt;
+  if (!PassesGates(sight, found)) return std::nullopt;  // what fails does not begin to wait
   if (Waits(sight, rest, memory, found) || !PassesGates(sight, found)) return std::nullopt;
   const MotionUncertainty motion = Uncertainty(sight, found, memory);
   Remember(sight, found, memory);

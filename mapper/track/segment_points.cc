@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/pixel_ray.h"
 namespace tsdfpp {
 namespace {
 
@@ -100,8 +101,7 @@ std::vector<SegmentPoint> SegmentPointsOf(const Frame& frame, const std::vector<
   for (std::size_t i = 0; i < count; ++i) {
     const cv::Point2i& pixel = inside[i * inside.size() / count];
     const double z = frame.depth.at<float>(pixel.y, pixel.x);
-    const Eigen::Vector3d p_C((pixel.x - camera.cx) / camera.fx * z,
-                              (pixel.y - camera.cy) / camera.fy * z, z);
+    const Eigen::Vector3d p_C = z * PixelRay(camera, pixel.x, pixel.y);
     points.push_back({p_C.cast<float>(), pixel});
   }
   return points;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/pixel_ray.h"
 #include "sim/render/parallel_rows.h"
 
 namespace tsdfpp {
@@ -28,9 +29,7 @@ Step BestStep(double z, float before, float after) {
 cv::Mat IncidenceAngles(const cv::Mat& depth, const Intrinsics& intrinsics) {
   const Intrinsics& k = intrinsics;
   cv::Mat angles(depth.size(), CV_32FC1);
-  const auto ray = [&](int u, int v) {
-    return Eigen::Vector3d((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0);
-  };
+  const auto ray = [&](int u, int v) { return PixelRay(k, u, v); };
   ParallelRows(depth.rows, [&](int v) {
     const auto* row = depth.ptr<float>(v);
     const float* above = v > 0 ? depth.ptr<float>(v - 1) : nullptr;

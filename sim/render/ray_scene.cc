@@ -8,6 +8,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/pixel_ray.h"
 #include "sim/scene/mujoco_guard.h"
 
 namespace tsdfpp {

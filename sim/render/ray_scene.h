@@ -46,11 +46,6 @@ class RayScene {
   std::unique_ptr<State> state_;
 };
 
-// The ray of a pixel in the camera's frame, with z = 1.
-inline Eigen::Vector3d PixelRay(const Intrinsics& k, double u, double v) {
-  return {(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0};
-}
-
 // Which pixels a rasteriser and a ray must agree on.
 struct RayCheckConfig {
   // Beyond this angle between ray and normal a shift of 1/256 pixel, the rasteriser's grid for

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/pixel_ray.h"
 namespace tsdfpp {
 namespace {
 
@@ -88,7 +89,7 @@ int MendSliverPixels(CompiledScene& scene, const Intrinsics& k, const Pose& T_WC
   }
   const Eigen::Vector3d origin = T_WC.translation();
   for (const cv::Point& pixel : doubtful) {
-    const Eigen::Vector3d ray_C((pixel.x - k.cx) / k.fx, (pixel.y - k.cy) / k.fy, 1.0);
+    const Eigen::Vector3d ray_C = PixelRay(k, pixel.x, pixel.y);
     const Eigen::Vector3d direction = T_WC.linear() * ray_C;
     int geom = -1;
     const mjtNum range = mj_ray(scene.model(), scene.data(), origin.data(), direction.data(),
