@@ -23,7 +23,7 @@ constexpr double kMost_m = kPixel_voxels * kToyVoxel_m;
 constexpr double kMost_rad = kMost_m / 0.35;
 
 // A table with two walls, so that nothing of the camera's motion is free, and a brick that slides.
-Frame Room(int index) {
+Frame RoomFrom(double camera_angle_rad, int index) {
   reference::Scene scene = TableOnly();
   scene.shapes.push_back(reference::Cuboid(kBackground, {90, 90, 90},
                                            MakePose(0, Eigen::Vector3d::UnitZ(), {-0.27, 0, 0.06}),
@@ -33,7 +33,20 @@ Frame Room(int index) {
                                            {0.24, 0.02, 0.08}));
   AddBrick(scene, 0.3, {-0.12 + 0.006 * index, 0.06, kTableTop_m + 0.045});
   const Intrinsics camera{192, 144, 160.0, 160.0, 95.5, 71.5};
-  return reference::Render(scene, CircleCamera(0.5 + 0.02 * index), index, camera);
+  return reference::Render(scene, CircleCamera(camera_angle_rad), index, camera);
+}
+
+Frame Room(int index) { return RoomFrom(0.5 + 0.02 * index, index); }
+
+// A camera that creeps, by a fiftieth of a voxel a frame, and sees its depth through noise: that it
+// stands still is hardly less likely than that it moves.
+Frame CreepingRoom(int index) {
+  Frame frame = RoomFrom(0.5 + 0.001 * index, index);
+  Dice dice(static_cast<std::uint64_t>(index));
+  for (float& z : cv::Mat_<float>(frame.depth)) {
+    if (IsValidDepth(z)) z += static_cast<float>(dice.Uniform(-0.004, 0.004));
+  }
+  return frame;
 }
 
 PipelineConfig ConfigOf(CameraSource camera, Method method = Method::kTsdfppAnchored) {
@@ -144,6 +157,23 @@ TEST(CameraTracker, LooksAtNothingWherePosesAreGiven) {
   for (int i = 1; i <= 3; ++i) ASSERT_TRUE(pipeline.Process(Room(i)));
   EXPECT_TRUE(pipeline.camera_log().T_WC.empty());
   EXPECT_EQ(pipeline.camera_log().located, 0);
+}
+
+// Where a camera is said to be it is, until something speaks against that. Where it was a frame ago
+// is no such word.
+TEST(CameraTracker, KeepsGivenPosesAndNotThoseOfBefore) {
+  Pipeline refined(ConfigOf(CameraSource::kRefine), Toys());
+  Pipeline tracked(ConfigOf(CameraSource::kTrack), Toys());
+  for (int i = 1; i <= 4; ++i) {
+    const Frame frame = CreepingRoom(i);
+    ASSERT_TRUE(refined.Process(frame));
+    ASSERT_TRUE(tracked.Process(frame));
+    const Pose& by_refine = refined.camera_log().T_WC.at(i);
+    EXPECT_LT((by_refine.matrix() - frame.T_WC.matrix()).norm(), 1e-12) << i;
+    if (i == 1) continue;
+    const Pose& by_track = tracked.camera_log().T_WC.at(i);
+    EXPECT_GT((by_track.matrix() - CreepingRoom(1).T_WC.matrix()).norm(), 1e-6) << i;
+  }
 }
 
 TEST(CameraTracker, NeedsSignedDistances) {
