@@ -182,6 +182,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     }
   } else if (until >= 0) {
     return UsageError("--until {} needs a sequence to map", until);
+  } else if (const char* option = source.Option(); option != nullptr) {
+    return UsageError("{} needs a sequence to map", option);
   } else if (source.scene.IsAny()) {
     return UsageError("{} needs a scene to map", source.scene.seed ? "--seed" : "--sensor");
   } else if (wishes.track.tracked != TrackChoice::kAuto || wishes.track.config) {

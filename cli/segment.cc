@@ -116,10 +116,29 @@ std::string ScoreText(const Measured& value) {
   return value.value ? fmt::format("{:.3f}", *value.value) : "-";
 }
 
+// Errors: kUsage where `out` lies in the sequence's folder, or is that of the masks.
+Expected<void> CheckOut(const SegmentArguments& options) {
+  namespace fs = std::filesystem;
+  std::error_code failure;
+  const fs::path out = fs::weakly_canonical(options.out, failure);
+  const auto refused = [&](const std::string& read) {
+    return UsageError("--out '{}' lies in '{}', which is read, expected a folder outside",
+                      options.out, read);
+  };
+  if (fs::is_directory(options.source.path, failure)) {
+    const fs::path way = out.lexically_relative(fs::weakly_canonical(options.source.path, failure));
+    if (!way.empty() && *way.begin() != "..") return refused(options.source.path);
+  }
+  const std::string& masks = options.segmentation.masks;
+  if (!masks.empty() && out == fs::weakly_canonical(masks, failure)) return refused(masks);
+  return {};
+}
+
 Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::App& app) {
   if (IsOurSequence(options.out)) {
     return UsageError("--out '{}' is a sequence, expected another folder", options.out);
   }
+  TSDFPP_RETURN_IF_ERROR(CheckOut(options));
   TSDFPP_ASSIGN(const std::unique_ptr<Segmenter> segmenter, MakeSegmenterOf(options));
   TSDFPP_ASSIGN(const std::unique_ptr<FrameSource> source, OpenArguments(options.source));
   const SequenceInfo& info = source->info();
@@ -128,8 +147,13 @@ Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::A
   for (int i = 0; i < info.frame_count; i += options.every) {
     files.insert(SegmentWriter::NameOf(info.first_index + i));
   }
-  if (options.colour) files.insert("colour/" + SegmentWriter::NameOf(info.first_index));
-  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files)));
+  if (options.colour) {
+    for (int i = 0; i < info.frame_count; i += options.every) {
+      files.insert("colour/" + SegmentWriter::NameOf(info.first_index + i));
+    }
+  }
+  // Images that have the names of ours are often what others made or read.
+  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files), ForeignFiles::kStay));
   SegmentWriter writer(options, *source, run_folder.path());
   {
     ProgressBar bar("segment");

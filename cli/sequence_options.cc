@@ -55,6 +55,16 @@ CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
   return path;
 }
 
+const char* SequenceArguments::Option() const {
+  if (!dataset.empty()) return "--dataset";
+  if (!calibration.empty()) return "--calibration";
+  if (depth_units > 0) return "--depth-units";
+  if (fixed_camera) return "--fixed-camera";
+  if (pose_offset_s != 0) return "--pose-offset";
+  if (unchecked) return "--unchecked";
+  return nullptr;
+}
+
 std::string TextOf(const SequenceArguments& arguments) {
   std::string text = arguments.path;
   if (!arguments.dataset.empty()) text += " --dataset " + arguments.dataset;

@@ -21,6 +21,9 @@ struct SequenceArguments {
   double pose_offset_s = 0;  // --pose-offset
   bool unchecked = false;
   SceneOptions scene;  // --sensor, --seed
+
+  // One of the options on sequences that was given, null where none was.
+  const char* Option() const;
 };
 
 // Adds the positional argument `name` and the options; returns the argument, which is required.

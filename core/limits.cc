@@ -29,7 +29,7 @@ constexpr std::array<NamedLimit, 9> kAllLimits = {{
     {"nesting", &Limits::nesting, 1, kMostNesting,
      "lists and objects within one another, in JSON and in TOML"},
     {"image_side", &Limits::image_side, 2, kMostSide, "pixels of an image's width or height"},
-    {"image_pixels", &Limits::image_pixels, 4, kMostPixels, "pixels of an image"},
+    {"image_pixels", &Limits::image_pixels, 4, kMostPixels, "pixels of an image, and of the boxes of a frame's masks together (`--masks`)"},
     {"frames", &Limits::frames, 1, kMostFrames, "frames of a sequence"},
     {"map_bytes", &Limits::map_bytes, 1, kAnySize, "bytes of a saved map once it is unfolded"},
     {"mesh_elements", &Limits::mesh_elements, 1, kMostElements,

@@ -109,7 +109,21 @@ Expected<void> CheckFarthestSeen(const Frame& frame) {
 
 }  // namespace
 
-Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
+namespace {
+
+// Whether it is of the camera's size and of the type.
+Expected<void> CheckImageForm(const Frame& frame, const char* name, const cv::Mat& image, int type,
+                              const char* type_name) {
+  const Intrinsics& k = frame.intrinsics;
+  if (image.type() == type && image.size() == cv::Size(k.width, k.height)) return {};
+  return DataError("frame {}: its {} image is {}x{} (type {}), expected {}x{} of {} (type {})",
+                   frame.index, name, image.cols, image.rows, image.type(), k.width, k.height,
+                   type_name, type);
+}
+
+}  // namespace
+
+Expected<void> CheckFrameForm(const Frame& frame) {
   const Intrinsics& k = frame.intrinsics;
   const auto number = [](double x) { return std::isfinite(x); };
   if (k.width < kLeastSide_px || k.height < kLeastSide_px || !(k.fx > 0) || !(k.fy > 0) ||
@@ -119,21 +133,14 @@ Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
         "({:g}, {:g}), expected {} pixels a side at least and focal lengths above 0",
         frame.index, k.width, k.height, k.fx, k.fy, k.cx, k.cy, kLeastSide_px);
   }
-  struct Image {
-    const char* name;
-    const cv::Mat& image;
-    int type;
-    const char* type_name;
-  };
-  for (const Image& of : {Image{"colour", frame.colour, CV_8UC3, "8-bit colours"},
-                          Image{"depth", frame.depth, CV_32FC1, "32-bit depths"},
-                          Image{"mask", labels, CV_16UC1, "16-bit ids"}}) {
-    if (of.image.type() == of.type && of.image.size() == cv::Size(k.width, k.height)) continue;
-    return DataError("frame {}: its {} image is {}x{} (type {}), expected {}x{} of {} (type {})",
-                     frame.index, of.name, of.image.cols, of.image.rows, of.image.type(), k.width,
-                     k.height, of.type_name, of.type);
-  }
+  TSDFPP_RETURN_IF_ERROR(CheckImageForm(frame, "colour", frame.colour, CV_8UC3, "8-bit colours"));
+  TSDFPP_RETURN_IF_ERROR(CheckImageForm(frame, "depth", frame.depth, CV_32FC1, "32-bit depths"));
   return CheckRigid(frame.T_WC, fmt::format("frame {}: the camera's", frame.index));
+}
+
+Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels) {
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame));
+  return CheckImageForm(frame, "mask", labels, CV_16UC1, "16-bit ids");
 }
 
 Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,

@@ -14,6 +14,8 @@ namespace tsdfpp {
 // is that which is given.
 // Errors: kData, a sentence beginning with the frame's number. No pixel is looked at.
 Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels);
+// The same of what there is before segmentation: all but the mask.
+Expected<void> CheckFrameForm(const Frame& frame);
 
 // Whether the map can take these poses of objects and then this frame, whose form is right: the
 // poses, what they move, the camera, and all that the frame's depth may show lie in the range.

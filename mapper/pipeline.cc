@@ -198,6 +198,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
 }
 
 Expected<Segments> Pipeline::Segment(const Frame& frame) {
+  TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame));
   TSDFPP_ASSIGN(Segments segments, segmenter_->Segment(frame));
   TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
   if (repair_ != nullptr) {

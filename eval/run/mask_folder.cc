@@ -10,6 +10,7 @@
 
 #include "core/data_folder.h"
 #include "core/folders.h"
+#include "core/limits.h"
 #include "sequence/integer_images.h"
 
 namespace tsdfpp {
@@ -30,26 +31,35 @@ struct NamedMask {
 
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
-// The digits at the end of `text`, which are taken off it.
-std::optional<int> TakeNumber(std::string_view& text) {
+// The digits at the end of `text`, which are taken off it; nothing where there are none. Errors:
+// kData, naming `file`: more digits than a frame's number has, or a time's behind its point.
+Expected<std::optional<int>> TakeNumber(std::string_view& text, const fs::path& file) {
   std::size_t begin = text.size();
   while (begin > 0 && IsDigit(text[begin - 1])) --begin;
+  if (begin == text.size()) return std::nullopt;
+  const std::string_view digits = text.substr(begin);
+  text.remove_suffix(digits.size());
+  if (text.ends_with('.')) {
+    return DataError("{}: is named after a time, expected the number of a frame", file.string());
+  }
   int number = 0;
-  const auto [end, fault] = std::from_chars(text.data() + begin, text.data() + text.size(), number);
-  if (begin == text.size() || fault != std::errc()) return std::nullopt;
-  text.remove_suffix(text.size() - begin);
+  if (std::from_chars(digits.data(), digits.data() + digits.size(), number).ec != std::errc()) {
+    return DataError("{}: {} is no number of a frame", file.string(), digits);
+  }
   return number;
 }
 
-// What a name without ending says; nothing where it has no number at its end.
-std::optional<NamedMask> NameOf(std::string_view stem) {
-  const auto last = TakeNumber(stem);
+// What the name says; nothing where it has no number at its end. Errors: those of TakeNumber.
+Expected<std::optional<NamedMask>> NameOf(const fs::path& file) {
+  const std::string name = file.stem().string();
+  std::string_view stem = name;
+  TSDFPP_ASSIGN(const std::optional<int> last, TakeNumber(stem, file));
   if (!last) return std::nullopt;
-  if (!stem.ends_with('_')) return NamedMask{MaskKind::kIds, *last, 0, {}};
+  if (!stem.ends_with('_')) return NamedMask{MaskKind::kIds, *last, 0, file};
   stem.remove_suffix(1);
-  const auto frame = TakeNumber(stem);
-  if (!frame) return NamedMask{MaskKind::kIds, *last, 0, {}};
-  return NamedMask{MaskKind::kInstance, *frame, *last, {}};
+  TSDFPP_ASSIGN(const std::optional<int> frame, TakeNumber(stem, file));
+  if (!frame) return NamedMask{MaskKind::kIds, *last, 0, file};
+  return NamedMask{MaskKind::kInstance, *frame, *last, file};
 }
 
 bool IsImage(const fs::path& file) {
@@ -65,7 +75,7 @@ Expected<std::vector<NamedMask>> MasksIn(const fs::path& folder) {
   std::vector<NamedMask> masks;
   const std::string name = folder.filename().string();
   std::string_view digits = name;
-  const auto frame = TakeNumber(digits);
+  TSDFPP_ASSIGN(const std::optional<int> frame, TakeNumber(digits, folder));
   if (!frame || !digits.empty()) return masks;
   TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFolder(folder));
   for (const fs::path& file : files) {
@@ -85,13 +95,17 @@ Expected<std::vector<NamedMask>> ListMasks(const fs::path& folder) {
       continue;
     }
     if (!IsImage(entry)) continue;
-    const std::string stem = entry.stem().string();
-    auto named = NameOf(stem);
-    if (!named) continue;
-    named->file = entry;
-    masks.push_back(std::move(*named));
+    TSDFPP_ASSIGN(std::optional<NamedMask> named, NameOf(entry));
+    if (named) masks.push_back(std::move(*named));
   }
   return masks;
+}
+
+// Whether two masks of a frame that follow each other have one number (1_3.png and 01_3.png), or
+// are of two folders (1/ and 01/).
+bool IsThereTwice(const NamedMask& a, const NamedMask& b) {
+  return a.kind == MaskKind::kInstance ? a.instance == b.instance
+                                       : a.file.parent_path() != b.file.parent_path();
 }
 
 // The instance of the pixels that are not 0 in `is_there`; nothing where there are none.
@@ -109,7 +123,15 @@ std::optional<Instance> InstanceOf(const cv::Mat& is_there) {
   return Instance{box, is_there(box).clone(), kClass, static_cast<float>(1 - share)};
 }
 
-std::vector<Instance> InstancesOfIds(const cv::Mat& ids) {
+// Masks are data: where many are spread over the image their boxes are far more than it.
+Expected<void> CheckBoxes(const Frame& frame, const fs::path& folder, std::int64_t pixels) {
+  return CheckLimit(
+      &Limits::image_pixels, pixels,
+      fmt::format("frame {}: {}: the boxes of its masks", frame.index, folder.string()), "pixels");
+}
+
+Expected<std::vector<Instance>> InstancesOfIds(const cv::Mat& ids, const Frame& frame,
+                                               const fs::path& folder) {
   std::map<InstanceId, cv::Rect> boxes;
   for (int v = 0; v < ids.rows; ++v) {
     const auto* row = ids.ptr<InstanceId>(v);
@@ -117,6 +139,9 @@ std::vector<Instance> InstancesOfIds(const cv::Mat& ids) {
       if (row[u] != kBackground && row[u] != kNoInstance) boxes[row[u]] |= cv::Rect(u, v, 1, 1);
     }
   }
+  std::int64_t pixels = 0;
+  for (const auto& [id, box] : boxes) pixels += box.area();
+  TSDFPP_RETURN_IF_ERROR(CheckBoxes(frame, folder, pixels));
   std::vector<Instance> instances;
   instances.reserve(boxes.size());
   for (const auto& [id, box] : boxes) {
@@ -140,6 +165,7 @@ Expected<std::unique_ptr<MaskFolder>> MaskFolder::Open(const fs::path& folder) {
   });
   std::unique_ptr<MaskFolder> opened(new MaskFolder(folder));
   opened->is_of_ids_ = masks.front().kind == MaskKind::kIds;
+  const NamedMask* before = nullptr;
   for (const NamedMask& mask : masks) {
     if (mask.kind != masks.front().kind) {
       return DataError("{}: {} and {} are masks of different kinds, expected one kind",
@@ -150,7 +176,12 @@ Expected<std::unique_ptr<MaskFolder>> MaskFolder::Open(const fs::path& folder) {
       return DataError("{} and {} are both the ids of frame {}, expected one image",
                        files.front().string(), mask.file.string(), mask.frame);
     }
+    if (!files.empty() && IsThereTwice(*before, mask)) {
+      return DataError("{} and {} are both of frame {}, expected one of the two",
+                       files.back().string(), mask.file.string(), mask.frame);
+    }
     files.push_back(mask.file);
+    before = &mask;
   }
   return opened;
 }
@@ -170,12 +201,17 @@ Expected<std::vector<Instance>> MaskFolder::Find(const Frame& frame) {
                      folder_.string(), files->second.size(), kNoInstance - 1);
   }
   const DataFolder folder(folder_);
+  std::int64_t pixels = 0;
   for (const fs::path& file : files->second) {
     TSDFPP_RETURN_IF_ERROR(folder.CheckLinks(file));
     const auto ids = ReadIds(file, frame.depth.size(), "the frame's depth");
     if (!ids) return DataError("frame {}: {}", frame.index, ids.error().message);
-    if (is_of_ids_) return InstancesOfIds(*ids);
-    if (auto instance = InstanceOf(*ids != 0)) instances.push_back(std::move(*instance));
+    if (is_of_ids_) return InstancesOfIds(*ids, frame, folder_);
+    auto instance = InstanceOf(*ids != 0);
+    if (!instance) continue;
+    pixels += instance->box.area();
+    TSDFPP_RETURN_IF_ERROR(CheckBoxes(frame, folder_, pixels));
+    instances.push_back(std::move(*instance));
   }
   return instances;
 }

@@ -206,7 +206,7 @@ std::set<std::string> RunFolder::OldFiles() const {
   return old;
 }
 
-Expected<void> RunFolder::CheckPlaces(std::set<std::string> files) const {
+Expected<void> RunFolder::CheckPlaces(std::set<std::string> files, ForeignFiles foreign) const {
   const std::set<std::string> old = OldFiles();
   files.insert({kRunNote, kRunMoving});
   std::error_code failure;
@@ -224,7 +224,16 @@ Expected<void> RunFolder::CheckPlaces(std::set<std::string> files) const {
         return UsageError("{}: is a file, expected a folder or nothing", (out_ / folder).string());
       }
     }
-    if (!fs::is_directory(fs::symlink_status(out_ / name, failure))) continue;
+    const fs::file_status there = fs::symlink_status(out_ / name, failure);
+    if (fs::is_other(there)) {
+      return UsageError("{}: is no regular file, expected one or nothing", (out_ / name).string());
+    }
+    if (foreign == ForeignFiles::kStay && fs::exists(there) && !fs::is_directory(there) &&
+        !old.contains(name) && name != kRunNote && name != kRunMoving) {
+      return UsageError("{}: is of no earlier run and would be replaced, expected another folder",
+                        (out_ / name).string());
+    }
+    if (!fs::is_directory(there)) continue;
     // A folder of the old run's files alone goes with them, and one without files.
     for (const fs::path& file : FilesIn(out_ / name, failure)) {
       if (!old.contains(file.lexically_relative(out_).string())) {

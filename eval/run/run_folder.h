@@ -24,6 +24,9 @@ struct RunNote {
 
 inline constexpr const char* kRunNote = "run.json";
 
+// What becomes of files that no run wrote down, where new ones have their names.
+enum class ForeignFiles { kAreReplaced, kStay };
+
 // A run writes all its files into a hidden folder inside its output folder. In the end they move to
 // their places: the old run.json goes first, then what else that run left; what nobody wrote down
 // stays, but for files of the same names as new ones. The new run.json comes last. So whoever finds
@@ -47,14 +50,16 @@ class RunFolder {
   const std::string& id() const { return note_.run; }
 
   // Whether files of these names could take their places: who knows what will be written asks
-  // before the work. Errors: kUsage, as Commit.
-  Expected<void> CheckPlaces(std::set<std::string> files) const;
+  // before the work. Errors: kUsage, as Commit, and where `foreign` ones that are to stay have such
+  // a name.
+  Expected<void> CheckPlaces(std::set<std::string> files,
+                             ForeignFiles foreign = ForeignFiles::kAreReplaced) const;
 
   // Moves everything to its place. Of the files named in `rewritten` the size is not kept. Errors:
-  // kUsage where a folder of somebody else's stands in a file's place, or a file or link in a
-  // folder's,
-  // kData where a name cannot be printed: then all is as before; kEnvironment where the disk
-  // refuses: the folder may then be without run.json, and the same command puts it in order.
+  // kUsage where a folder of somebody else's, a pipe or a device stands in a file's place, or a
+  // file or link in a folder's, kData where a name cannot be printed: then all is as before;
+  // kEnvironment where the disk refuses: the folder may then be without run.json, and the same
+  // command puts it in order.
   Expected<void> Commit(const std::set<std::string>& rewritten = {});
 
  private:

@@ -66,11 +66,15 @@ class NetworkFinder : public InstanceFinder {
       : loaded_(std::move(loaded)), format_(format), config_(std::move(config)) {}
 
   Expected<std::vector<Instance>> Find(const Frame& frame) override {
-    const bool has_colour =
-        frame.colour.type() == CV_8UC3 && frame.colour.size() == frame.depth.size();
+    const bool has_colour = frame.colour.type() == CV_8UC3 && !frame.colour.empty() &&
+                            frame.colour.size() == frame.depth.size();
     if (!has_colour) {
       return DataError("frame {} has no colour of the size of its depth, which a network needs",
                        frame.index);
+    }
+    if (frame.depth.type() != CV_32FC1) {
+      return DataError("frame {}: its depth is of type {}, expected 32-bit depths (type {})",
+                       frame.index, frame.depth.type(), CV_32FC1);
     }
     // The network keeps what it computes with.
     const std::lock_guard lock(mutex_);
@@ -120,6 +124,12 @@ class NetworkFinder : public InstanceFinder {
                            ? config_.height
                            : std::max(1, static_cast<int>(std::lround(static_cast<double>(width) *
                                                                       image.height / image.width)));
+    if (height > kMostNetworkSide_px) {
+      return DataError(
+          "frame {}: an image of {}x{} is {}x{} for a network {} pixels wide, expected a height of "
+          "{} at most: set width and height",
+          frame.index, image.width, image.height, width, height, width, kMostNetworkSide_px);
+    }
     const cv::Size part(width, height);
     const auto filled = [](int side) { return (side + kStride_px - 1) / kStride_px * kStride_px; };
     const cv::Mat blob = OwnInput(frame, part, {filled(width), filled(height)});
@@ -171,10 +181,11 @@ class NetworkFinder : public InstanceFinder {
     const cv::Size input(config_.width > 0 ? config_.width : kYoloSide_px,
                          config_.height > 0 ? config_.height : kYoloSide_px);
     const Letterbox letterbox = LetterboxOf(image, input);
-    const cv::Rect place(static_cast<int>(std::lround(letterbox.offset.x)),
-                         static_cast<int>(std::lround(letterbox.offset.y)),
-                         static_cast<int>(std::lround(letterbox.scale * image.width)),
-                         static_cast<int>(std::lround(letterbox.scale * image.height)));
+    const cv::Rect place(
+        static_cast<int>(std::lround(letterbox.offset.x)),
+        static_cast<int>(std::lround(letterbox.offset.y)),
+        std::max(1, static_cast<int>(std::lround(letterbox.scale * image.width))),
+        std::max(1, static_cast<int>(std::lround(letterbox.scale * image.height))));
     cv::Mat picture(input, CV_8UC3, cv::Scalar::all(kYoloGrey));
     const cv::Rect within = place & cv::Rect(cv::Point(), input);
     cv::resize(frame.colour, picture(within), within.size(), 0, 0, cv::INTER_LINEAR);

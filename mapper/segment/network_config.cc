@@ -3,10 +3,11 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "core/plain_name.h"
+
 namespace tsdfpp {
 namespace {
 
-constexpr int kMostSide_px = 4096;
 constexpr std::size_t kMostClasses = 10'000;
 
 Expected<void> CheckNetwork(std::string_view field, double value, double lowest, double highest) {
@@ -40,8 +41,8 @@ std::string_view NetworkFormatName(NetworkFormat format) {
 }
 
 Expected<void> NetworkConfig::Validate() const {
-  TSDFPP_RETURN_IF_ERROR(CheckNetwork("width", width, 0, kMostSide_px));
-  TSDFPP_RETURN_IF_ERROR(CheckNetwork("height", height, 0, kMostSide_px));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("width", width, 0, kMostNetworkSide_px));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("height", height, 0, kMostNetworkSide_px));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("least_score", least_score, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("most_overlap", most_overlap, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_share", mask_share, 0, 1));
@@ -60,6 +61,8 @@ Expected<void> NetworkConfig::Validate() const {
   }
   for (const std::string& name : classes) {
     if (name.empty()) return UsageError("network setting 'classes' has an empty name");
+    const auto is_label = CheckLabel(name, "network setting 'classes'");
+    if (!is_label) return UsageError("{}", is_label.error().message);
   }
   return {};
 }

@@ -22,6 +22,9 @@ enum class NetworkFormat {
 Expected<NetworkFormat> NetworkFormatFromName(std::string_view name);
 std::string_view NetworkFormatName(NetworkFormat format);
 
+// Of a network's input: greatest width and height.
+inline constexpr int kMostNetworkSide_px = 4096;
+
 struct NetworkConfig {
   NetworkFormat format = NetworkFormat::kAuto;
   std::vector<std::string> classes{};  // names by number; none: those of COCO, or "thing"

@@ -226,5 +226,34 @@ TEST_F(SegmentCommand, RefusesWithOneSentence) {
   EXPECT_EQ(Run({}, unmasked).exit_code, 0);
 }
 
+// Ids have the names that images of data sets have.
+TEST_F(SegmentCommand, WhatIsReadIsNotWrittenOver) {
+  const fs::path recording = Recording();
+  const auto refused = [&](const fs::path& out, const std::vector<std::string>& more,
+                           const char* words) {
+    std::vector<std::string> arguments{"segment", recording, "--out", out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const CommandOutput run = test::RunTsdfpp(arguments, folder_.path());
+    EXPECT_EQ(run.exit_code, kUsage) << out;
+    EXPECT_NE(run.err.find(words), std::string::npos) << run.err;
+  };
+  refused(recording, {}, "which is read, expected a folder outside");
+  refused(recording / "depth", {}, "which is read, expected a folder outside");
+  refused(recording / "new/one", {}, "which is read, expected a folder outside");
+  fs::create_directory_symlink(recording / "depth", folder_ / "link");
+  refused(folder_ / "link", {}, "which is read, expected a folder outside");
+  ASSERT_EQ(Run({"--segmentation", "gt"}, recording).exit_code, 0);
+  fs::rename(folder_ / "out", folder_ / "masks");
+  refused(folder_ / "masks", {"--segmentation", "network", "--masks", folder_ / "masks"},
+          "which is read, expected a folder outside");
+  // What somebody else put there.
+  fs::create_directories(folder_ / "theirs/colour");
+  ASSERT_TRUE(WriteFile(folder_ / "theirs/colour/000002.png", "x").has_value());
+  refused(folder_ / "theirs", {"--colour"}, "000002.png: is of no earlier run");
+  EXPECT_EQ(ReadFile(folder_ / "theirs/colour/000002.png").value(), "x");
+  fs::rename(folder_ / "masks", folder_ / "out");
+  EXPECT_EQ(Run({"--segmentation", "gt"}, recording).exit_code, 0) << "an earlier run's own";
+}
+
 }  // namespace
 }  // namespace tsdfpp

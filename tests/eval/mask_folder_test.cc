@@ -95,5 +95,46 @@ TEST_F(MaskFolderTest, RefusesWithOneSentence) {
   EXPECT_NE(words.find("7x4"), std::string::npos) << words;
 }
 
+// Names after times would give each frame the mask of another, or none.
+TEST_F(MaskFolderTest, NamesOfTimesAreRefused) {
+  Write("1305031453.000000.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("1305031453.000000.png: is named after a time"), std::string::npos)
+      << OpenError();
+  fs::remove(folder_ / "1305031453.000000.png");
+  Write("99999999999.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("99999999999 is no number of a frame"), std::string::npos)
+      << OpenError();
+}
+
+TEST_F(MaskFolderTest, WhatIsThereTwiceIsRefused) {
+  Write("1_3.png", {0, 0, 1, 1}, 1);
+  Write("1_4.png", {0, 0, 1, 1}, 1);
+  EXPECT_EQ(OpenError(), "");
+  Write("a01_3.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("are both of frame 1"), std::string::npos) << OpenError();
+  for (const char* name : {"1_3.png", "1_4.png", "a01_3.png"}) fs::remove(folder_ / name);
+  Write("2/a.png", {0, 0, 1, 1}, 1);
+  Write("2/b.png", {0, 0, 1, 1}, 1);
+  EXPECT_EQ(OpenError(), "");
+  Write("02/a.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("are both of frame 2"), std::string::npos) << OpenError();
+}
+
+// Each id gets a mask of its box: ids that lie all over the image would take memory without bound.
+TEST_F(MaskFolderTest, BoxesAreAsLargeTogetherAsAnImageMayBe) {
+  constexpr int kSide_px = 400;
+  constexpr int kIds = 1000;  // of 160 pixels each, whose boxes are nearly the image
+  cv::Mat ids(kSide_px, kSide_px, CV_16UC1);
+  cv::RNG(1).fill(ids, cv::RNG::UNIFORM, 1, 1 + kIds);
+  ASSERT_TRUE(cv::imwrite((folder_ / "1.png").string(), ids));
+  Frame frame = FrameNumber(1);
+  frame.depth = cv::Mat(kSide_px, kSide_px, CV_32FC1, cv::Scalar(1));
+  const auto found = MaskFolder::Open(folder_.path()).value()->Find(frame);
+  ASSERT_FALSE(found.has_value());
+  EXPECT_EQ(found.error().kind, ErrorKind::kData);
+  EXPECT_NE(found.error().message.find("frame 1: "), std::string::npos) << found.error().message;
+  EXPECT_NE(found.error().message.find("image_pixels"), std::string::npos) << found.error().message;
+}
+
 }  // namespace
 }  // namespace tsdfpp

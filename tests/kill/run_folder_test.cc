@@ -297,5 +297,28 @@ TEST(RunFolder, FoldersWithoutFilesMakePlace) {
   }
 }
 
+// A pipe or a device would be replaced by a file. Files that no run wrote stay where they are asked
+// to; those of an earlier run give way.
+TEST(RunFolder, WhatIsNoFileOrOfNobodyStays) {
+  const TempFolder folder;
+  const fs::path out = folder / "out";
+  fs::create_directories(out);
+  ASSERT_EQ(mkfifo((out / "pipe").c_str(), 0600), 0);
+  ASSERT_TRUE(WriteFile(out / "1.png", "theirs").has_value());
+  auto run = RunFolder::Begin(out, "c");
+  ASSERT_TRUE(run.has_value());
+  const auto pipe = run->CheckPlaces({"pipe"});
+  ASSERT_FALSE(pipe.has_value());
+  EXPECT_NE(pipe.error().message.find("pipe: is no regular file"), std::string::npos);
+  EXPECT_TRUE(run->CheckPlaces({"1.png"}).has_value());
+  const auto theirs = run->CheckPlaces({"1.png", "2.png"}, ForeignFiles::kStay);
+  ASSERT_FALSE(theirs.has_value());
+  EXPECT_NE(theirs.error().message.find("1.png: is of no earlier run"), std::string::npos)
+      << theirs.error().message;
+  ASSERT_TRUE(WriteFile(run->path() / "2.png", "ours").has_value());
+  ASSERT_TRUE(run->Commit().has_value());
+  EXPECT_TRUE(run->CheckPlaces({"2.png"}, ForeignFiles::kStay).has_value());
+}
+
 }  // namespace
 }  // namespace tsdfpp

@@ -230,5 +230,43 @@ TEST(OwnInstanceNetwork, RunsOnAnyShapeAndNumberOfThreads) {
   }
 }
 
+TEST(InstanceNetwork, DepthOfAnotherTypeIsRefused) {
+  const auto finder = LoadInstanceNetwork(NetworkFile("centres.onnx"), {}).value();
+  Frame frame = FrameOf(64, 32, [](int, int) { return cv::Vec3b(0, 0, 0); });
+  frame.depth = cv::Mat(32, 64, CV_16UC1, cv::Scalar(1000));
+  EXPECT_NE(finder->Find(frame).error().message.find("expected 32-bit depths"), std::string::npos);
+  frame.colour = cv::Mat(0, 5, CV_8UC3);
+  frame.depth = cv::Mat(0, 5, CV_32FC1);
+  EXPECT_NE(finder->Find(frame).error().message.find("has no colour"), std::string::npos);
+}
+
+// An image 2 pixels wide and 16,384 high, as high as one may be.
+TEST(InstanceNetwork, ImagesOfExtremeShape) {
+  const auto black = [](int, int) { return cv::Vec3b(0, 0, 0); };
+  const auto own = OwnInstanceNetwork({}).value();
+  EXPECT_NE(own->Find(FrameOf(2, 16384, black)).error().message.find("expected a height of 4096"),
+            std::string::npos);
+  const auto yolo = LoadInstanceNetwork(NetworkFile("yolo_v8.onnx"),
+                                        {.classes = {"cup", "car"}, .width = 64, .height = 64})
+                        .value();
+  for (const auto& frame : {FrameOf(2, 16384, black), FrameOf(16384, 2, black)}) {
+    EXPECT_TRUE(yolo->Find(frame).has_value());
+  }
+}
+
+// A class becomes the word of an object, and a saved map's.
+TEST(NetworkConfig, ClassesAreLabels) {
+  for (const std::string& name : {std::string("a\0b", 3), std::string(101, 'x'), std::string()}) {
+    NetworkConfig config;
+    config.classes = {"cup", name};
+    const auto status = config.Validate();
+    ASSERT_FALSE(status.has_value());
+    EXPECT_EQ(status.error().kind, ErrorKind::kUsage);
+  }
+  NetworkConfig config;
+  config.classes = {"cup", "toy car"};
+  EXPECT_TRUE(config.Validate().has_value());
+}
+
 }  // namespace
 }  // namespace tsdfpp

@@ -165,5 +165,42 @@ TEST(PipelineForm, WhatNoNumberCanHoldIsRefused) {
   }
 }
 
+// Segments of depth and networks see a frame first of all.
+TEST(PipelineForm, IsAskedForBeforeSegments) {
+  class Nobody : public InstanceFinder {
+   public:
+    Expected<std::vector<Instance>> Find(const Frame&) override {
+      ++asked;
+      return std::vector<Instance>{};
+    }
+    int asked = 0;
+  };
+  const std::vector<std::function<void(Frame&)>> faults{
+      [](Frame& f) { f.intrinsics.fx = std::numeric_limits<double>::quiet_NaN(); },
+      [](Frame& f) { f.intrinsics.fy = -f.intrinsics.fy; },
+      [](Frame& f) { f.depth.convertTo(f.depth, CV_16UC1, 1000); },
+      [](Frame& f) { f.colour = cv::Mat(0, 5, CV_8UC3); }, [](Frame& f) { f.depth = cv::Mat(); }};
+  for (const Segmentation segmentation : {Segmentation::kDepth, Segmentation::kFull}) {
+    const auto finder = std::make_shared<Nobody>();
+    PipelineConfig config;
+    config.map = DyadicConfig();
+    config.segmentation = segmentation;
+    config.segmenter.finder = finder;
+    config.associate = AssociationMode::kVotes;
+    config.poses = PoseSource::kTrack;
+    Pipeline pipeline(config, {});
+    for (std::size_t k = 0; k < faults.size(); ++k) {
+      Frame bad = DyadicFrame(0);
+      faults[k](bad);
+      const auto status = pipeline.Process(bad);
+      ASSERT_FALSE(status.has_value()) << k;
+      EXPECT_EQ(status.error().kind, ErrorKind::kData);
+    }
+    EXPECT_EQ(finder->asked, 0);
+    const auto good = pipeline.Process(DyadicFrame(0));
+    EXPECT_TRUE(good.has_value()) << good.error().message;
+  }
+}
+
 }  // namespace
 }  // namespace tsdfpp
