@@ -42,8 +42,9 @@ Expected<void> CheckTracking(const TrackWishes& wishes, const std::vector<PoseSo
     return std::find(poses.begin(), poses.end(), source) != poses.end();
   };
   if (wishes.tracked != TrackChoice::kAuto && !are(PoseSource::kIcp) && !are(PoseSource::kTrack)) {
-    return UsageError("--track {} needs --poses icp or track: given poses are not tracked",
-                      TrackChoiceName(wishes.tracked));
+    return UsageError("--track {} needs --poses {}: given poses are not tracked",
+                      TrackChoiceName(wishes.tracked),
+                      wishes.tracked == TrackChoice::kMoving ? "track" : "icp or track");
   }
   if (wishes.config && !are(PoseSource::kTrack) && camera == CameraSource::kGiven) {
     return UsageError("--track-config needs --poses track, or --camera refine or track");
