@@ -127,6 +127,15 @@ TEST_F(CommandErrors, MapFiles) {
   ExpectError(with({"--until", "3"}), kUsage, {"--until 3", "sequence"});
   ExpectError(with({scene_, "--until", "2"}), kUsage, {"--until 2", "goes to 2"});
   ExpectError(with({scene_, "--until", "9"}), kUsage, {"--until 9", "up to 4"});
+  for (const std::vector<std::string>& of_sequences :
+       {std::vector<std::string>{"--calibration", "none"},
+        {"--dataset", "bop"},
+        {"--depth-units", "5"},
+        {"--fixed-camera"},
+        {"--pose-offset", "1"},
+        {"--unchecked"}}) {
+    ExpectError(with(of_sequences), kUsage, {of_sequences.front() + " needs a sequence to map"});
+  }
   ExpectError(with({"--remove", "cup"}), kUsage, {"cup", "mug"});
   ExpectError(with({"--save", folder_.path()}), kUsage, {"--save", "folder"});
   ExpectError(with({"--save", file + "/a.map"}), kEnvironment, {file});

@@ -344,18 +344,6 @@ TEST_F(Hostile, SettingsOfTrackingAreNotLeftOut) {
   ExpectSentence(RunTsdfpp({"map", "--load", file, "--track", "all", "--out", folder_ / "a/b/out"},
                            folder_.path()),
                  kUsage, "--track needs a sequence to map");
-  for (const std::vector<std::string>& of_sequences :
-       {std::vector<std::string>{"--calibration", "none"},
-        {"--dataset", "bop"},
-        {"--depth-units", "5"},
-        {"--fixed-camera"},
-        {"--pose-offset", "1"},
-        {"--unchecked"}}) {
-    std::vector<std::string> arguments{"map", "--load", file, "--out", folder_ / "a/b/out"};
-    arguments.insert(arguments.end(), of_sequences.begin(), of_sequences.end());
-    ExpectSentence(RunTsdfpp(arguments, folder_.path()), kUsage,
-                   of_sequences.front() + " needs a sequence to map");
-  }
   ExpectSentence(Map(folder_ / "set", {"--method", "surfels", "--associate", "votes"}), kUsage,
                  "association by votes asks a map for its voxels, which method 'surfels' has not");
 }
