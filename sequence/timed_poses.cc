@@ -71,11 +71,11 @@ Expected<TimedPoses> ReadTimedPoses(const std::filesystem::path& path,
   return poses;
 }
 
-Expected<void> RemarkOnPoseOffset(const fs::path& path, double offset_s,
+Expected<void> RemarkOnPoseOffset(const std::filesystem::path& path, double offset_s,
                                   std::vector<std::string>& remarks) {
   if (offset_s == 0) return {};
   std::error_code code;
-  if (!fs::exists(path, code)) {
+  if (!std::filesystem::exists(path, code)) {
     return UsageError("{}: no such file, expected no offset of poses without it", path.string());
   }
   remarks.push_back(fmt::format("{}: read {:g} s {} the images' times", path.string(),

@@ -16,13 +16,13 @@ namespace fs = std::filesystem;
 using test::CommandOutput;
 using test::kUsage;
 
+const std::string kScene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
+
 class CompareTracking : public testing::Test {
  protected:
   CommandOutput Run(const std::vector<std::string>& more, const std::string& until) {
-    std::vector<std::string> arguments{"compare",    TSDFPP_SOURCE_DIR "/scenes/mini.toml",
-                                       "--methods",  "tsdf++/anchored",
-                                       "--profiles", "close",
-                                       "--until",    until,
+    std::vector<std::string> arguments{"compare",    kScene,  "--methods", "tsdf++/anchored",
+                                       "--profiles", "close", "--until",   until,
                                        "--out",      Out()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return test::RunTsdfpp(arguments, folder_.path());

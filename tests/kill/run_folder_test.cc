@@ -68,7 +68,7 @@ class RunFolderFaults : public testing::Test {
  protected:
   // The folder after the first run, with something of somebody else's in it.
   fs::path Begun(const std::string& name) {
-    const fs::path out = folder_ / name;
+    fs::path out = folder_ / name;
     fs::remove_all(out);
     EXPECT_EQ(RunShimmed(First(out), {out}, folder_.path()).exit_code, 0);
     EXPECT_TRUE(WriteFile(out / "mesh/letter.txt", "kept").has_value());
