@@ -74,6 +74,7 @@ bool IsImage(const fs::path& file) {
 Expected<std::vector<NamedMask>> MasksIn(const fs::path& folder) {
   std::vector<NamedMask> masks;
   const std::string name = folder.filename().string();
+  if (name.find_first_not_of("0123456789.") != std::string::npos) return masks;
   std::string_view digits = name;
   TSDFPP_ASSIGN(const std::optional<int> frame, TakeNumber(digits, folder));
   if (!frame || !digits.empty()) return masks;

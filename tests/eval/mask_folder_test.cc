@@ -72,6 +72,7 @@ TEST_F(MaskFolderTest, FoldersNamedAfterFramesAsSegmentAnythingLeavesThem) {
   Write("12/0.png", {0, 0, 2, 2}, 255);
   Write("12/1.png", {2, 2, 2, 2}, 255);
   Write("notes/3.png", {2, 2, 2, 2}, 255);
+  Write("net-1.0/3.png", {2, 2, 2, 2}, 255);
   EXPECT_EQ(Find(12).size(), 2U);
 }
 
@@ -103,6 +104,10 @@ TEST_F(MaskFolderTest, NamesOfTimesAreRefused) {
   fs::remove(folder_ / "1305031453.000000.png");
   Write("99999999999.png", {0, 0, 1, 1}, 1);
   EXPECT_NE(OpenError().find("99999999999 is no number of a frame"), std::string::npos)
+      << OpenError();
+  fs::remove(folder_ / "99999999999.png");
+  Write("1305031453.50/a.png", {0, 0, 1, 1}, 1);
+  EXPECT_NE(OpenError().find("1305031453.50: is named after a time"), std::string::npos)
       << OpenError();
 }
 
