@@ -194,27 +194,24 @@ Expected<std::vector<FoundCamera>> RunRecording(const CameraBenchOptions& option
   return found;
 }
 
-// The recording with each offset, and with the first one whose clock is right.
+// The recording with each offset, and without one whose clock is right.
 Expected<void> RunRecordings(const CameraBenchOptions& options, const CameraPlan& plan,
                              FigureTable& table) {
   SequenceOptions reading;
   TSDFPP_ASSIGN(const auto as_read, OpenSequence(options.recording, reading));
-  if (!options.camera.empty()) {
-    reading.intrinsics = {
-        0, 0, options.camera[0], options.camera[1], options.camera[2], options.camera[3]};
-  }
-  bool is_first = true;
+  const auto& [fx, fy, cx, cy] = options.camera;
+  reading.intrinsics = {0, 0, fx, fy, cx, cy};
   for (const double offset_s : options.pose_offsets_s) {
     reading.pose_offset_s = offset_s;
     TSDFPP_ASSIGN(const auto source, OpenSequence(options.recording, reading));
     TSDFPP_ASSIGN(std::vector<FoundCamera> found,
                   RunRecording(options, plan, offset_s, *source, table));
     const fs::path folder = options.recording;
-    if (is_first && fs::exists(folder / "groundtruth.txt") && fs::exists(folder / "depth.txt")) {
+    if (offset_s == 0 && fs::exists(folder / "groundtruth.txt") &&
+        fs::exists(folder / "depth.txt")) {
       TSDFPP_RETURN_IF_ERROR(JudgeClock(options.recording, *source, as_read->info().intrinsics,
                                         options.until, std::move(found), options.out));
     }
-    is_first = false;
   }
   return {};
 }
@@ -228,9 +225,6 @@ Expected<void> RunCameraBench(const CameraBenchOptions& options) {
   if (!options.settings.empty()) {
     TSDFPP_ASSIGN(const toml::table settings, ParseTomlFile(options.settings));
     TSDFPP_ASSIGN(plan.settings, SdfTrackConfig::FromToml(settings, options.settings));
-  }
-  if (!options.camera.empty() && options.camera.size() != 4) {
-    return UsageError("--camera: {} numbers, expected fx,fy,cx,cy or ''", options.camera.size());
   }
   for (const double voxel_m : options.voxels_m) {
     MapConfig map;

@@ -213,9 +213,7 @@ void AddCamera(CLI::App& app, Chosen& chosen) {
       ->capture_default_str();
   command->add_option("--recording", options->recording, "Folder of a sequence, or ''")
       ->capture_default_str();
-  command
-      ->add_option("--camera", options->camera,
-                   "The recording's fx,fy,cx,cy; '' for what its reader takes")
+  command->add_option("--camera", options->camera, "The recording's fx,fy,cx,cy, pixels")
       ->delimiter(',')
       ->capture_default_str();
   command
