@@ -211,7 +211,7 @@ void AddCamera(CLI::App& app, Chosen& chosen) {
   command->add_option("--scenes", options->scenes, "Scene files")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--recording", options->recording, "Folder of a sequence, or ''")
+  command->add_option("--recording", options->recording, "Folder of a TUM recording, or ''")
       ->capture_default_str();
   command->add_option("--camera", options->camera, "The recording's fx,fy,cx,cy, pixels")
       ->delimiter(',')
