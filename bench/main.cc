@@ -23,6 +23,7 @@
 #include "bench/scaling.h"
 #include "bench/segment.h"
 #include "bench/side_by_side.h"
+#include "bench/terms.h"
 #include "bench/track.h"
 #include "bench/whole.h"
 #include "core/guard.h"
@@ -171,6 +172,19 @@ void AddTrack(CLI::App& app, Chosen& chosen) {
   command->callback([=, &chosen] { chosen = [=] { return RunTrackBench(*options); }; });
 }
 
+void AddTerms(CLI::App& app, Chosen& chosen) {
+  const auto options = std::make_shared<TermsBenchOptions>();
+  CLI::App* command = app.add_subcommand(
+      "terms", "What each term of the tracker does for shapes that leave motions free, as CSV");
+  command->add_option("--out", options->out, "Output folder")->required();
+  command->add_option("--shapes", options->shapes, "Some of them; default: all")->delimiter(',');
+  command->add_option("--sets", options->sets, "Some sets of terms, by name; default: all")
+      ->delimiter(',');
+  AddCount(command, "--seeds", options->seeds, "Draws of the noise", 1, 1000);
+  command->add_option("--method", options->method, "The map")->capture_default_str();
+  command->callback([=, &chosen] { chosen = [=] { return RunTermsBench(*options); }; });
+}
+
 void AddReturns(CLI::App& app, Chosen& chosen) {
   const auto options = std::make_shared<ReturnBenchOptions>();
   CLI::App* command = app.add_subcommand(
@@ -308,6 +322,7 @@ int RunBench(int argc, char** argv) {
   tsdfpp::AddReleased(app, chosen);
   tsdfpp::AddSegment(app, chosen);
   tsdfpp::AddTrack(app, chosen);
+  tsdfpp::AddTerms(app, chosen);
   tsdfpp::AddReturns(app, chosen);
   tsdfpp::AddMotion(app, chosen);
   tsdfpp::AddCamera(app, chosen);

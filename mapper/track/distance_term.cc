@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "mapper/track/robust_deviation.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -16,15 +18,6 @@ constexpr std::size_t kPointsPerTask = 512;
 constexpr float kFewObservations = 1;
 // Distances are looked at up to so many times the Huber width: further ones count all the same.
 constexpr double kFarthest_hubers = 10;
-
-// Of sizes of errors; 0 of none.
-double RobustDeviation(std::vector<float> sizes) {
-  constexpr double kNormalMedian = 1.4826;
-  if (sizes.empty()) return 0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return kNormalMedian * static_cast<double>(*middle);
-}
 
 }  // namespace
 

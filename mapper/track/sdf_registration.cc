@@ -1,7 +1,6 @@
 #include "mapper/track/sdf_registration.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -34,9 +33,20 @@ MotionFrame FrameOf(const SdfRegistration& task) {
   return frame;
 }
 
-// Of the shares below which a share is none: keeps directions of which nothing speaks apart from
-// rounding.
+// Of the mean information: keeps directions of which nothing speaks from dividing by nothing.
 constexpr double kNoShare = 1e-9;
+
+// A direction is known by other terms than the distances where they leave less open.
+constexpr double kKnownOtherwise_voxels = 0.05;
+// Along directions of which distances know a smaller share, what they know is for the most part
+// what is wrong with a model's rim. Other terms that know such a direction have that share of say.
+constexpr double kWeakOfDistances = 0.2;
+
+// That leave no more than that open.
+double PointsAsked(double deviation_m, double voxel_m) {
+  const double open_m = kKnownOtherwise_voxels * voxel_m;
+  return deviation_m * deviation_m / (open_m * open_m);
+}
 
 Eigen::Matrix3d PriorOf(const Eigen::Vector3d& shares, const Eigen::Matrix3d& directions,
                         double weak_share) {
@@ -44,10 +54,11 @@ Eigen::Matrix3d PriorOf(const Eigen::Vector3d& shares, const Eigen::Matrix3d& di
   return directions * lacking.asDiagonal() * directions.transpose();
 }
 
-MotionPrior PriorFor(const Matrix6& H, const Pose& expected, double weak_share) {
+// `H` is that of the distances.
+MotionPrior PriorFor(const Matrix6& H, const KnownDirections& known, const Pose& expected,
+                     double weak_share) {
   MotionPrior prior;
   prior.expected = expected;
-  const KnownDirections known = DirectionsOf(H);
   const double weights = std::max(1.0, H.topLeftCorner<3, 3>().trace());
   prior.P.topLeftCorner<3, 3>() = weights * PriorOf(known.shift_shares, known.shifts, weak_share);
   prior.P.bottomRightCorner<3, 3>() = weights * PriorOf(known.turn_shares, known.turns, weak_share);
@@ -58,6 +69,122 @@ DistanceTerm TermOf(const SdfRegistration& task, const MotionFrame& frame,
                     const SdfTrackConfig& config, std::size_t stride) {
   return {*task.model, task.points, frame, task.voxel_m, task.camera, config, stride};
 }
+
+// As narrow as residuals of that deviation ask for.
+double HuberFor(double deviation_m, double voxel_m, const SdfTrackConfig& config) {
+  return std::min(
+      config.huber_voxels * voxel_m,
+      config.huber_deviations * std::max(deviation_m, kLeastDeviation_voxels * voxel_m));
+}
+
+// The distances and the other terms of a finer pass.
+class AllTerms {
+ public:
+  AllTerms(const SdfRegistration& task, const MotionFrame& frame, const SdfTrackConfig& config,
+           std::size_t stride)
+      : task_(&task),
+        frame_(&frame),
+        config_(&config),
+        distances_(TermOf(task, frame, config, stride)) {}
+
+  void KeepAt(const Pose& T_LC) {
+    distances_.KeepAt(T_LC);
+    deviation_m_ = distances_.KeptDeviation_m();
+    distances_.SetHuber(HuberFor(deviation_m_, task_->voxel_m, *config_));
+    deviation_m_ = std::max(deviation_m_, kLeastDeviation_voxels * task_->voxel_m);
+    for (const auto& term : task_->others) term->KeepAt(T_LC, deviation_m_);
+  }
+  NormalEquations Sums(const Pose& T_LC) const {
+    NormalEquations sums = distances_.Sums(T_LC);
+    if (task_->others.empty()) return sums;
+    const NormalEquations more = OfOthers(T_LC);
+    sums.H += more.H;
+    sums.g += more.g;
+    sums.cost += more.cost;
+    return sums;
+  }
+  // What distances know and, up to the config's share, what the others know.
+  KnownDirections KnownAt(const Pose& T_LC) const {
+    const Matrix6 of_distances = distances_.Sums(T_LC).H;
+    KnownDirections known = DirectionsOf(of_distances);
+    const AlongDirections others = Along(known, of_distances, AtBest(T_LC));
+    const double asked = PointsAsked(deviation_m_, task_->voxel_m);
+    known.shift_shares.array() += config_->weak_share * (others.shifts.array() / asked).min(1);
+    known.turn_shares.array() += config_->weak_share * (others.turns.array() / asked).min(1);
+    return known;
+  }
+  // Along weak directions, from T_LC: what is expected and, as far as they know it, what the other
+  // terms say.
+  MotionPrior PriorAt(const Pose& T_LC) const {
+    const Matrix6 of_distances = distances_.Sums(T_LC).H;
+    const KnownDirections known = DirectionsOf(of_distances);
+    if (task_->others.empty()) {
+      return PriorFor(of_distances, known, task_->T_LC_expected, config_->weak_share);
+    }
+    const AlongDirections best = Along(known, of_distances, AtBest(T_LC));
+    const double asked = PointsAsked(deviation_m_, task_->voxel_m);
+    const double weights = std::max(1.0, of_distances.topLeftCorner<3, 3>().trace());
+    Matrix6 directions = Matrix6::Zero();
+    directions.topLeftCorner<3, 3>() = known.shifts;
+    directions.bottomRightCorner<3, 3>() = known.turns;
+    Vector6 shares;
+    shares << known.shift_shares, known.turn_shares;
+    Vector6 trust;
+    trust << best.shifts, best.turns;
+    trust = (trust / asked).cwiseMin(1);
+    const Vector6 say = weights * (kWeakOfDistances - shares.array()).max(0) * trust.array();
+    const Vector6 pull =
+        weights * (config_->weak_share - shares.array()).max(0) * (1 - trust.array());
+    const Vector6 said = directions.transpose() * SaidByOthers(T_LC, directions, say);
+    const Vector6 expected =
+        directions.transpose() * frame_->LengthsOf(task_->T_LC_expected * T_LC.inverse());
+    const Vector6 both = say + pull;
+    Vector6 target = Vector6::Zero();
+    for (int i = 0; i < 6; ++i) {
+      if (both[i] > 0) target[i] = (say[i] * said[i] + pull[i] * expected[i]) / both[i];
+    }
+    return {directions * both.asDiagonal() * directions.transpose(),
+            frame_->MotionOf(directions * target) * T_LC};
+  }
+  DistanceCounts Count(const Pose& T_LC) const { return distances_.Count(T_LC); }
+
+ private:
+  NormalEquations OfOthers(const Pose& T_LC) const {
+    NormalEquations sums;
+    for (const auto& term : task_->others) {
+      const NormalEquations more = term->Sums(T_LC, *frame_);
+      sums.H += more.H;
+      sums.g += more.g;
+      sums.cost += more.cost;
+    }
+    return sums;
+  }
+  // The motion from T_LC by which their errors are least, along those directions (columns) in which
+  // they have a say.
+  Vector6 SaidByOthers(const Pose& T_LC, const Matrix6& directions, const Vector6& say) const {
+    const NormalEquations sums = OfOthers(T_LC);
+    Matrix6 chosen = directions;
+    for (int i = 0; i < 6; ++i) {
+      if (!(say[i] > 0)) chosen.col(i).setZero();
+    }
+    Matrix6 H = chosen.transpose() * sums.H * chosen;
+    const double floor = 1e-9 + kNoShare * H.trace();
+    H.diagonal().array() += floor;
+    const Vector6 way = -H.ldlt().solve(chosen.transpose() * sums.g);
+    return way.allFinite() ? Vector6(chosen * way) : Vector6(Vector6::Zero());
+  }
+  Matrix6 AtBest(const Pose& T_LC) const {
+    Matrix6 sum = Matrix6::Zero();
+    for (const auto& term : task_->others) sum += term->Information(T_LC, *frame_);
+    return sum;
+  }
+
+  const SdfRegistration* task_;
+  const MotionFrame* frame_;
+  const SdfTrackConfig* config_;
+  DistanceTerm distances_;
+  double deviation_m_ = 0;
+};
 
 // Passes of the coarse search from one seed: what is kept of the points holds near where it was
 // kept.
@@ -76,8 +203,8 @@ void RegisterCoarsely(const SdfRegistration& task, const SdfTrackConfig& config,
     Pose T_LC = seed;
     for (int pass = 0; pass < kCoarsePasses; ++pass) {
       coarse.KeepAt(T_LC);
-      const MotionPrior prior =
-          PriorFor(coarse.Sums(T_LC).H, task.T_LC_expected, config.weak_share);
+      const Matrix6 H = coarse.Sums(T_LC).H;
+      const MotionPrior prior = PriorFor(H, DirectionsOf(H), task.T_LC_expected, config.weak_share);
       const LeastSquaresResult found = MinimiseOverPose(sums, T_LC, result.frame, prior, options);
       result.iterations += found.iterations;
       T_LC = found.T;
@@ -97,26 +224,15 @@ constexpr int kMiddlePasses = 2;
 constexpr int kLastPasses = 1;
 constexpr int kPassesOfAll = kMiddlePasses + kLastPasses;
 
-// As narrow as residuals of that deviation ask for.
-double HuberFor(double deviation_m, double voxel_m, const SdfTrackConfig& config) {
-  return std::min(
-      config.huber_voxels * voxel_m,
-      config.huber_deviations * std::max(deviation_m, kLeastDeviation_voxels * voxel_m));
-}
-
-LeastSquaresResult RunPasses(const SdfRegistration& task, const SdfTrackConfig& config,
-                             const LeastSquaresOptions& options, int passes, DistanceTerm& term,
-                             SdfRegistrationResult& result) {
+LeastSquaresResult RunPasses(const SdfRegistration& task, const LeastSquaresOptions& options,
+                             int passes, AllTerms& terms, SdfRegistrationResult& result) {
   MotionPrior prior;
   LeastSquaresResult found;
   for (int pass = 0; pass < passes; ++pass) {
-    term.KeepAt(result.T_LC);
-    term.SetHuber(HuberFor(term.KeptDeviation_m(), task.voxel_m, config));
-    if (pass == 0) {
-      prior = PriorFor(term.Sums(result.T_LC).H, task.T_LC_expected, config.weak_share);
-    }
-    found = MinimiseOverPose([&](const Pose& T) { return term.Sums(T); }, result.T_LC, result.frame,
-                             prior, options);
+    terms.KeepAt(result.T_LC);
+    if (pass == 0 || !task.others.empty()) prior = terms.PriorAt(result.T_LC);
+    found = MinimiseOverPose([&](const Pose& T) { return terms.Sums(T); }, result.T_LC,
+                             result.frame, prior, options);
     result.iterations += found.iterations;
     result.T_LC = found.T;
   }
@@ -124,48 +240,34 @@ LeastSquaresResult RunPasses(const SdfRegistration& task, const SdfTrackConfig& 
 }
 
 LeastSquaresResult RegisterFinely(const SdfRegistration& task, const SdfTrackConfig& config,
-                                  const LeastSquaresOptions& options, DistanceTerm& all,
+                                  const LeastSquaresOptions& options, AllTerms& all,
                                   SdfRegistrationResult& result) {
   const std::size_t stride = task.points.size() / static_cast<std::size_t>(config.middle_points);
-  if (stride < 2) return RunPasses(task, config, options, kPassesOfAll, all, result);
-  DistanceTerm some = TermOf(task, result.frame, config, stride);
-  RunPasses(task, config, options, kMiddlePasses, some, result);
-  return RunPasses(task, config, options, kLastPasses, all, result);
+  if (stride < 2) return RunPasses(task, options, kPassesOfAll, all, result);
+  AllTerms some(task, result.frame, config, stride);
+  RunPasses(task, options, kMiddlePasses, some, result);
+  return RunPasses(task, options, kLastPasses, all, result);
 }
 
 }  // namespace
-
-KnownDirections DirectionsOf(const Matrix6& information) {
-  KnownDirections known;
-  const double weights = information.topLeftCorner<3, 3>().trace();
-  if (!(weights > 0) || !information.allFinite()) return known;
-  const Matrix6 H = information / weights;
-  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
-  const Eigen::Matrix3d shifts = H.topLeftCorner<3, 3>();
-  const Solver of_shifts(shifts);
-  known.shift_shares = of_shifts.eigenvalues().cwiseMax(0);
-  known.shifts = of_shifts.eigenvectors();
-  const Eigen::Matrix3d floor = kNoShare * Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d both = H.topRightCorner<3, 3>();
-  const Eigen::Matrix3d schur =
-      H.bottomRightCorner<3, 3>() - both.transpose() * (shifts + floor).ldlt().solve(both);
-  const Solver of_turns((schur + schur.transpose()) / 2);
-  known.turn_shares = of_turns.eigenvalues().cwiseMax(0);
-  known.turns = of_turns.eigenvectors();
-  return known;
-}
 
 OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
                         const SdfRegistrationResult& found, const SdfTrackConfig& config) {
   DistanceTerm term = TermOf(task, found.frame, config, 1);
   term.SetHuber(HuberFor(found.counts.deviation_m, task.voxel_m, config));
-  const auto cost_at = [&](const Pose& T) {
+  for (const auto& of : task.others) {
+    of->KeepAt(found.T_LC,
+               std::max(found.counts.deviation_m, kLeastDeviation_voxels * task.voxel_m));
+  }
+  const auto cost_at = [&](const Pose& T, const Pose& T_of_others) {
     term.KeepAt(T);
-    return term.Sums(T).cost;
+    double cost = term.Sums(T).cost;
+    for (const auto& of : task.others) cost += of->Sums(T_of_others, found.frame).cost;
+    return cost;
   };
-  const double cost_found = cost_at(found.T_LC);
+  const double cost_found = cost_at(found.T_LC, found.T_LC);
   OtherPlace other;
-  other.cost_ratio = cost_at(T_LC) / cost_found;
+  other.cost_ratio = cost_at(T_LC, task.bias * T_LC) / cost_found;
   other.counts = term.Count(T_LC);
   return other;
 }
@@ -179,7 +281,7 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   if (!result.frame.centre.allFinite() || !std::isfinite(result.frame.radius_m)) return result;
   const LeastSquaresOptions options{config.max_iterations, config.settled_voxels * task.voxel_m};
   RegisterCoarsely(task, config, options, result);
-  DistanceTerm fine = TermOf(task, result.frame, config, 1);
+  AllTerms fine(task, result.frame, config, 1);
   const LeastSquaresResult found = RegisterFinely(task, config, options, fine, result);
   const bool is_settled =
       found.converged || found.last_step_m < kNearlySettled_voxels * task.voxel_m;
@@ -187,9 +289,9 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   result.converged = is_settled && found.at.H.trace() > 0;
   result.counts = fine.Count(found.T);
   result.information = found.at.H;
-  result.known = DirectionsOf(found.at.H);
-  const Matrix6 floor = (1e-9 + kNoShare * found.at.H.trace() / 6) * Matrix6::Identity();
-  const Matrix6 information = found.at.H + floor;
+  result.known = task.others.empty() ? DirectionsOf(found.at.H) : fine.KnownAt(found.T);
+  const Matrix6 floor = (1e-9 + kNoShare * result.information.trace() / 6) * Matrix6::Identity();
+  const Matrix6 information = result.information + floor;
   const double deviation_m = result.counts.deviation_m;
   result.covariance = deviation_m * deviation_m * information.ldlt().solve(Matrix6::Identity());
   return result;

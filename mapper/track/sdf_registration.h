@@ -2,11 +2,13 @@
 // Levenberg-Marquardt search over six numbers and without matching points (docs/tracking.md).
 #pragma once
 
-#include <algorithm>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "mapper/track/distance_term.h"
+#include "mapper/track/known_directions.h"
+#include "mapper/track/point_term.h"
 
 namespace tsdfpp {
 
@@ -23,27 +25,12 @@ struct SdfRegistration {
   std::vector<Pose> T_LC_seeds{};
   // The expected place is as good as right: no coarse pass.
   bool is_near = false;
+  // Terms beside the distances, of the finer passes.
+  std::span<const std::unique_ptr<PointTerm>> others{};
+  // Where the model makes what is at T_LC seem to be: bias * T_LC. The other terms are made for
+  // what seems.
+  Pose bias = Pose::Identity();
 };
-
-// How much is known along which directions, as shares of the points' weights, increasing, with the
-// directions as columns. Of turns what the terms know while any shift is free (the Schur
-// complement of the shifts): a ball tells no turn about its centre, whatever point `frame` turns it
-// about. Of shifts what they know of an object that does not turn. So whatever motion the terms do
-// not see has a part in one of the two.
-struct KnownDirections {
-  Eigen::Vector3d shift_shares = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d shifts = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d turn_shares = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d turns = Eigen::Matrix3d::Identity();
-
-  double LeastShare() const { return std::min(shift_shares[0], turn_shares[0]); }
-  // Directions whose share is less.
-  int CountBelow(double share) const {
-    return static_cast<int>((shift_shares.array() < share).count() +
-                            (turn_shares.array() < share).count());
-  }
-};
-KnownDirections DirectionsOf(const Matrix6& information);
 
 struct SdfRegistrationResult {
   Pose T_LC = Pose::Identity();
@@ -62,11 +49,11 @@ struct SdfRegistrationResult {
   Matrix6 covariance = Matrix6::Zero();
 };
 
-// Registers in two passes: few points and a wide Huber function from every seed, then all points
-// from where the cost was least. Along directions of which less than config.weak_share of the
-// points' information speaks, a prior pulls towards the expected pose, up to that share. Points
-// that are not finite, and a model or segment without anything in it, give converged = false.
-// Deterministic for any number of threads; `config` must be valid.
+// Registers in two passes: few points and a wide Huber function from every seed, then all points,
+// and the other terms, from where the cost was least. Along directions of which less than
+// config.weak_share of the points' information speaks, a prior pulls towards the expected pose, up
+// to that share. Points that are not finite, and a model or segment without anything in it, give
+// converged = false. Deterministic for any number of threads; `config` must be valid.
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config);
 

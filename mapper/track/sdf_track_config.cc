@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <utility>
 
 namespace tsdfpp {
 namespace {
@@ -32,6 +33,18 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("weak_share", weak_share, 0, 0.1));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_turn_rad", keyframe_turn_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_points", keyframe_points, 10, 1000000));
+  TSDFPP_RETURN_IF_ERROR(InRange("free_space_weight", free_space_weight, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("outline_weight", outline_weight, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("colour_weight", colour_weight, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("colour_points", colour_points, 20, 1000000));
+  for (const auto& [field, weight] :
+       {std::pair{"outline_weight", outline_weight}, std::pair{"colour_weight", colour_weight}}) {
+    if (weight == 0 || keyframe_turn_rad > 0) continue;
+    return UsageError(
+        "tracking setting '{}' is {}, and there is no keyframe to compare with: expected "
+        "keyframe_turn_rad above 0",
+        field, weight);
+  }
   TSDFPP_RETURN_IF_ERROR(InRange("inlier_voxels", inlier_voxels, 0.01, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("min_inlier_share", min_inlier_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("min_observed_share", min_observed_share, 0, 1));
@@ -69,6 +82,10 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("weak_share", config.weak_share)
       .Get("keyframe_turn_rad", config.keyframe_turn_rad)
       .Get("keyframe_points", config.keyframe_points)
+      .Get("free_space_weight", config.free_space_weight)
+      .Get("outline_weight", config.outline_weight)
+      .Get("colour_weight", config.colour_weight)
+      .Get("colour_points", config.colour_points)
       .Get("inlier_voxels", config.inlier_voxels)
       .Get("min_inlier_share", config.min_inlier_share)
       .Get("min_observed_share", config.min_observed_share)
@@ -107,6 +124,10 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"weak_share", weak_share},
                      {"keyframe_turn_rad", keyframe_turn_rad},
                      {"keyframe_points", keyframe_points},
+                     {"free_space_weight", free_space_weight},
+                     {"outline_weight", outline_weight},
+                     {"colour_weight", colour_weight},
+                     {"colour_points", colour_points},
                      {"inlier_voxels", inlier_voxels},
                      {"min_inlier_share", min_inlier_share},
                      {"min_observed_share", min_observed_share},

@@ -45,6 +45,13 @@ struct SdfTrackConfig {
   // 0 switches this off.
   double keyframe_turn_rad = 0.15;
   int keyframe_points = 1500;
+  int colour_points = 600;  // of a keyframe, at most, for the term of colour
+
+  // Terms of the image (view_terms.h): how much an error of theirs counts beside one of a distance,
+  // both in deviations; 0 switches one off. The last two need a keyframe.
+  double free_space_weight = 0;
+  double outline_weight = 0;
+  double colour_weight = 0;
 
   // Gates; an object that fails one is frozen for the frame.
   // A point nearer than this to the model's surface is an inlier, and one nearer than three of its

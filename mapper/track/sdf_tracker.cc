@@ -89,7 +89,7 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
   ++turn_;
   std::vector<Turn> turns;
   for (auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
-    turns.push_back({id, std::move(pixels), &memory_[id]});
+    turns.push_back({id, labels, std::move(pixels), &memory_[id]});
   }
   // Each turn is its own object's alone.
   tbb::parallel_for(std::size_t{0}, turns.size(),
@@ -111,6 +111,13 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
   const auto points = SegmentPointsOf(frame, turn.pixels, voxel_m, config_);
   if (points.size() < static_cast<std::size_t>(config_.min_points)) return;
   Memory& memory = *turn.memory;
+  Sight sight{&frame, &points, CentreOf(points)};
+  sight.voxel_m = voxel_m;
+  std::optional<SegmentView> view;
+  if (config_.outline_weight > 0 || config_.colour_weight > 0) {
+    view.emplace(frame, turn.labels, turn.id, config_.max_step_voxels * voxel_m);
+    sight.view = &*view;
+  }
   const auto known = before.find(turn.id);
   const std::optional<ObjectModel> model = models_(map, turn.id);
   // Its pixels may have waited until now, so that the map has nothing of it.
@@ -119,7 +126,7 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
     // One that begins anew is the same object.
     Memory anew;
     anew.frame = frame.index;
-    anew.centre_L = frame.T_WC * CentreOf(points);
+    anew.centre_L = frame.T_WC * sight.centre_C;
     anew.T_WO_begun = memory.T_WO_begun;
     anew.has_moved = memory.has_moved;
     anew.is_placed = memory.is_placed;
@@ -127,11 +134,11 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
     if (config_.keyframe_turn_rad > 0) {
       // A model that is begun anew has a pose already.
       const Pose T_OC = known == before.end() ? frame.T_WC : known->second.inverse() * frame.T_WC;
-      memory.keyframe = KeyframeOf(points, T_OC, frame.intrinsics);
+      memory.keyframe = KeyframeOf(sight, T_OC);
     }
     return;
   }
-  const auto registered = Register(frame, points, *model, voxel_m, known->second, memory);
+  const auto registered = Register(sight, *model, known->second, memory);
   turn.has_moved = memory.has_moved;
   if (!registered) return;
   turn.status = TrackStatus::kTracked;
@@ -149,23 +156,29 @@ void SdfTracker::Place(InstanceId id, int frame) {
   memory.is_placed = true;
 }
 
-std::optional<SdfTracker::Registered> SdfTracker::Register(const Frame& frame,
-                                                           const std::vector<SegmentPoint>& points,
-                                                           const ObjectModel& model, double voxel_m,
+std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const ObjectModel& model,
                                                            const Pose& T_WO, Memory& memory) const {
+  const Frame& frame = *sight.frame;
+  const double voxel_m = sight.voxel_m;
   const SurfaceReader reader(*model.grid, voxel_m);
-  Sight sight{&frame,  &points,    CentreOf(points),           &reader,
-              voxel_m, model.T_WL, model.T_WL.inverse() * T_WO};
+  sight.grid = model.grid;
+  sight.model = &reader;
+  sight.T_WL = model.T_WL;
+  sight.T_LO = model.T_WL.inverse() * T_WO;
   // An object from a map's file has no memory yet.
   if (memory.centre_L) {
     const std::int64_t passed = std::int64_t{frame.index} - memory.frame;
     sight.passed = static_cast<int>(std::clamp<std::int64_t>(passed, 1, kMostPassed));
   }
 
-  const SdfRegistration task = TaskOf(sight, memory);
+  const std::optional<Pose> calibration = Calibration(sight, memory);
+  SdfRegistration task = TaskOf(sight, memory);
+  if (calibration) task.bias = calibration->inverse();
+  const auto others = OthersOf(sight, memory, task.bias);
+  task.others = others;
   SdfRegistrationResult found = RegisterToDistances(task, config_);
   const SdfRegistrationResult nearest = found;
-  if (found.converged) Calibrate(sight, memory, found);
+  if (found.converged && calibration) found.T_LC = *calibration * found.T_LC;
   const Rest rest = StayAtRest(sight, task, nearest, memory, found);
   if (!rest.is_kept && !found.converged) return std::nullopt;
   if (!PassesGates(sight, found)) return std::nullopt;  // what fails does not begin to wait
@@ -258,16 +271,29 @@ bool SdfTracker::Waits(const Sight& sight, const Rest& rest, Memory& memory,
   return false;
 }
 
-void SdfTracker::Calibrate(const Sight& sight, const Memory& memory,
-                           SdfRegistrationResult& found) const {
-  if (!memory.keyframe) return;
+std::optional<Pose> SdfTracker::Calibration(const Sight& sight, const Memory& memory) const {
+  if (!memory.keyframe) return std::nullopt;
   const Keyframe& keyframe = *memory.keyframe;
   SdfRegistration task{sight.model, keyframe.points, sight.voxel_m, keyframe.camera};
   task.T_LC_expected = sight.T_LO * keyframe.T_OC;
   task.is_near = true;
   const SdfRegistrationResult apparent = RegisterToDistances(task, config_);
-  if (!apparent.converged) return;
-  found.T_LC = task.T_LC_expected * apparent.T_LC.inverse() * found.T_LC;
+  if (!apparent.converged) return std::nullopt;
+  return task.T_LC_expected * apparent.T_LC.inverse();
+}
+
+std::vector<std::unique_ptr<PointTerm>> SdfTracker::OthersOf(const Sight& sight,
+                                                             const Memory& memory,
+                                                             const Pose& bias) const {
+  ViewTermParts parts{sight.frame, sight.view};
+  if (memory.keyframe && sight.view != nullptr) {
+    parts.key = &memory.keyframe->view;
+    parts.T_LC_key = bias * sight.T_LO * memory.keyframe->T_OC;
+  }
+  parts.model = sight.grid;
+  parts.reader = sight.model;
+  parts.voxel_m = sight.voxel_m;
+  return ViewTermsOf(parts, config_);
 }
 
 bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& found) const {
@@ -303,7 +329,7 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
     const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
     const Eigen::Matrix3d turn = memory.keyframe->T_OC.linear().transpose() * T_OC.linear();
     if (Eigen::AngleAxisd(turn).angle() > config_.keyframe_turn_rad) {
-      memory.keyframe = KeyframeOf(*sight.points, T_OC, sight.frame->intrinsics);
+      memory.keyframe = KeyframeOf(sight, T_OC);
     }
   }
   memory.frame = sight.frame->index;
@@ -315,11 +341,13 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
   }
 }
 
-SdfTracker::Keyframe SdfTracker::KeyframeOf(const std::vector<SegmentPoint>& points,
-                                            const Pose& T_OC, const Intrinsics& camera) const {
+SdfTracker::Keyframe SdfTracker::KeyframeOf(const Sight& sight, const Pose& T_OC) const {
+  const std::vector<SegmentPoint>& points = *sight.points;
+  const Intrinsics& camera = sight.frame->intrinsics;
   const std::size_t count =
       std::min(points.size(), static_cast<std::size_t>(config_.keyframe_points));
-  Keyframe keyframe{{}, T_OC, camera};
+  Keyframe keyframe{{}, T_OC, camera, {}};
+  if (sight.view != nullptr) keyframe.view = KeyViewOf(*sight.view, points, camera, config_);
   keyframe.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     keyframe.points.push_back(points[i * points.size() / count]);

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "mapper/track/object_model.h"
 #include "mapper/track/sdf_registration.h"
 #include "mapper/track/tracker.h"
+#include "mapper/track/view_terms.h"
 
 namespace tsdfpp {
 
@@ -42,6 +44,7 @@ class SdfTracker : public Tracker {
     std::vector<SegmentPoint> points;
     Pose T_OC = Pose::Identity();
     Intrinsics camera;
+    KeyView view;
   };
 
   // What is remembered of an object beside its pose.
@@ -66,7 +69,9 @@ class SdfTracker : public Tracker {
     const Frame* frame = nullptr;
     const std::vector<SegmentPoint>* points = nullptr;
     Eigen::Vector3d centre_C = Eigen::Vector3d::Zero();  // of the points
-    const SurfaceReader* model = nullptr;
+    const SegmentView* view = nullptr;                   // none where no term asks for it
+    const TsdfGrid* grid = nullptr;
+    const SurfaceReader* model = nullptr;  // of the grid
     double voxel_m = 0;
     Pose T_WL = Pose::Identity();
     Pose T_LO = Pose::Identity();
@@ -81,6 +86,7 @@ class SdfTracker : public Tracker {
   // One object of a frame, and what became of it.
   struct Turn {
     InstanceId id = kNoInstance;
+    cv::Mat labels;           // of the frame
     std::vector<int> pixels;  // of its segment, without the outline
     Memory* memory = nullptr;
     TrackStatus status = TrackStatus::kFrozen;
@@ -92,9 +98,9 @@ class SdfTracker : public Tracker {
   // May run beside the turns of other objects.
   void Take(const Frame& frame, const MapRepresentation& map, const ObjectPoses& before,
             Turn& turn) const;
-  // Nothing where the object is frozen. T_WO is that before the frame.
-  std::optional<Registered> Register(const Frame& frame, const std::vector<SegmentPoint>& points,
-                                     const ObjectModel& model, double voxel_m, const Pose& T_WO,
+  // Nothing where the object is frozen. T_WO is that before the frame; `sight` has the frame and
+  // what it shows of the object.
+  std::optional<Registered> Register(Sight sight, const ObjectModel& model, const Pose& T_WO,
                                      Memory& memory) const;
   SdfRegistration TaskOf(const Sight& sight, const Memory& memory) const;
   // What a frame says of an object that was at rest.
@@ -116,15 +122,18 @@ class SdfTracker : public Tracker {
   // does not wait for ever, and then `found` is where it is at rest.
   bool Waits(const Sight& sight, const Rest& rest, Memory& memory,
              SdfRegistrationResult& found) const;
-  // Takes off `found` what the keyframe says that the model adds.
-  void Calibrate(const Sight& sight, const Memory& memory, SdfRegistrationResult& found) const;
+  // The terms beside the distances that the config has; `bias` is SdfRegistration's.
+  std::vector<std::unique_ptr<PointTerm>> OthersOf(const Sight& sight, const Memory& memory,
+                                                   const Pose& bias) const;
+  // What the keyframe says that the model adds to places: takes a seeming one to that where it is.
+  std::optional<Pose> Calibration(const Sight& sight, const Memory& memory) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
   // How well its motion is known since it was last tracked; remembers the place for the next.
   MotionUncertainty Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
                                 Memory& memory) const;
   void Remember(const Sight& sight, const SdfRegistrationResult& found, Memory& memory) const;
-  Keyframe KeyframeOf(const std::vector<SegmentPoint>& points, const Pose& T_OC,
-                      const Intrinsics& camera) const;
+  // The segment, seen from there.
+  Keyframe KeyframeOf(const Sight& sight, const Pose& T_OC) const;
 
   SdfTrackConfig config_;
   ModelSource models_;

@@ -1,0 +1,200 @@
+// The tracker's terms of the image, on a plate and a ball: what each fixes that the distances leave
+// free, and that its slopes are those of its cost.
+#include "mapper/track/view_terms.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.h"
+#include "mapper/track/sdf_registration.h"
+#include "tests/mapper/drawn_things.h"
+#include "tests/reference/analytic_scene.h"
+
+namespace tsdfpp {
+namespace {
+
+using reference::MakePose;
+
+constexpr double kVoxel_m = 0.01;
+// Of a pixel, at a metre; an outline of whole pixels says where something is to a small part of
+// one, as does a smooth texture.
+constexpr double kPixel_m = 1 / 300.0;
+constexpr double kOutline_pixels = 0.15;
+constexpr double kColour_pixels = 0.1;
+
+std::vector<SegmentPoint> PointsOf(const Frame& frame, const SdfTrackConfig& config) {
+  const auto pixels = PixelsByLabel(frame.mask, config.mask_erosion_px);
+  return SegmentPointsOf(frame, pixels.at(drawn::kThing), kVoxel_m, config);
+}
+
+// The plate's plane, observed far beyond the plate: nothing of the distances holds it in the plane.
+TsdfGrid PlaneGrid() {
+  TsdfGrid grid;
+  for (int x = -5; x < 5; ++x) {
+    for (int y = -5; y < 5; ++y) {
+      for (int z = -2; z < 2; ++z) {
+        TsdfBlock& block = grid.FindOrAdd({x, y, z});
+        for (int place = 0; place < kBlockVoxels; ++place) {
+          const auto i = static_cast<std::size_t>(place);
+          const Index3 voxel = VoxelAt({x, y, z}, place);
+          block.distance[i] = static_cast<float>(-kVoxel_m * voxel.z);
+          block.weight[i] = 50;
+        }
+        block.UpdateMasks(static_cast<float>(kVoxel_m));
+      }
+    }
+  }
+  return grid;
+}
+
+const Pose kPlateBefore = MakePose(0, {0, 0, 1}, {0.01, 0.02, 1.0});
+// In its plane: 4 pixels to the side, 3 down, and a turn by 2 degrees.
+Pose PlateAfter() { return kPlateBefore * MakePose(2 * kDegree, {0, 0, 1}, {0.0133, -0.01, 0}); }
+
+SdfTrackConfig With(double free_space, double outline, double colour) {
+  SdfTrackConfig config;
+  config.free_space_weight = free_space;
+  config.outline_weight = outline;
+  config.colour_weight = colour;
+  return config;
+}
+
+// The plate, kept as a keyframe where it was, and where it is now.
+struct Slide {
+  Slide(const SdfTrackConfig& config, double gain, double offset)
+      : before(drawn::Draw(drawn::Plate(), kPlateBefore)),
+        after(drawn::Draw(drawn::Plate(), PlateAfter(), gain, offset)),
+        key(KeyViewOf(SegmentView(before, before.mask, drawn::kThing, 2 * kVoxel_m),
+                      PointsOf(before, config), drawn::Camera(), config)),
+        view(after, after.mask, drawn::kThing, 2 * kVoxel_m),
+        points(PointsOf(after, config)) {
+    parts = {&after, &view, &key, kPlateBefore.inverse(), &grid, &reader, kVoxel_m};
+  }
+  Frame before;
+  Frame after;
+  TsdfGrid grid = PlaneGrid();
+  SurfaceReader reader{grid, kVoxel_m};
+  KeyView key;
+  SegmentView view;
+  std::vector<SegmentPoint> points;
+  ViewTermParts parts;
+};
+
+SdfRegistrationResult Found(const Slide& slide, const SdfTrackConfig& config) {
+  const auto terms = ViewTermsOf(slide.parts, config);
+  SdfRegistration task{&slide.reader, slide.points, kVoxel_m, drawn::Camera()};
+  task.T_LC_expected = kPlateBefore.inverse();
+  task.others = terms;
+  return RegisterToDistances(task, config);
+}
+
+double ShiftOff_m(const SdfRegistrationResult& found) {
+  return (found.T_LC * PlateAfter()).translation().norm();
+}
+double TurnOff_rad(const SdfRegistrationResult& found) {
+  return Eigen::AngleAxisd((found.T_LC * PlateAfter()).linear()).angle();
+}
+
+TEST(ViewTerms, OutlineHoldsAPlateInItsPlane) {
+  const SdfTrackConfig config = With(0, 1, 0);
+  const Slide slide(config, 1, 0);
+  const auto alone = Found(slide, SdfTrackConfig());
+  EXPECT_GT(ShiftOff_m(alone), 3 * kPixel_m) << "a plane's distances know nothing of it";
+  EXPECT_EQ(alone.known.CountBelow(config.weak_share), 3);
+  const auto found = Found(slide, config);
+  ASSERT_TRUE(found.converged);
+  EXPECT_LT(ShiftOff_m(found), kOutline_pixels * kPixel_m);
+  EXPECT_LT(TurnOff_rad(found), kOutline_pixels * kPixel_m / 0.1);
+  EXPECT_EQ(found.known.CountBelow(config.weak_share), 0);
+}
+
+TEST(ViewTerms, ColourHoldsAPlateInItsPlaneWhateverTheLight) {
+  const SdfTrackConfig config = With(0, 0, 1);
+  for (const auto& [gain, offset] : {std::pair{1.0, 0.0}, std::pair{0.7, 20.0}}) {
+    const Slide slide(config, gain, offset);
+    const auto found = Found(slide, config);
+    ASSERT_TRUE(found.converged);
+    EXPECT_LT(ShiftOff_m(found), kColour_pixels * kPixel_m);
+    EXPECT_LT(TurnOff_rad(found), kColour_pixels * kPixel_m / 0.1);
+    EXPECT_EQ(found.known.CountBelow(config.weak_share), 0);
+  }
+}
+
+// A model that claims what the frame sees through costs, and less the further back it is.
+TEST(ViewTerms, FreeSpacePushesAModelBack) {
+  const SdfTrackConfig config = With(1, 0, 0);
+  const Slide slide(config, 1, 0);
+  const auto terms = ViewTermsOf(slide.parts, config);
+  ASSERT_EQ(terms.size(), 1U);
+  const MotionFrame frame{{0, 0, 0}, 0.1};
+  // So much of the plane is in the picture beside the plate, before the wall.
+  const auto at = [&](double nearer_m) {
+    const Pose T_LC = Eigen::Translation3d(0, 0, nearer_m) * kPlateBefore.inverse();
+    terms.front()->KeepAt(T_LC, 0.001);
+    return terms.front()->Sums(T_LC, frame);
+  };
+  EXPECT_GT(at(0).cost, 0);
+  EXPECT_EQ(at(drawn::kWall_m).cost, 0);
+}
+
+// The cost falls as its slopes say, to the second order; images are linear between pixels, so that
+// a few points pass a kink.
+TEST(ViewTerms, HaveTheSlopesOfTheirCosts) {
+  constexpr double kStep_m = 2e-5;
+  constexpr double kKinks = 0.03;
+  for (const SdfTrackConfig& config : {With(0, 1, 0), With(0, 0, 1)}) {
+    const Slide slide(config, 0.8, 10);
+    const auto terms = ViewTermsOf(slide.parts, config);
+    ASSERT_EQ(terms.size(), 1U);
+    const MotionFrame frame{{0.02, -0.01, 0}, 0.1};
+    const Pose T_LC = MakePose(0.01, {0.2, 0.5, 1}, {0.002, 0.003, 0.001}) * PlateAfter().inverse();
+    terms.front()->KeepAt(T_LC, 0.001);
+    const NormalEquations here = terms.front()->Sums(T_LC, frame);
+    for (int i = 0; i < 6; ++i) {
+      const Vector6 step = kStep_m * Vector6::Unit(i);
+      const double up = terms.front()->Sums(frame.MotionOf(step) * T_LC, frame).cost;
+      const double down = terms.front()->Sums(frame.MotionOf(-step) * T_LC, frame).cost;
+      EXPECT_NEAR((up - down) / (2 * kStep_m), here.g[i], kKinks * here.g.cwiseAbs().maxCoeff())
+          << i;
+    }
+  }
+}
+
+// Before a nearer thing an outline is that thing's; at the picture's edge it is nobody's.
+TEST(SegmentView, TellsItsOwnOutlineFromOthers) {
+  Frame frame = drawn::Draw(drawn::Plate(), kPlateBefore);
+  const auto columns = [&](const SegmentView& view) {
+    std::pair<double, double> ends{1e9, -1e9};
+    for (const RimPoint& point : view.Rim()) {
+      ends.first = std::min(ends.first, point.pixel.x());
+      ends.second = std::max(ends.second, point.pixel.x());
+    }
+    return ends;
+  };
+  const auto whole = columns(SegmentView(frame, frame.mask, drawn::kThing, 2 * kVoxel_m));
+  EXPECT_NEAR(whole.second - whole.first, 0.28 / kPixel_m, 1);
+  // A bar stands before its right end.
+  const cv::Rect bar(180, 0, 40, 240);
+  frame.depth(bar) = 0.7F;
+  frame.mask(bar) = 9;
+  const auto hidden = columns(SegmentView(frame, frame.mask, drawn::kThing, 2 * kVoxel_m));
+  EXPECT_EQ(hidden.first, whole.first);
+  EXPECT_LE(hidden.second, 180 - 2) << "the outline at the bar is the bar's";
+}
+
+TEST(SegmentView, HasNoRimWhereASurfaceTurnsAway) {
+  const Frame frame = drawn::Draw(drawn::Ball(), MakePose(0, {0, 0, 1}, {0, 0, 1}));
+  EXPECT_TRUE(SegmentView(frame, frame.mask, drawn::kThing, 2 * kVoxel_m).Rim().empty());
+}
+
+TEST(SdfTrackConfig, ImageTermsNeedAKeyframe) {
+  SdfTrackConfig config = With(0, 1, 0);
+  EXPECT_TRUE(config.Validate());
+  config.keyframe_turn_rad = 0;
+  EXPECT_FALSE(config.Validate());
+}
+
+}  // namespace
+}  // namespace tsdfpp
