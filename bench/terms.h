@@ -21,7 +21,7 @@ struct TermsBenchOptions {
 // with a pattern; true masks; depth exact or with a Kinect's noise and levels of colour with
 // theirs. Tracked with the distances alone, with free space, outline, colour and the expected
 // motion added one by one, and with others (docs/tracking.md). Writes terms.csv, a row for each
-// shape, paint, depth and set: shifts (ATE), turns, ADD-S, the shares of directions that are free,
+// shape, paint, depth and set: shifts (ATE), turns, ADD-S, how many directions are free,
 // frozen frames and milliseconds, of draws the median; and summary.csv, a row a shape, paint and
 // depth, with shifts and turns of all sets. Errors: kUsage for an unknown shape, set or method;
 // else those of the scenes and the renderer.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/pixel_ray.h"
 #include "mapper/track/object_model.h"
 #include "mapper/volume/fusion_kernels.h"
 
@@ -27,12 +28,11 @@ cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const I
       ++behind;
       continue;
     }
-    const double u = camera.fx * p_C.x() / p_C.z() + camera.cx;
-    const double v = camera.fy * p_C.y() / p_C.z() + camera.cy;
-    left = std::min(left, std::floor(u));
-    right = std::max(right, std::ceil(u) + 1);
-    top = std::min(top, std::floor(v));
-    bottom = std::max(bottom, std::ceil(v) + 1);
+    const Eigen::Vector2d pixel = PixelOf(camera, p_C);
+    left = std::min(left, std::floor(pixel.x()));
+    right = std::max(right, std::ceil(pixel.x()) + 1);
+    top = std::min(top, std::floor(pixel.y()));
+    bottom = std::max(bottom, std::ceil(pixel.y()) + 1);
   }
   if (behind == 8) return {};
   if (behind > 0) return image;

@@ -25,6 +25,8 @@ struct KnownDirections {
                             (turn_shares.array() < share).count());
   }
 };
+// `information` is over the six lengths of a MotionFrame, in points; where it is not finite, or
+// nothing of shifts is known, all shares are 0.
 KnownDirections DirectionsOf(const Matrix6& information);
 
 // What other terms know along those directions, in points.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/pixel_ray.h"
 #include "mapper/volume/fusion_kernels.h"
 
 namespace tsdfpp {
@@ -49,8 +50,9 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
     ForEachSurfaceVoxel(entry, voxel_m, [&](std::size_t /*place*/, const Index3& voxel) {
       const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z));
       if (!(p_C.z() > double{kNearest_m})) return;
-      const double u = std::floor(camera.fx * p_C.x() / p_C.z() + camera.cx + 0.5);
-      const double v = std::floor(camera.fy * p_C.y() / p_C.z() + camera.cy + 0.5);
+      const Eigen::Vector2d pixel = PixelOf(camera, p_C);
+      const double u = std::floor(pixel.x() + 0.5);
+      const double v = std::floor(pixel.y() + 0.5);
       if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) return;
       Count(frame, static_cast<int>(u), static_cast<int>(v), p_C.z(), margin_m, may_be, sight);
     });

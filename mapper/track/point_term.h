@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "mapper/track/pose_least_squares.h"
@@ -38,9 +39,6 @@ class PointTerm {
   // What the points tell of motions at T_LC once they are where they belong, so that their errors
   // have the deviation that such errors have at best: the Hessian of Sums() with that.
   Matrix6 Information(const Pose& T_LC, const MotionFrame& frame) const;
-
-  // Points that are kept.
-  int Seen() const { return static_cast<int>(kept_.size()); }
 
  protected:
   // Called where points are kept, before the first of them is looked at for that.

@@ -42,12 +42,6 @@ constexpr double kKnownOtherwise_voxels = 0.05;
 // what is wrong with a model's rim. Other terms that know such a direction have that share of say.
 constexpr double kWeakOfDistances = 0.2;
 
-// That leave no more than that open.
-double PointsAsked(double deviation_m, double voxel_m) {
-  const double open_m = kKnownOtherwise_voxels * voxel_m;
-  return deviation_m * deviation_m / (open_m * open_m);
-}
-
 Eigen::Matrix3d PriorOf(const Eigen::Vector3d& shares, const Eigen::Matrix3d& directions,
                         double weak_share) {
   const Eigen::Vector3d lacking = (weak_share - shares.array()).max(0);
@@ -107,10 +101,9 @@ class AllTerms {
   KnownDirections KnownAt(const Pose& T_LC) const {
     const Matrix6 of_distances = distances_.Sums(T_LC).H;
     KnownDirections known = DirectionsOf(of_distances);
-    const AlongDirections others = Along(known, of_distances, AtBest(T_LC));
-    const double asked = PointsAsked(deviation_m_, task_->voxel_m);
-    known.shift_shares.array() += config_->weak_share * (others.shifts.array() / asked).min(1);
-    known.turn_shares.array() += config_->weak_share * (others.turns.array() / asked).min(1);
+    const Vector6 trust = Trust(T_LC, known, of_distances);
+    known.shift_shares += config_->weak_share * trust.head<3>();
+    known.turn_shares += config_->weak_share * trust.tail<3>();
     return known;
   }
   // Along weak directions, from T_LC: what is expected and, as far as they know it, what the other
@@ -121,17 +114,13 @@ class AllTerms {
     if (task_->others.empty()) {
       return PriorFor(of_distances, known, task_->T_LC_expected, config_->weak_share);
     }
-    const AlongDirections best = Along(known, of_distances, AtBest(T_LC));
-    const double asked = PointsAsked(deviation_m_, task_->voxel_m);
     const double weights = std::max(1.0, of_distances.topLeftCorner<3, 3>().trace());
     Matrix6 directions = Matrix6::Zero();
     directions.topLeftCorner<3, 3>() = known.shifts;
     directions.bottomRightCorner<3, 3>() = known.turns;
     Vector6 shares;
     shares << known.shift_shares, known.turn_shares;
-    Vector6 trust;
-    trust << best.shifts, best.turns;
-    trust = (trust / asked).cwiseMin(1);
+    const Vector6 trust = Trust(T_LC, known, of_distances);
     const Vector6 say = weights * (kWeakOfDistances - shares.array()).max(0) * trust.array();
     const Vector6 pull =
         weights * (config_->weak_share - shares.array()).max(0) * (1 - trust.array());
@@ -173,10 +162,17 @@ class AllTerms {
     const Vector6 way = -H.ldlt().solve(chosen.transpose() * sums.g);
     return way.allFinite() ? Vector6(chosen * way) : Vector6(Vector6::Zero());
   }
-  Matrix6 AtBest(const Pose& T_LC) const {
-    Matrix6 sum = Matrix6::Zero();
-    for (const auto& term : task_->others) sum += term->Information(T_LC, *frame_);
-    return sum;
+  // How well the others know each direction, shifts first: 1 where they leave no more open than
+  // kKnownOtherwise_voxels.
+  Vector6 Trust(const Pose& T_LC, const KnownDirections& known, const Matrix6& of_distances) const {
+    Matrix6 at_best = Matrix6::Zero();
+    for (const auto& term : task_->others) at_best += term->Information(T_LC, *frame_);
+    const AlongDirections along = Along(known, of_distances, at_best);
+    const double open_m = kKnownOtherwise_voxels * task_->voxel_m;
+    const double asked = deviation_m_ * deviation_m_ / (open_m * open_m);
+    Vector6 trust;
+    trust << along.shifts, along.turns;
+    return (trust / asked).cwiseMin(1);
   }
 
   const SdfRegistration* task_;

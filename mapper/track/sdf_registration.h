@@ -52,8 +52,11 @@ struct SdfRegistrationResult {
 // Registers in two passes: few points and a wide Huber function from every seed, then all points,
 // and the other terms, from where the cost was least. Along directions of which less than
 // config.weak_share of the points' information speaks, a prior pulls towards the expected pose, up
-// to that share. Points that are not finite, and a model or segment without anything in it, give
-// converged = false. Deterministic for any number of threads; `config` must be valid.
+// to that share. Along directions of which the distances know less than a fifth it pulls, up to
+// that, to where the other terms would have the object, as far as they know the direction
+// (docs/tracking.md, "Terms of the image"). Points that are not finite, and a model or segment
+// without anything in it, give converged = false. Deterministic for any number of threads; `config`
+// must be valid.
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config);
 

@@ -89,11 +89,11 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
   ++turn_;
   std::vector<Turn> turns;
   for (auto& [id, pixels] : PixelsByLabel(labels, config_.mask_erosion_px)) {
-    turns.push_back({id, labels, std::move(pixels), &memory_[id]});
+    turns.push_back({id, std::move(pixels), &memory_[id]});
   }
   // Each turn is its own object's alone.
   tbb::parallel_for(std::size_t{0}, turns.size(),
-                    [&](std::size_t i) { Take(frame, map, before, turns[i]); });
+                    [&](std::size_t i) { Take(frame, labels, map, before, turns[i]); });
   TrackedPoses after{before};
   for (const Turn& turn : turns) {
     after.seen[turn.id] = turn.status;
@@ -105,8 +105,8 @@ TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
   return after;
 }
 
-void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const ObjectPoses& before,
-                      Turn& turn) const {
+void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
+                      const ObjectPoses& before, Turn& turn) const {
   const double voxel_m = map.config().voxel_m;
   const auto points = SegmentPointsOf(frame, turn.pixels, voxel_m, config_);
   if (points.size() < static_cast<std::size_t>(config_.min_points)) return;
@@ -115,7 +115,7 @@ void SdfTracker::Take(const Frame& frame, const MapRepresentation& map, const Ob
   sight.voxel_m = voxel_m;
   std::optional<SegmentView> view;
   if (config_.outline_weight > 0 || config_.colour_weight > 0) {
-    view.emplace(frame, turn.labels, turn.id, config_.max_step_voxels * voxel_m);
+    view.emplace(frame, labels, turn.id, config_.max_step_voxels * voxel_m);
     sight.view = &*view;
   }
   const auto known = before.find(turn.id);

@@ -86,7 +86,6 @@ class SdfTracker : public Tracker {
   // One object of a frame, and what became of it.
   struct Turn {
     InstanceId id = kNoInstance;
-    cv::Mat labels;           // of the frame
     std::vector<int> pixels;  // of its segment, without the outline
     Memory* memory = nullptr;
     TrackStatus status = TrackStatus::kFrozen;
@@ -96,8 +95,8 @@ class SdfTracker : public Tracker {
   };
 
   // May run beside the turns of other objects.
-  void Take(const Frame& frame, const MapRepresentation& map, const ObjectPoses& before,
-            Turn& turn) const;
+  void Take(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
+            const ObjectPoses& before, Turn& turn) const;
   // Nothing where the object is frozen. T_WO is that before the frame; `sight` has the frame and
   // what it shows of the object.
   std::optional<Registered> Register(Sight sight, const ObjectModel& model, const Pose& T_WO,

@@ -7,6 +7,7 @@
 
 #include "core/pixel_ray.h"
 #include "mapper/track/model_sight.h"
+#include "mapper/track/robust_deviation.h"
 
 namespace tsdfpp {
 namespace {
@@ -29,10 +30,8 @@ constexpr double kFreeSpaceMargin_voxels = 1;
 // Gains of light that are taken for real.
 constexpr double kLeastGain = 0.4;
 constexpr double kMostGain = 2.5;
-
-Eigen::Vector2d PixelOf(const Intrinsics& camera, const Eigen::Vector3d& p_C) {
-  return {camera.fx * p_C.x() / p_C.z() + camera.cx, camera.fy * p_C.y() / p_C.z() + camera.cy};
-}
+// What is further from a line than so many medians has no part in it.
+constexpr double kNear_medians = 3;
 
 // Of a slope over pixels, over the point.
 Eigen::Vector3d SlopeOverPoint(const Intrinsics& camera, const Eigen::Vector3d& p_C,
@@ -50,38 +49,47 @@ std::vector<Eigen::Vector3d> Moved(const Pose& T, const std::vector<Eigen::Vecto
   return moved;
 }
 
-// Where a rim of the object is beside the outline of its segment, pixels.
-class OutlineTerm : public PointTerm {
+// Points of the keyframe, and the segment as the frame shows it.
+class KeyTerm : public PointTerm {
  public:
-  OutlineTerm(const ViewTermParts& parts, double weight)
-      : PointTerm(Moved(parts.T_LC_key, parts.key->rim_C), weight),
+  KeyTerm(const ViewTermParts& parts, const std::vector<Eigen::Vector3d>& points_C, double weight)
+      : PointTerm(Moved(parts.T_LC_key, points_C), weight),
         view_(parts.view),
         camera_(parts.frame->intrinsics) {}
 
- private:
-  bool IsFit(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
-    return view_->IsOutlineOf(PixelOf(camera_, p_C), p_C.z());
-  }
-  PointSight At(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
-    if (!(p_C.z() > 0)) return {};
-    const ImageValue at = view_->OutlineAt(PixelOf(camera_, p_C));
-    if (!at.is_known || std::abs(at.value) > kFarthestRim_px) return {};
-    return {true, at.value, SlopeOverPoint(camera_, p_C, at.slope)};
-  }
-  double LeastDeviation(double /*distance_m*/) const override { return kLeastDeviation_px; }
+ protected:
+  const SegmentView& view() const { return *view_; }
+  const Intrinsics& camera() const { return camera_; }
 
+ private:
   const SegmentView* view_;
   Intrinsics camera_;
 };
 
+// Where a rim of the object is beside the outline of its segment, pixels.
+class OutlineTerm : public KeyTerm {
+ public:
+  OutlineTerm(const ViewTermParts& parts, double weight)
+      : KeyTerm(parts, parts.key->rim_C, weight) {}
+
+ private:
+  bool IsFit(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
+    return view().IsOutlineOf(PixelOf(camera(), p_C), p_C.z());
+  }
+  PointSight At(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
+    if (!(p_C.z() > 0)) return {};
+    const ImageValue at = view().OutlineAt(PixelOf(camera(), p_C));
+    if (!at.is_known || std::abs(at.value) > kFarthestRim_px) return {};
+    return {true, at.value, SlopeOverPoint(camera(), p_C, at.slope)};
+  }
+  double LeastDeviation(double /*distance_m*/) const override { return kLeastDeviation_px; }
+};
+
 // How grey a point of the object is beside what it was, but for one gain and offset of all.
-class ColourTerm : public PointTerm {
+class ColourTerm : public KeyTerm {
  public:
   ColourTerm(const ViewTermParts& parts, double weight)
-      : PointTerm(Moved(parts.T_LC_key, parts.key->patch_C), weight),
-        view_(parts.view),
-        camera_(parts.frame->intrinsics),
-        grey_(&parts.key->patch_grey) {}
+      : KeyTerm(parts, parts.key->patch_C, weight), grey_(&parts.key->patch_grey) {}
 
  private:
   // The line through the pairs of grey values, twice, the second time by what is near it.
@@ -100,10 +108,7 @@ class ColourTerm : public PointTerm {
     std::vector<double> sizes;
     sizes.reserve(pairs.size());
     for (const auto& [now, then] : pairs) sizes.push_back(std::abs(gain_ * now + offset_ - then));
-    if (sizes.empty()) return;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    FitLine(pairs, 3 * std::max(*middle, kLeastDeviation_grey));
+    FitLine(pairs, kNear_medians * std::max(MiddleOne(std::move(sizes)), kLeastDeviation_grey));
   }
   void FitLine(const std::vector<std::pair<double, double>>& pairs, double most) {
     double count = 0;
@@ -126,19 +131,17 @@ class ColourTerm : public PointTerm {
     offset_ = (then_sum - gain_ * now_sum) / count;
   }
   bool IsFit(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
-    return view_->IsAtDepth(PixelOf(camera_, p_C), p_C.z());
+    return view().IsAtDepth(PixelOf(camera(), p_C), p_C.z());
   }
   PointSight At(std::size_t point, const Eigen::Vector3d& p_C) const override {
     if (!(p_C.z() > 0)) return {};
-    const ImageValue at = view_->GreyAt(PixelOf(camera_, p_C));
+    const ImageValue at = view().GreyAt(PixelOf(camera(), p_C));
     if (!at.is_known) return {};
     return {true, gain_ * at.value + offset_ - (*grey_)[point],
-            SlopeOverPoint(camera_, p_C, gain_ * at.slope)};
+            SlopeOverPoint(camera(), p_C, gain_ * at.slope)};
   }
   double LeastDeviation(double /*distance_m*/) const override { return kLeastDeviation_grey; }
 
-  const SegmentView* view_;
-  Intrinsics camera_;
   const std::vector<double>* grey_;
   double gain_ = 1;
   double offset_ = 0;

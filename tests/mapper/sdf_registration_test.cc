@@ -425,6 +425,10 @@ TEST(SdfTrackConfig, RoundTripsThroughToml) {
   config.curved = false;
   config.weak_share = 0.03;
   config.keyframe_points = 77;
+  config.free_space_weight = 0.5;
+  config.outline_weight = 0.25;
+  config.colour_weight = 2;
+  config.colour_points = 88;
   EXPECT_EQ(SdfTrackConfig::FromToml(config.ToToml(), "t").value(), config);
   EXPECT_TRUE(SdfTrackConfig().Validate());
   config.min_points = config.max_points + 1;

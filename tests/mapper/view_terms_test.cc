@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "core/units.h"
 #include "mapper/track/sdf_registration.h"
@@ -50,6 +51,7 @@ TsdfGrid PlaneGrid() {
 }
 
 const Pose kPlateBefore = MakePose(0, {0, 0, 1}, {0.01, 0.02, 1.0});
+constexpr double kWallBehind_m = drawn::kWall_m - 1.0;  // the plate
 // In its plane: 4 pixels to the side, 3 down, and a turn by 2 degrees.
 Pose PlateAfter() { return kPlateBefore * MakePose(2 * kDegree, {0, 0, 1}, {0.0133, -0.01, 0}); }
 
@@ -122,21 +124,31 @@ TEST(ViewTerms, ColourHoldsAPlateInItsPlaneWhateverTheLight) {
   }
 }
 
-// A model that claims what the frame sees through costs, and less the further back it is.
+// A model that claims what the frame sees through costs, the less the further back it is.
 TEST(ViewTerms, FreeSpacePushesAModelBack) {
   const SdfTrackConfig config = With(1, 0, 0);
   const Slide slide(config, 1, 0);
   const auto terms = ViewTermsOf(slide.parts, config);
   ASSERT_EQ(terms.size(), 1U);
   const MotionFrame frame{{0, 0, 0}, 0.1};
-  // So much of the plane is in the picture beside the plate, before the wall.
-  const auto at = [&](double nearer_m) {
-    const Pose T_LC = Eigen::Translation3d(0, 0, nearer_m) * kPlateBefore.inverse();
-    terms.front()->KeepAt(T_LC, 0.001);
-    return terms.front()->Sums(T_LC, frame);
+  // Of the plane, which is in the picture beside the plate, before the wall.
+  const auto behind = [](double further_m) {
+    return Pose(Eigen::Translation3d(0, 0, -further_m)) * kPlateBefore.inverse();
   };
-  EXPECT_GT(at(0).cost, 0);
-  EXPECT_EQ(at(drawn::kWall_m).cost, 0);
+  constexpr double kDeviation_m = 0.001;
+  terms.front()->KeepAt(behind(0), kDeviation_m);
+  const auto cost_at = [&](double further_m) {
+    return terms.front()->Sums(behind(further_m), frame).cost;
+  };
+  EXPECT_GT(cost_at(0), cost_at(0.2));
+  EXPECT_GT(cost_at(0.2), cost_at(0.4));
+  EXPECT_GT(cost_at(0.4), 0);
+  EXPECT_EQ(cost_at(kWallBehind_m), 0);
+  // Along the picture's axis, which is the lattice's z; nothing pulls it aside.
+  const NormalEquations here = terms.front()->Sums(behind(0.2), frame);
+  EXPECT_GT(here.g[2], 0);
+  EXPECT_EQ(here.g[0], 0);
+  EXPECT_EQ(here.g[1], 0);
 }
 
 // The cost falls as its slopes say, to the second order; images are linear between pixels, so that
@@ -162,7 +174,7 @@ TEST(ViewTerms, HaveTheSlopesOfTheirCosts) {
   }
 }
 
-// Before a nearer thing an outline is that thing's; at the picture's edge it is nobody's.
+// Beside a nearer thing an outline is that thing's; at the picture's edge it is nobody's.
 TEST(SegmentView, TellsItsOwnOutlineFromOthers) {
   Frame frame = drawn::Draw(drawn::Plate(), kPlateBefore);
   const auto columns = [&](const SegmentView& view) {
@@ -182,6 +194,16 @@ TEST(SegmentView, TellsItsOwnOutlineFromOthers) {
   const auto hidden = columns(SegmentView(frame, frame.mask, drawn::kThing, 2 * kVoxel_m));
   EXPECT_EQ(hidden.first, whole.first);
   EXPECT_LE(hidden.second, 180 - 2) << "the outline at the bar is the bar's";
+  // Its right end lies beyond the picture; its rows there are those about 125.
+  const Frame cut = drawn::Draw(drawn::Plate(), MakePose(0, {0, 0, 1}, {0.45, 0.02, 1.0}));
+  ASSERT_EQ(cut.mask.at<InstanceId>(125, cut.mask.cols - 1), drawn::kThing);
+  int at_left = 0;
+  for (const RimPoint& point : SegmentView(cut, cut.mask, drawn::kThing, 2 * kVoxel_m).Rim()) {
+    if (std::abs(point.pixel.y() - 125) > 20) continue;
+    EXPECT_LT(point.pixel.x(), cut.mask.cols / 2 + 100) << "beyond the picture nothing is known";
+    ++at_left;
+  }
+  EXPECT_GT(at_left, 20);
 }
 
 TEST(SegmentView, HasNoRimWhereASurfaceTurnsAway) {
@@ -190,10 +212,13 @@ TEST(SegmentView, HasNoRimWhereASurfaceTurnsAway) {
 }
 
 TEST(SdfTrackConfig, ImageTermsNeedAKeyframe) {
-  SdfTrackConfig config = With(0, 1, 0);
-  EXPECT_TRUE(config.Validate());
-  config.keyframe_turn_rad = 0;
-  EXPECT_FALSE(config.Validate());
+  for (SdfTrackConfig config : {With(0, 1, 0), With(0, 0, 1)}) {
+    EXPECT_TRUE(config.Validate());
+    config.keyframe_turn_rad = 0;
+    const auto refused = config.Validate();
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("keyframe_turn_rad"), std::string::npos);
+  }
 }
 
 }  // namespace
