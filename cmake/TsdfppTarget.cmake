@@ -117,6 +117,19 @@ function(tsdfpp_room name)
   endif()
 endfunction()
 
+# tsdfpp_late_library(<name> FOR <target> SOURCES ... LINK ...): a library that <target> loads where it first needs it
+# (core/late_library.h); programs that link <target> find it in the build's folder.
+function(tsdfpp_late_library name)
+  cmake_parse_arguments(ARG "" "FOR" "SOURCES;LINK" ${ARGN})
+  add_library(${name} MODULE ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK})
+  tsdfpp_compile_options(${name})
+  add_dependencies(${ARG_FOR} ${name})
+  target_link_libraries(${ARG_FOR} INTERFACE -Wl,-rpath,${PROJECT_BINARY_DIR})
+endfunction()
+
 # tsdfpp_order_tbb(<target>): what ThreadSanitizer has to be told of a libtbb that is not instrumented.
 function(tsdfpp_order_tbb target)
   set(source ${PROJECT_SOURCE_DIR}/tests/sanitizers/tbb_happens_before.cc)

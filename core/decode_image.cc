@@ -7,6 +7,7 @@
 
 #include "core/address_space.h"
 #include "core/files.h"
+#include "core/image_codecs.h"
 #include "core/quiet_stderr.h"
 
 namespace tsdfpp {
@@ -43,12 +44,14 @@ Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, 
   constexpr auto kMostBytes = static_cast<std::size_t>(std::numeric_limits<int>::max());
   if (bytes.size() <= kMostBytes && !(is_exr && path.empty())) {
     if (is_exr) EnableExr();
+    const auto codecs = LoadImageCodecs();
+    if (!codecs) return EnvironmentError("{}: {}", where, codecs.error().message);
     const QuietStderr quiet;
     try {
       if (is_exr) {
-        image = cv::imread(path.string(), flags);
+        image = codecs->read(path.string(), flags);
       } else {
-        image = cv::imdecode(
+        image = codecs->decode(
             cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data())),
             flags);
       }

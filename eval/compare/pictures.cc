@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/encode_image.h"
 #include "core/files.h"
 #include "eval/picture/draw_scene.h"
 #include "eval/picture/record_images.h"
@@ -25,12 +26,9 @@ void Write(cv::Mat& image, const std::string& text, cv::Point at, double size = 
 Expected<void> SavePng(const std::filesystem::path& path, const cv::Mat& rgb) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9})) {
-    return EnvironmentError("{}: a picture of {}x{} cannot be encoded", path.string(), bgr.cols,
-                            bgr.rows);
-  }
-  return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  TSDFPP_ASSIGN(const std::string bytes,
+                EncodeImage(bgr, ".png", path.string(), {cv::IMWRITE_PNG_COMPRESSION, 9}));
+  return WriteFile(path, bytes);
 }
 
 // Rows of cells of equal size below a line of column titles, each row under its own title.

@@ -1,9 +1,9 @@
 #include "eval/gate/gate_explain.h"
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/encode_image.h"
 #include "core/files.h"
 #include "eval/gate/gate_times.h"
 #include "eval/picture/draw_scene.h"
@@ -162,12 +162,8 @@ Expected<void> Draw(const Seen& seen, const std::filesystem::path& file) {
   cv::Mat all;
   cv::hconcat(parts, all);
   cv::cvtColor(all, all, cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", all, bytes)) {
-    return EnvironmentError("{}: a picture of {}x{} cannot be encoded", file.string(), all.cols,
-                            all.rows);
-  }
-  return WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  TSDFPP_ASSIGN(const std::string bytes, EncodeImage(all, ".png", file.string()));
+  return WriteFile(file, bytes);
 }
 
 }  // namespace

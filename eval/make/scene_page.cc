@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/encode_image.h"
 #include "core/files.h"
 #include "sim/load_scene.h"
 #include "sim/scene_list.h"
@@ -33,11 +34,9 @@ cv::Mat Shrunk(const cv::Mat& image, int width) {
 Expected<void> WriteJpeg(const cv::Mat& rgb, const std::filesystem::path& path) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality})) {
-    return EnvironmentError("'{}' cannot be encoded as JPEG", path.string());
-  }
-  return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  TSDFPP_ASSIGN(const std::string bytes,
+                EncodeImage(bgr, ".jpg", path.string(), {cv::IMWRITE_JPEG_QUALITY, kJpegQuality}));
+  return WriteFile(path, bytes);
 }
 
 // The pictures next to each other.

@@ -1,7 +1,6 @@
 #include "eval/picture/map_views.h"
 
-#include <opencv2/imgcodecs.hpp>
-
+#include "core/encode_image.h"
 #include "core/files.h"
 #include "sequence/image_files.h"
 
@@ -9,11 +8,8 @@ namespace tsdfpp {
 namespace {
 
 Expected<void> WritePng(const cv::Mat& image, const std::filesystem::path& path) {
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", image, bytes)) {
-    return EnvironmentError("{}: the PNG codec fails", path.string());
-  }
-  return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  TSDFPP_ASSIGN(const std::string bytes, EncodeImage(image, ".png", path.string()));
+  return WriteFile(path, bytes);
 }
 
 cv::Mat NormalPicture(const RaySurface& surface) {

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "core/encode_image.h"
 #include "eval/picture/draw_scene.h"
 
 namespace tsdfpp {
@@ -68,13 +69,8 @@ Expected<std::string> WebpBytes(const cv::Mat& rgb, bool lossless) {
   }
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".webp", bgr, bytes,
-                    {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality})) {
-    return EnvironmentError("a picture of {} x {} pixels cannot be encoded as WebP", rgb.cols,
-                            rgb.rows);
-  }
-  return std::string(bytes.begin(), bytes.end());
+  return EncodeImage(bgr, ".webp", "a picture of the record",
+                     {cv::IMWRITE_WEBP_QUALITY, lossless ? kWebpLossless : kWebpQuality});
 }
 
 }  // namespace tsdfpp

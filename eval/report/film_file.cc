@@ -99,14 +99,15 @@ FilmFile::~FilmFile() {
 Expected<void> FilmFile::Open(cv::Size size, int rate_hz) {
   if (file_.has_parent_path()) TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(file_.parent_path()));
   if (!memory_.is_open()) return Cannot(std::strerror(memory_.failure()));
+  auto encoder = NewFilmEncoder();
+  if (!encoder) return Cannot(encoder.error().message);
+  encoder_ = std::move(*encoder);
   RemoveDeadLinks(file_);
   std::error_code failure;
   std::filesystem::create_symlink(memory_.path(), link_, failure);
   if (failure) return Cannot(failure.message());
   quiet_.emplace();  // the encoder prints what it chose, and its threads what they lack
-  writer_.open(link_.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), rate_hz,
-               size);
-  if (writer_.isOpened()) return {};
+  if (encoder_->Open(link_.string(), rate_hz, size)) return {};
   quiet_.reset();
   return EnvironmentError(
       "cannot write H.264 to '{}': the folder refuses, or OpenCV has no encoder for it",
@@ -114,12 +115,12 @@ Expected<void> FilmFile::Open(cv::Size size, int rate_hz) {
 }
 
 void FilmFile::Show(const cv::Mat& page) {
-  writer_.write(page);
+  encoder_->Write(page);
   ++frames_;
 }
 
 Expected<void> FilmFile::Finish() {
-  writer_.release();
+  encoder_->Close();
   // The encoder goes on after an error, with another film, and OpenCV says nothing of it.
   const std::string words = quiet_ ? quiet_->Words() : "";
   quiet_.reset();

@@ -2,14 +2,15 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <opencv2/core.hpp>
-#include <opencv2/videoio.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "core/error.h"
 #include "core/quiet_stderr.h"
+#include "eval/report/film_encoder.h"
 
 namespace tsdfpp {
 
@@ -58,7 +59,7 @@ class FilmFile {
   MemoryFile memory_;
   std::filesystem::path link_;
   std::optional<QuietStderr> quiet_;  // outlives the encoder's threads
-  cv::VideoWriter writer_;
+  std::unique_ptr<FilmEncoder> encoder_;
   int frames_ = 0;
 };
 

@@ -44,6 +44,19 @@ TEST(CommandHelp, EverySubcommandHasHelp) {
   EXPECT_FALSE(version.out.empty());
 }
 
+// Codecs bring some 240 libraries, whose loading takes longer than most commands
+// (core/late_library.h).
+TEST(CommandStart, LoadsNoCodecs) {
+  const TempFolder folder;
+  const CommandOutput listed =
+      RunTsdfpp({"--version"}, folder.path(), {{"LD_TRACE_LOADED_OBJECTS", "1"}});
+  EXPECT_NE(listed.out.find("libopencv_core"), std::string::npos) << listed.out;
+  for (const char* library :
+       {"libopencv_imgcodecs", "libopencv_videoio", "libgdal", "libavcodec"}) {
+    EXPECT_EQ(listed.out.find(library), std::string::npos) << library;
+  }
+}
+
 // What `tsdfpp methods` prints for plots and other programs is the row of the method.
 TEST(CommandMethods, AreTheRows) {
   const TempFolder folder;
