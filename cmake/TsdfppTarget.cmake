@@ -16,7 +16,10 @@ function(tsdfpp_compile_together target)
   endforeach()
 endfunction()
 
-file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/compiled_together.txt lines REGEX "^[^#]")
+file(READ ${CMAKE_CURRENT_LIST_DIR}/compiled_together.txt lines)
+string(REGEX REPLACE "#[^\n]*\n" "" lines "${lines}")
+string(REPLACE "\n " " " lines "${lines}")
+string(REPLACE "\n" ";" lines "${lines}")
 set_property(
   DIRECTORY
   APPEND
