@@ -120,6 +120,12 @@ function(tsdfpp_room name)
   endif()
 endfunction()
 
+# What has a program find them. The sanitizers' runtimes call dlopen in its place, and a RUNPATH is of the caller alone.
+set(TSDFPP_FIND_LATE -Wl,-rpath,${PROJECT_BINARY_DIR})
+if(TSDFPP_SANITIZE)
+  list(APPEND TSDFPP_FIND_LATE -Wl,--disable-new-dtags)
+endif()
+
 # tsdfpp_late_library(<name> FOR <target> SOURCES ... LINK ...): a library that <target> loads where it first needs it
 # (core/late_library.h); programs that link <target> find it in the build's folder.
 function(tsdfpp_late_library name)
@@ -130,7 +136,7 @@ function(tsdfpp_late_library name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK})
   tsdfpp_compile_options(${name})
   add_dependencies(${ARG_FOR} ${name})
-  target_link_libraries(${ARG_FOR} INTERFACE -Wl,-rpath,${PROJECT_BINARY_DIR})
+  target_link_libraries(${ARG_FOR} INTERFACE ${TSDFPP_FIND_LATE})
 endfunction()
 
 # tsdfpp_order_tbb(<target>): what ThreadSanitizer has to be told of a libtbb that is not instrumented.
