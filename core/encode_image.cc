@@ -10,7 +10,7 @@ Expected<std::string> EncodeImage(const cv::Mat& image, const std::string& endin
   if (!codecs) return EnvironmentError("{}: {}", where, codecs.error().message);
   std::vector<unsigned char> bytes;
   if (!codecs->encode(ending, image, bytes, parameters)) {
-    return EnvironmentError("{}: a picture of {}x{} cannot be encoded as '{}'", where, image.cols,
+    return EnvironmentError("{}: {}x{} pixels cannot be encoded as '{}'", where, image.cols,
                             image.rows, ending);
   }
   return std::string(bytes.begin(), bytes.end());

@@ -47,10 +47,11 @@ class FilmFile {
 
   // Errors: kEnvironment, the folder refuses or there is no encoder.
   Expected<void> Open(cv::Size size, int rate_hz);
+  // Both after an Open that went well; a page is blue, green, red, and of the film's size.
   void Show(const cv::Mat& page);
-  int frames() const { return frames_; }
   // Errors: kEnvironment, the film is not whole or cannot be written.
   Expected<void> Finish();
+  int frames() const { return frames_; }
 
  private:
   tl::unexpected<Error> Cannot(const std::string& why) const;

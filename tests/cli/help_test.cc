@@ -44,8 +44,7 @@ TEST(CommandHelp, EverySubcommandHasHelp) {
   EXPECT_FALSE(version.out.empty());
 }
 
-// Codecs bring some 240 libraries, whose loading takes longer than most commands
-// (core/late_library.h).
+// Codecs bring some 240 libraries, which would be bound before every command (core/late_library.h).
 TEST(CommandStart, LoadsNoCodecs) {
   const TempFolder folder;
   const CommandOutput listed =
