@@ -16,7 +16,7 @@ import pathlib
 import subprocess
 import sys
 
-SCENES = "contact,fast,handheld,reentry,stack,thin,toycar3"
+SCENES = "contact,container,fast,handheld,occlusion,reentry,stack,thin,toycar3,tumble"
 SENSOR = "nguyen2012+colour_noise"
 LONG = 1_000_000  # frames between evaluations: the examined frame alone
 

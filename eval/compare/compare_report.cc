@@ -78,9 +78,10 @@ nlohmann::json TrackedJson(const CompareRun& run) {
   return TrackChoiceName(run.pipeline.tracked().choice());
 }
 
+// Of the objects that moved, whether they are removed or not.
 nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run) {
   nlohmann::json trajectories;
-  for (const InstanceId id : result.movers) {
+  for (const InstanceId id : result.truth->moved()) {
     const auto estimate = run.pipeline.trajectories().find(run.IdOf(id));
     const auto truth = result.truth->trajectories().find(id);
     if (estimate == run.pipeline.trajectories().end() ||

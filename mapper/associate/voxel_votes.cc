@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <limits>
+#include <span>
 
 #include "core/pixel_ray.h"
 namespace tsdfpp {
@@ -18,6 +20,16 @@ Eigen::Vector3d PointOf(const Frame& frame, int pixel) {
   const int u = pixel % frame.depth.cols;
   const double z = frame.depth.at<float>(v, u);
   return frame.T_WC * (z * PixelRay(frame.intrinsics, u, v));
+}
+
+constexpr float kFar = std::numeric_limits<float>::infinity();
+
+// To the surface of one object (of ObjectLookup::ids()), voxels; kFar where it says nothing.
+// `scratch` is what memory is kept in from call to call.
+float DistanceOf(const ObjectLookup& lookup, std::size_t object, const Eigen::Vector3d& p_W,
+                 std::vector<ObjectLookup::Distance>& scratch) {
+  lookup.Distances(p_W, std::span(&object, 1), scratch);
+  return scratch.empty() ? kFar : scratch.front().voxels;
 }
 
 bool IsShare(int count, double share, std::size_t of) {
@@ -67,26 +79,36 @@ std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
 }
 
 void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const {
-  const std::vector<std::size_t> around = lookup.Around(segment.points_W);
+  const std::optional<std::size_t> background = lookup.NumberOf(kBackground);
+  const bool may_be_background = !segment.is_known && background;
+  std::vector<std::size_t> around = lookup.Around(segment.points_W);
+  if (background) std::erase(around, *background);
   if (around.empty()) return;
   std::vector<Votes> counts(around.size());
   for (std::size_t i = 0; i < around.size(); ++i) counts[i].object = around[i];
   std::vector<ObjectLookup::Distance> distances;
+  std::vector<ObjectLookup::Distance> scratch;
   for (const Eigen::Vector3d& p_W : segment.points_W) {
     lookup.Distances(p_W, around, distances);
+    if (distances.empty()) continue;
+    const float to_background =
+        may_be_background ? DistanceOf(lookup, *background, p_W, scratch) : kFar;
+    const bool is_alone = to_background > config_.at_voxels;
     Votes* nearest = nullptr;
     float least = 0;
     for (const ObjectLookup::Distance& distance : distances) {
       const auto place =
           std::lower_bound(around.begin(), around.end(), distance.object) - around.begin();
       Votes& votes = counts[static_cast<std::size_t>(place)];
-      if (distance.voxels <= config_.near_voxels) ++votes.near;
+      if (is_alone && distance.voxels <= config_.near_voxels) ++votes.near;
       if (nearest == nullptr ? distance.voxels <= config_.at_voxels : distance.voxels < least) {
         nearest = &votes;
         least = distance.voxels;
       }
     }
-    if (nearest != nullptr) ++nearest->at;
+    if (nearest == nullptr || to_background < least) continue;
+    ++nearest->at;
+    if (is_alone) ++nearest->alone;
   }
   for (const Votes& votes : counts) {
     if (votes.at > 0 || votes.near > 0) segment.votes.push_back(votes);
@@ -97,10 +119,11 @@ void VoxelVotes::Claim(const ObjectLookup& lookup, std::vector<Segment>& segment
   tbb::parallel_for(std::size_t{0}, segments.size(),
                     [&](std::size_t s) { CountVotes(lookup, segments[s]); });
   for (Segment& segment : segments) {
-    const auto most = std::max_element(segment.votes.begin(), segment.votes.end(),
-                                       [](const Votes& a, const Votes& b) { return a.at < b.at; });
+    const auto most =
+        std::max_element(segment.votes.begin(), segment.votes.end(),
+                         [](const Votes& a, const Votes& b) { return a.alone < b.alone; });
     if (most == segment.votes.end()) continue;
-    if (IsShare(most->at, config_.min_share, segment.points_W.size())) {
+    if (IsShare(most->alone, config_.min_share, segment.points_W.size())) {
       segment.object = most->object;
     }
   }
@@ -229,11 +252,32 @@ void VoxelVotes::Cut(const Frame& frame, const ObjectLookup& lookup, const Segme
                     });
 }
 
+void VoxelVotes::LeaveBackground(const Frame& frame, const ObjectLookup& lookup,
+                                 const Segment& segment, cv::Mat& labels) {
+  const std::optional<std::size_t> background = lookup.NumberOf(kBackground);
+  if (!background) return;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      std::vector<ObjectLookup::Distance> scratch;
+                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        const int pixel = segment.pixels[i];
+                        const Eigen::Vector3d p_W = PointOf(frame, pixel);
+                        if (DistanceOf(lookup, *background, p_W, scratch) <
+                            DistanceOf(lookup, *segment.object, p_W, scratch)) {
+                          labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) =
+                              kNoInstance;
+                        }
+                      }
+                    });
+}
+
 AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segments,
                                         const MapRepresentation& map) {
   next_ = state_;
   ++next_.frame;
-  const ObjectLookup lookup(map);
+  const ObjectLookup lookup(map, segments.unknown.empty()
+                                     ? ObjectLookup::Of::kObjects
+                                     : ObjectLookup::Of::kObjectsAndBackground);
   if (!lookup.ids().empty()) next_.next_id = std::max(next_.next_id, lookup.ids().back() + 1);
   std::vector<Segment> found = FindSegments(frame, segments, map.config().voxel_m);
   Claim(lookup, found);
@@ -263,6 +307,11 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   for (Segment& segment : found) {
     const bool is_born = segment.label != kNoInstance && segment.label != kBackground;
     if (!is_born) association.unclaimed.push_back(std::move(segment.pixels));
+  }
+  for (const Segment& segment : found) {
+    if (segment.object && !segment.is_known) {
+      LeaveBackground(frame, lookup, segment, association.labels);
+    }
   }
   for (const Segment& segment : found) {
     if (segment.shared_with.empty()) continue;

@@ -25,6 +25,11 @@ class VoxelVotes : public Associator {
   //     within at_voxels.
   //  2. *Claims.* A segment joins the object that most of its points vote for, if those are
   //     min_share of them; several may join one object.
+  //     Segments that are unknown (Segments::unknown) may be pieces of the background, of which
+  //     those at an object's foot are near both; taken once, they would take their neighbours. So
+  //     points of theirs do not vote where they are nearer to the background's surface, count for
+  //     no claim (of 2 and 3) where they are within at_voxels of it, and are nobody's where they
+  //     are nearer to it than to the object that the segment joins.
   //  3. *Moved objects.* Of the segments that are left and the objects that have none and had one
   //     at most recent_frames frames ago, those belong together of which the greatest share of
   //     points, and near_share at least, is within near_voxels of the object; one segment an
@@ -38,9 +43,9 @@ class VoxelVotes : public Associator {
   //     (mapper/track/lost_objects.h), for hold_frames frames at most. Ids count up and are never
   //     used again; after the last one, kNoInstance - 1, nothing is born any more, and Remarks()
   //     says so.
-  //     Segments that are unknown (Segments::unknown) may be the candidate that a known one was
-  //     before, which waits on, but begin none. Else they are background, or held back where
-  //     cut_share of their points vote for one object.
+  //     Unknown segments may be the candidate that a known one was before, which waits on, but
+  //     begin none. Else they are background, or held back where cut_share of their points vote
+  //     for one object.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
@@ -58,7 +63,8 @@ class VoxelVotes : public Associator {
   struct Votes {
     std::size_t object = 0;  // of ObjectLookup::ids()
     int at = 0;              // votes
-    int near = 0;            // points within near_voxels
+    int alone = 0;           // of them, those that count for a claim
+    int near = 0;            // points within near_voxels, that count for a claim
   };
 
   // A segment of the frame, and what becomes of it.
@@ -87,6 +93,9 @@ class VoxelVotes : public Associator {
                                           const std::vector<Segment>& segments);
   void Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
            cv::Mat& labels) const;
+
+  static void LeaveBackground(const Frame& frame, const ObjectLookup& lookup,
+                              const Segment& segment, cv::Mat& labels);
 
   // What is remembered from frame to frame.
   struct State {

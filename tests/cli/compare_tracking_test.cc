@@ -16,12 +16,10 @@ namespace fs = std::filesystem;
 using test::CommandOutput;
 using test::kUsage;
 
-const std::string kScene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
-
 class CompareTracking : public testing::Test {
  protected:
   CommandOutput Run(const std::vector<std::string>& more, const std::string& until) {
-    std::vector<std::string> arguments{"compare",    kScene,  "--methods", "tsdf++/anchored",
+    std::vector<std::string> arguments{"compare",    scene_,  "--methods", "tsdf++/anchored",
                                        "--profiles", "close", "--until",   until,
                                        "--out",      Out()};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -46,6 +44,7 @@ class CompareTracking : public testing::Test {
     std::ofstream(folder_ / "settings.toml") << text;
     return folder_ / "settings.toml";
   }
+  std::string scene_ = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
   std::string command_;
   test::TempFolder folder_;
 };
@@ -60,6 +59,14 @@ TEST_F(CompareTracking, SettingsReachTheTracker) {
   constexpr double kVoxel_m = 0.01;
   EXPECT_LT(off_m(""), kVoxel_m);
   EXPECT_GT(off_m("max_translation_voxels = 1e-6"), 3 * kVoxel_m);
+}
+
+// This scene's experiment removes nothing; its duck starts at frame 15, and nothing else moves.
+TEST_F(CompareTracking, ScoresWhatMovesWithoutBeingRemoved) {
+  scene_ = TSDFPP_SOURCE_DIR "/scenes/occlusion.toml";
+  const auto run = Compared({"--poses", "track"}, "18");
+  ASSERT_EQ(run["trajectories"].size(), 1U);
+  EXPECT_EQ(run["trajectories"]["2"]["frames"], 18);
 }
 
 TEST_F(CompareTracking, SaysWhatIsTracked) {

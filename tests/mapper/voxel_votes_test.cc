@@ -1,6 +1,5 @@
 // Association by votes (paper III-C) in analytic worlds: one id for each object whatever the masks
 // call it, merged and split masks, objects that leave and come back, and what is hardly there.
-// Longer than most files: one world, and every rule of one class.
 #include "mapper/associate/voxel_votes.h"
 
 #include <gtest/gtest.h>
@@ -14,18 +13,6 @@
 
 namespace tsdfpp {
 namespace {
-
-constexpr int kConfirmed =
-    3;  // the frame of a sequence in which VoteConfig{} lets an object be born
-
-class ToyVotes : public VoteWorld {
- public:
-  explicit ToyVotes(Method method = Method::kTsdfppAnchored) : VoteWorld(method, ToyConfig()) {}
-};
-
-int CountOf(const cv::Mat& labels, InstanceId id) {
-  return cv::countNonZero(labels == static_cast<double>(id));
-}
 
 // The labels that the truth would be given if each true object were one of the map: nothing where a
 // pixel is otherwise, or two true objects are one.
@@ -245,41 +232,6 @@ TEST(VoxelVotes, HoldsBackWhatIsSmallOrShortLived) {
   }
   EXPECT_EQ(world.map().Objects().size(), 4U);
   EXPECT_TRUE(MapToBytes(world.map()).value() == MapToBytes(without.map()).value());
-}
-
-// Of what no network knows: it joins the map's objects, and otherwise is background.
-TEST(VoxelVotes, UnknownSegmentsMakeNoObject) {
-  const cv::Rect kTable(2, 58, 12, 8);
-  ToyVotes world;
-  ToyVotes without;
-  for (int i = 0; i < 12; ++i) {
-    const Frame frame = RenderToys(TableWithToys(), 0.3 + 0.05 * i, i);
-    // Known ones at first, unknown ones later; beside them one of the table's, never known.
-    cv::Mat segments = frame.mask.clone();
-    segments(kTable) = 77;
-    std::vector<InstanceId> unknown{77};
-    if (i >= 6) unknown = {1, 2, 3, 77};
-    const cv::Mat labels = world.Map(frame, {segments, {}, unknown});
-    EXPECT_EQ(CountOf(labels(kTable), kBackground), kTable.area()) << i;
-    without.Map(frame, {frame.mask, {}});
-  }
-  EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
-  EXPECT_TRUE(MapToBytes(world.map()).value() == MapToBytes(without.map()).value());
-}
-
-// A network that finds a thing in every second frame: what waits to be an object is not fused
-// between, nor do those frames count.
-TEST(VoxelVotes, AnUnknownSegmentOfACandidateWaitsWithIt) {
-  ToyVotes world;
-  for (int i = 0; i < 2 * kConfirmed - 1; ++i) {
-    const Frame frame = RenderToys(TableWithToys(), 0.3, i);
-    const std::vector<InstanceId> all{1, 2, 3};
-    const cv::Mat labels =
-        world.Map(frame, {frame.mask, {}, i % 2 == 0 ? std::vector<InstanceId>{} : all});
-    const bool is_born = i == 2 * (kConfirmed - 1);
-    EXPECT_EQ(CountOf(labels, kNoInstance), is_born ? 0 : cv::countNonZero(frame.mask)) << i;
-  }
-  EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
 }
 
 // Nothing that a mask may hold stops it or enters the map.
