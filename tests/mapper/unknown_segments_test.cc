@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "core/pixel_ray.h"
-#include "tests/mapper/vote_world.h"
+#include "tests/mapper/toy_votes.h"
 #include "tests/reference/votes_reference.h"
 
 namespace tsdfpp {

@@ -10,7 +10,6 @@
 
 #include "core/random.h"
 #include "mapper/associate/voxel_votes.h"
-#include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
 
@@ -94,17 +93,5 @@ class VoteWorld {
   std::map<InstanceId, InstanceId> truth_of_;
   DrawnIds ids_{20261124};
 };
-
-// The frame of a sequence in which VoteConfig{} lets an object be born.
-inline constexpr int kConfirmed = 3;
-
-class ToyVotes : public VoteWorld {
- public:
-  explicit ToyVotes(Method method = Method::kTsdfppAnchored) : VoteWorld(method, ToyConfig()) {}
-};
-
-inline int CountOf(const cv::Mat& labels, InstanceId id) {
-  return cv::countNonZero(labels == static_cast<double>(id));
-}
 
 }  // namespace tsdfpp

@@ -8,7 +8,7 @@
 
 #include "mapper/map_file.h"
 #include "tests/mapper/every_method.h"
-#include "tests/mapper/vote_world.h"
+#include "tests/mapper/toy_votes.h"
 #include "tests/reference/votes_reference.h"
 
 namespace tsdfpp {
