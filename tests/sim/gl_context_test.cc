@@ -115,8 +115,8 @@ TEST(GlContext, TellsWhatItIs) {
   const auto context = GlContext::Create();
   ASSERT_TRUE(context.has_value()) << context.error().message;
   EXPECT_FALSE((*context)->info().renderer.empty());
-  // MuJoCo's lights are of the compatibility profile; the core profile knows none. (The version
-  // says so in Mesa alone, and Mesa leaves the mask of profiles empty.)
+  // MuJoCo's lights are of the compatibility profile; the core profile knows none. (The version's
+  // text names the profile in Mesa alone.)
   using GetFunction = void (*)();
   using Loader = GetFunction (*)(const char*);
   auto load = reinterpret_cast<Loader>(dlsym(RTLD_DEFAULT, "eglGetProcAddress"));
