@@ -29,6 +29,8 @@ SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   config.rest_voxels = 0;
   // A room has no outline, and fills the picture.
   config.free_space_weight = config.outline_weight = config.colour_weight = 0;
+  // What stands in a room hides it.
+  config.min_shown_share = 0;
   // Where a camera was is no reason to think that it is there still; a given pose is one.
   if (source == CameraSource::kTrack) config.rest_evidence = 0;
   config.settled_voxels = std::max(config.settled_voxels, kSettled_voxels);

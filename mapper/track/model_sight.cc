@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/pixel_ray.h"
+#include "mapper/track/surface_reader.h"
 #include "mapper/volume/fusion_kernels.h"
 
 namespace tsdfpp {
@@ -58,6 +59,39 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
     });
   }
   return sight;
+}
+
+FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId id,
+                          const TsdfGrid& model, const Pose& T_WL, double voxel_m,
+                          double margin_m) {
+  FacingVoxels facing;
+  const Pose T_CL = frame.T_WC.inverse() * T_WL;
+  const Eigen::Vector3d camera_L = T_CL.inverse().translation();
+  const Intrinsics& camera = frame.intrinsics;
+  const SurfaceReader reader(model, voxel_m);
+  VoxelCube cube;
+  for (const auto& entry : model.entries()) {
+    ForEachSurfaceVoxel(entry, voxel_m, [&](std::size_t /*place*/, const Index3& voxel) {
+      const Eigen::Vector3d p_L = voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z);
+      SurfaceReader::Linear at;
+      if (!reader.LinearAt(p_L, 0, cube, at)) return;
+      const Eigen::Vector3d slope(at.slope_x, at.slope_y, at.slope_z);
+      const Eigen::Vector3d p_C = T_CL * p_L;
+      if (slope.dot(p_L - camera_L) >= 0 || !(p_C.z() > double{kNearest_m})) return;
+      const Eigen::Vector2d pixel = PixelOf(camera, p_C);
+      const double u = std::floor(pixel.x() + 0.5);
+      const double v = std::floor(pixel.y() + 0.5);
+      if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return;
+      const cv::Point place(static_cast<int>(u), static_cast<int>(v));
+      const float depth_m = frame.depth.at<float>(place);
+      if (labels.at<InstanceId>(place) == id) {
+        ++facing.shown;
+      } else if (IsValidDepth(depth_m) && std::abs(double{depth_m} - p_C.z()) > margin_m) {
+        ++facing.missing;
+      }
+    });
+  }
+  return facing;
 }
 
 }  // namespace tsdfpp

@@ -42,4 +42,21 @@ struct ModelSight {
 ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_WL, double voxel_m,
                        double margin_m, const cv::Mat& may_be = {});
 
+// Numbers of the surface voxels that face the camera and are in the picture.
+struct FacingVoxels {
+  int shown = 0;  // their pixel is the object's
+  int missing =
+      0;  // it is not, and its depth is another: something is before them, or nothing there
+
+  // Of all of them; 1 where there are none.
+  double ShownShare() const {
+    return shown + missing == 0 ? 1 : static_cast<double>(shown) / (shown + missing);
+  }
+};
+
+// The same model's, where `labels` (CV_16UC1, of the depth's size) has `id` at the object's pixels.
+// Those whose pixel has no depth, or is another's with their depth, count as neither.
+FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId id,
+                          const TsdfGrid& model, const Pose& T_WL, double voxel_m, double margin_m);
+
 }  // namespace tsdfpp

@@ -50,6 +50,9 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("min_observed_share", min_observed_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("max_translation_voxels", max_translation_voxels, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_rotation_rad", max_rotation_rad, 0, EIGEN_PI));
+  TSDFPP_RETURN_IF_ERROR(InRange("min_shown_share", min_shown_share, 0, 1));
+  TSDFPP_RETURN_IF_ERROR(
+      InRange("max_hidden_deviation_voxels", max_hidden_deviation_voxels, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("return_frames", return_frames, 0, 10000));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_evidence", rest_evidence, 0, 100));
@@ -91,6 +94,8 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("min_observed_share", config.min_observed_share)
       .Get("max_translation_voxels", config.max_translation_voxels)
       .Get("max_rotation_rad", config.max_rotation_rad)
+      .Get("min_shown_share", config.min_shown_share)
+      .Get("max_hidden_deviation_voxels", config.max_hidden_deviation_voxels)
       .Get("return_frames", config.return_frames)
       .Get("rest_voxels", config.rest_voxels)
       .Get("rest_evidence", config.rest_evidence)
@@ -133,6 +138,8 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"min_observed_share", min_observed_share},
                      {"max_translation_voxels", max_translation_voxels},
                      {"max_rotation_rad", max_rotation_rad},
+                     {"min_shown_share", min_shown_share},
+                     {"max_hidden_deviation_voxels", max_hidden_deviation_voxels},
                      {"return_frames", return_frames},
                      {"rest_voxels", rest_voxels},
                      {"rest_evidence", rest_evidence},

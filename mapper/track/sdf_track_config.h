@@ -61,6 +61,11 @@ struct SdfTrackConfig {
   double min_observed_share = 0.3;     // of all points
   double max_translation_voxels = 10;  // of the segment's centre, for each frame since the last
   double max_rotation_rad = 0.35;      // for each frame since the last
+  // Of an object that is not at rest, where its place is known worse than that (the deviation of
+  // its segment's centre, along the direction that is known least): what is to be shown of its
+  // surface that faces the camera and is in the picture. 0 switches this off.
+  double min_shown_share = 0.6;
+  double max_hidden_deviation_voxels = 0.05;
 
   // An object that was out of sight and comes back is looked for all around its model
   // (lost_objects.h). After so many frames its model is begun anew where it was not found.

@@ -2,10 +2,13 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
+
+#include "mapper/track/model_sight.h"
 
 namespace tsdfpp {
 namespace {
@@ -22,6 +25,8 @@ constexpr double kSlow_voxels = 0.1;
 constexpr double kFartherBy = 1.3;
 constexpr double kSameWay = 0.7;
 constexpr double kShareGoingOn = 0.4;
+// Depth that is farther from a model's surface is not the surface's.
+constexpr double kOtherDepth_voxels = 2;
 // What seems to move for longer, and has not come as far as an object that moves, is something
 // else: its model is wrong there.
 constexpr int kLongestWait_frames = 20;
@@ -111,7 +116,7 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
   const auto points = SegmentPointsOf(frame, turn.pixels, voxel_m, config_);
   if (points.size() < static_cast<std::size_t>(config_.min_points)) return;
   Memory& memory = *turn.memory;
-  Sight sight{&frame, &points, CentreOf(points)};
+  Sight sight{&frame, &labels, turn.id, &points, CentreOf(points)};
   sight.voxel_m = voxel_m;
   std::optional<SegmentView> view;
   if (config_.outline_weight > 0 || config_.colour_weight > 0) {
@@ -181,7 +186,9 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
   if (found.converged && calibration) found.T_LC = *calibration * found.T_LC;
   const Rest rest = StayAtRest(sight, task, nearest, memory, found);
   if (!rest.is_kept && !found.converged) return std::nullopt;
-  if (!PassesGates(sight, found)) return std::nullopt;  // what fails does not begin to wait
+  // What fails does not begin to wait.
+  if (!PassesGates(sight, found)) return std::nullopt;
+  if (!rest.is_kept && IsHardlySeen(sight, found)) return std::nullopt;
   if (Waits(sight, rest, memory, found) || !PassesGates(sight, found)) return std::nullopt;
   const MotionUncertainty motion = Uncertainty(sight, found, memory);
   Remember(sight, found, memory);
@@ -306,6 +313,19 @@ bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& fo
          counts.observed >= config_.min_observed_share * counts.points &&
          counts.inliers >= config_.min_inlier_share * counts.observed &&
          counts.inliers >= config_.min_points;
+}
+
+bool SdfTracker::IsHardlySeen(const Sight& sight, const SdfRegistrationResult& found) const {
+  const Eigen::Matrix3d shifts = found.covariance.topLeftCorner<3, 3>();
+  const double variance_m2 =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(shifts, Eigen::EigenvaluesOnly)
+          .eigenvalues()[2];
+  const double most_m = config_.max_hidden_deviation_voxels * sight.voxel_m;
+  if (config_.min_shown_share <= 0 || variance_m2 <= most_m * most_m) return false;
+  const Pose T_WL = sight.frame->T_WC * found.T_LC.inverse();
+  const FacingVoxels facing = LookAtFacing(*sight.frame, *sight.labels, sight.id, *sight.grid, T_WL,
+                                           sight.voxel_m, kOtherDepth_voxels * sight.voxel_m);
+  return facing.ShownShare() < config_.min_shown_share;
 }
 
 MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrationResult& found,

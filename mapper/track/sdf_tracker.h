@@ -67,6 +67,8 @@ class SdfTracker : public Tracker {
   // A frame's segment of an object, and the object as the map has it.
   struct Sight {
     const Frame* frame = nullptr;
+    const cv::Mat* labels = nullptr;
+    InstanceId id = kNoInstance;
     const std::vector<SegmentPoint>* points = nullptr;
     Eigen::Vector3d centre_C = Eigen::Vector3d::Zero();  // of the points
     const SegmentView* view = nullptr;                   // none where no term asks for it
@@ -127,6 +129,8 @@ class SdfTracker : public Tracker {
   // What the keyframe says that the model adds to places: takes a seeming one to that where it is.
   std::optional<Pose> Calibration(const Sight& sight, const Memory& memory) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
+  // Much of it is hidden, and what is left says little about its place.
+  bool IsHardlySeen(const Sight& sight, const SdfRegistrationResult& found) const;
   // How well its motion is known since it was last tracked; remembers the place for the next.
   MotionUncertainty Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
                                 Memory& memory) const;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "mapper/map_representation.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/toy_scene.h"
@@ -44,6 +46,71 @@ TEST(ModelSight, IsMatchedSeenThroughOrHidden) {
   unknown.depth = cv::Mat(with.depth.size(), CV_32FC1, cv::Scalar(0));
   const ModelSight nothing = look(unknown);
   EXPECT_EQ(nothing.matched + nothing.through + nothing.hidden, 0);
+}
+
+constexpr InstanceId kScreen = 9;
+
+// A brick behind a screen that reaches so far to the right before it.
+reference::Scene BehindScreen(std::optional<double> screen_end_m) {
+  reference::Scene scene = TableOnly();
+  AddBrick(scene, 0.3, {-0.12, -0.06, kTableTop_m + 0.045});
+  if (screen_end_m) {
+    constexpr double kHalf_m = 0.2;
+    scene.shapes.push_back(reference::Cuboid(
+        kScreen, {90, 90, 90},
+        reference::MakePose(0, Eigen::Vector3d::UnitZ(), {0.1, *screen_end_m - kHalf_m, 0.1}),
+        {0.005, kHalf_m, 0.15}));
+  }
+  return scene;
+}
+
+// Of a face that is seen at a flat angle voxels are more than pixels.
+constexpr double kShareTolerance = 0.08;
+
+TEST(ModelSight, FacingVoxelsAreShownAsPixelsAre) {
+  const Intrinsics camera{256, 192, 215.0, 215.0, 127.5, 95.5};
+  const auto render = [&](std::optional<double> screen_end_m) {
+    return reference::Render(BehindScreen(screen_end_m), CircleCamera(0.02), 1, camera);
+  };
+  const Frame open = render(std::nullopt);
+  MapConfig config = ToyConfig();
+  config.voxel_m = kToyVoxel_m / 4;  // so that there are many
+  const auto map = MakeMap(Method::kTsdfppAnchored, config);
+  map->SetObjectPose(kBrick, Pose::Identity());
+  map->Fuse(open, open.mask);
+  const TsdfGrid& model = *VoxelsOf(*map).GridOf(kBrick);
+  const auto look = [&](const Frame& frame, const Pose& T_WL = Pose::Identity()) {
+    return LookAtFacing(frame, frame.mask, kBrick, model, T_WL, config.voxel_m, 2 * config.voxel_m);
+  };
+  const FacingVoxels all = look(open);
+  EXPECT_GT(all.shown, 30);
+  EXPECT_GT(all.ShownShare(), 1 - kShareTolerance);
+  const int pixels = cv::countNonZero(open.mask == kBrick);
+  int between = 0;
+  for (int step = 0; step < 16; ++step) {
+    const double end_m = -0.12 + 0.01 * step;
+    const Frame frame = render(end_m);
+    const double share = static_cast<double>(cv::countNonZero(frame.mask == kBrick)) / pixels;
+    EXPECT_NEAR(look(frame).ShownShare(), share, kShareTolerance) << end_m;
+    between += share > 0.1 && share < 0.9 ? 1 : 0;
+  }
+  EXPECT_GT(between, 5);
+  // Where nothing is before it, but it is not there.
+  Frame gone = open;
+  gone.depth = cv::Mat(open.depth.size(), CV_32FC1, cv::Scalar(5));
+  gone.mask = cv::Mat(open.mask.size(), CV_16UC1, cv::Scalar(kBackground));
+  EXPECT_EQ(look(gone).ShownShare(), 0);
+  // Another's pixels with its depth, and those without any, say nothing.
+  for (const float factor : {1.0F, 0.0F}) {
+    Frame unsaid = open;
+    unsaid.depth = factor * open.depth;
+    unsaid.mask = cv::Mat(open.mask.size(), CV_16UC1, cv::Scalar(kScreen));
+    EXPECT_LT(look(unsaid).shown + look(unsaid).missing, kShareTolerance * all.shown);
+  }
+  const Pose beside = reference::MakePose(0, Eigen::Vector3d::UnitZ(), {0, 5, 0});
+  const FacingVoxels outside = look(open, beside);
+  EXPECT_EQ(outside.shown + outside.missing, 0);
+  EXPECT_EQ(outside.ShownShare(), 1);
 }
 
 }  // namespace
