@@ -9,6 +9,7 @@
 #include "core/units.h"
 #include "mapper/pipeline.h"
 #include "mapper/voxel_inspection.h"
+#include "tests/mapper/noisy_toys.h"
 #include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
@@ -90,17 +91,6 @@ void ExpectFrozen(Pipeline& pipeline, const Frame& frame, const std::vector<Inst
     EXPECT_EQ(VoxelsOf(pipeline.map()).ObservedVoxels(id), before[id].voxels);
     EXPECT_EQ(pipeline.track_log().objects().at(id).frozen, before[id].frozen + 1);
   }
-}
-
-Intrinsics FineCamera() { return {384, 288, 320.0, 320.0, 191.5, 143.5}; }
-
-Frame WithNoise(Frame frame, double noise_m) {
-  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
-  cv::Mat noise(frame.depth.size(), CV_32FC1);
-  random.fill(noise, cv::RNG::NORMAL, 0, noise_m);
-  noise.setTo(0, frame.depth == 0);
-  frame.depth += noise;
-  return frame;
 }
 
 // A brick and a tray at rest until frame kStart, seen with noise by a camera that moves; then the
@@ -297,71 +287,6 @@ TEST(SdfTracker, FreezesWhatIsTooSmallOrWithoutDepth) {
     blind.depth.setTo(depth, blind.mask == kBrick);
     ExpectFrozen(pipeline, blind, {kBrick});
   }
-}
-
-// The brick slides or stands, while a screen comes before it, stays for some frames, and goes.
-constexpr InstanceId kScreen = 9;
-constexpr int kOpen = 6;     // the last frame without it
-constexpr int kHidden = 18;  // the last one with it
-Frame BrickBehindScreen(int index, bool moves) {
-  reference::Scene scene = TableOnly();
-  const Eigen::Vector3d at(-0.14, 0.03 + (moves ? 0.004 * (index - 1) : 0), kTableTop_m + 0.045);
-  AddBrick(scene, 0.3, at);
-  if (index > kOpen && index <= kHidden) {
-    constexpr double kHalf_m = 0.2;
-    const Eigen::Vector3d edge = at + Eigen::Vector3d(0.15, 0.005, 0);
-    scene.shapes.push_back(reference::Cuboid(
-        kScreen, {90, 90, 90},
-        reference::MakePose(0, Eigen::Vector3d::UnitZ(), edge - kHalf_m * Eigen::Vector3d::UnitY()),
-        {0.005, kHalf_m, 0.15}));
-  }
-  constexpr double kNoise_m = 0.001;
-  return WithNoise(reference::Render(scene, CircleCamera(0.02), index, FineCamera()), kNoise_m);
-}
-
-// More than half of it, in all frames with the screen.
-TEST(SdfTracker, TheScreenHidesMoreThanHalf) {
-  const auto pixels = [](const Frame& frame) { return cv::countNonZero(frame.mask == kBrick); };
-  for (int i = kOpen + 1; i <= kHidden; ++i) {
-    const int open = pixels(BrickBehindScreen(kOpen, true));
-    EXPECT_LT(pixels(BrickBehindScreen(i, true)), 0.5 * open);
-    EXPECT_GT(pixels(BrickBehindScreen(i, true)), 0.2 * open);
-  }
-}
-
-// Frames in which the brick is frozen, of those with the screen; after them it is where it should
-// be.
-int FrozenBehindScreen(const SdfTrackConfig& track, bool moves) {
-  PipelineConfig config = TrackConfig();
-  config.track = track;
-  config.map.voxel_m = kToyVoxel_m / 2;
-  Pipeline pipeline(config, Toys());
-  for (int i = 1; i <= kHidden; ++i) EXPECT_TRUE(pipeline.Process(BrickBehindScreen(i, moves)));
-  const int frozen = pipeline.track_log().objects().at(kBrick).frozen;
-  for (int i = kHidden + 1; i <= kHidden + 3; ++i) {
-    EXPECT_TRUE(pipeline.Process(BrickBehindScreen(i, moves)));
-  }
-  const TrackSpan& span = pipeline.track_log().objects().at(kBrick);
-  EXPECT_EQ(span.frozen, frozen);
-  EXPECT_EQ(span.lost, 0);
-  const int last = kHidden + 3;
-  const Eigen::Vector3d way = BrickBehindScreen(last, moves).T_WO.at(kBrick).translation() -
-                              BrickBehindScreen(1, moves).T_WO.at(kBrick).translation();
-  const Pose& found = pipeline.trajectories().at(kBrick).at(last);
-  const Eigen::Vector3d at = BrickBehindScreen(1, moves).T_WO.at(kBrick).translation();
-  EXPECT_LT((found * at - at - way).norm(), kPixel_voxels * kToyVoxel_m);
-  return frozen;
-}
-
-TEST(SdfTracker, FreezesWhatMovesAndIsHardlySeen) {
-  SdfTrackConfig track;
-  track.max_hidden_deviation_voxels = 0.2;  // what is left of a box says that much
-  EXPECT_EQ(FrozenBehindScreen(track, true), 0);
-  track.max_hidden_deviation_voxels = 0;
-  EXPECT_EQ(FrozenBehindScreen(track, true), kHidden - kOpen);
-  EXPECT_EQ(FrozenBehindScreen(track, false), 0) << "what rests is known to be where it was";
-  track.min_shown_share = 0;
-  EXPECT_EQ(FrozenBehindScreen(track, true), 0);
 }
 
 // It has no pose, and nothing of it is in the map, until there is enough of it.
