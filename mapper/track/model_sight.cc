@@ -1,6 +1,7 @@
 #include "mapper/track/model_sight.h"
 
 #include <cmath>
+#include <optional>
 
 #include "core/pixel_ray.h"
 #include "mapper/track/surface_reader.h"
@@ -8,6 +9,19 @@
 
 namespace tsdfpp {
 namespace {
+
+// Nothing where it is behind the camera, or nearer than `border` pixels to the picture's edge.
+std::optional<cv::Point> NearestPixel(const Intrinsics& camera, const Eigen::Vector3d& p_C,
+                                      int border) {
+  if (!(p_C.z() > double{kNearest_m})) return std::nullopt;
+  const Eigen::Vector2d pixel = PixelOf(camera, p_C);
+  const double u = std::floor(pixel.x() + 0.5);
+  const double v = std::floor(pixel.y() + 0.5);
+  if (!(u >= border && v >= border && u < camera.width - border && v < camera.height - border)) {
+    return std::nullopt;
+  }
+  return cv::Point(static_cast<int>(u), static_cast<int>(v));
+}
 
 // What the depth around a pixel says of a surface at z_m there.
 void Count(const Frame& frame, int u, int v, double z_m, double margin_m, const cv::Mat& may_be,
@@ -50,12 +64,9 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
   for (const auto& entry : model.entries()) {
     ForEachSurfaceVoxel(entry, voxel_m, [&](std::size_t /*place*/, const Index3& voxel) {
       const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z));
-      if (!(p_C.z() > double{kNearest_m})) return;
-      const Eigen::Vector2d pixel = PixelOf(camera, p_C);
-      const double u = std::floor(pixel.x() + 0.5);
-      const double v = std::floor(pixel.y() + 0.5);
-      if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) return;
-      Count(frame, static_cast<int>(u), static_cast<int>(v), p_C.z(), margin_m, may_be, sight);
+      if (const auto pixel = NearestPixel(camera, p_C, 1)) {
+        Count(frame, pixel->x, pixel->y, p_C.z(), margin_m, may_be, sight);
+      }
     });
   }
   return sight;
@@ -77,14 +88,11 @@ FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId 
       if (!reader.LinearAt(p_L, 0, cube, at)) return;
       const Eigen::Vector3d slope(at.slope_x, at.slope_y, at.slope_z);
       const Eigen::Vector3d p_C = T_CL * p_L;
-      if (slope.dot(p_L - camera_L) >= 0 || !(p_C.z() > double{kNearest_m})) return;
-      const Eigen::Vector2d pixel = PixelOf(camera, p_C);
-      const double u = std::floor(pixel.x() + 0.5);
-      const double v = std::floor(pixel.y() + 0.5);
-      if (!(u >= 0 && v >= 0 && u < camera.width && v < camera.height)) return;
-      const cv::Point place(static_cast<int>(u), static_cast<int>(v));
-      const float depth_m = frame.depth.at<float>(place);
-      if (labels.at<InstanceId>(place) == id) {
+      if (slope.dot(p_L - camera_L) >= 0) return;
+      const auto pixel = NearestPixel(camera, p_C, 0);
+      if (!pixel) return;
+      const float depth_m = frame.depth.at<float>(*pixel);
+      if (labels.at<InstanceId>(*pixel) == id) {
         ++facing.shown;
       } else if (IsValidDepth(depth_m) && std::abs(double{depth_m} - p_C.z()) > margin_m) {
         ++facing.missing;

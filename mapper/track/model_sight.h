@@ -44,9 +44,8 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
 
 // Numbers of the surface voxels that face the camera and are in the picture.
 struct FacingVoxels {
-  int shown = 0;  // their pixel is the object's
-  int missing =
-      0;  // it is not, and its depth is another: something is before them, or nothing there
+  int shown = 0;    // their pixel is the object's
+  int missing = 0;  // it is not, and its depth is nearer (something is before them) or farther
 
   // Of all of them; 1 where there are none.
   double ShownShare() const {
@@ -54,8 +53,9 @@ struct FacingVoxels {
   }
 };
 
-// The same model's, where `labels` (CV_16UC1, of the depth's size) has `id` at the object's pixels.
-// Those whose pixel has no depth, or is another's with their depth, count as neither.
+// `T_WL` is where the model's lattice is; `labels` (CV_16UC1, of the depth's size) has `id` at the
+// object's pixels. Depth is nearer or farther by more than `margin_m`: voxels at another's pixel
+// with about their depth, or at one without depth, count as neither.
 FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId id,
                           const TsdfGrid& model, const Pose& T_WL, double voxel_m, double margin_m);
 

@@ -61,9 +61,10 @@ struct SdfTrackConfig {
   double min_observed_share = 0.3;     // of all points
   double max_translation_voxels = 10;  // of the segment's centre, for each frame since the last
   double max_rotation_rad = 0.35;      // for each frame since the last
-  // Of an object that is not at rest, where its place is known worse than that (the deviation of
-  // its segment's centre, along the direction that is known least): what is to be shown of its
-  // surface that faces the camera and is in the picture. 0 switches this off.
+  // Of the model's surface that faces the camera and is in the picture: what an object's own pixels
+  // must show. Asked where it is not at rest and its place is known worse than the second (the
+  // deviation of its segment's centre along the direction that is known least). A share of 0
+  // switches this off.
   double min_shown_share = 0.6;
   double max_hidden_deviation_voxels = 0.05;
 
