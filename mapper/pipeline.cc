@@ -62,8 +62,12 @@ std::unique_ptr<Associator> MakeAssociator(
   switch (config.associate) {
     case AssociationMode::kGiven:
       return std::make_unique<GivenIds>();
-    case AssociationMode::kVotes:
-      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories));
+    case AssociationMode::kVotes: {
+      VoteConfig votes = config.votes;
+      // Masks are taken as they are unless they are repaired.
+      if (config.mask_repair == MaskRepairMode::kOff) votes.far_share = 0;
+      return std::make_unique<VoxelVotes>(votes, NextId(born, trajectories));
+    }
   }
   std::abort();
 }
@@ -231,6 +235,7 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   KeepThoseNotInPlace(frame, association, T_WO_,
                       [&](InstanceId id) { return !pixels_of.contains(id); });
   lost_->GiveUpUnsure(frame, pixels_of, *map_, T_WO_);
+  lost_->AskTrials(frame, pixels_of);
   if (lost_->empty()) return found;
   std::vector<LoosePixels> segments = association.unclaimed;
   std::vector<InstanceId> id_of(segments.size(), kNoInstance);
@@ -297,7 +302,7 @@ void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& associat
     }
     settled.push_back(id);
     if (begins_anew) track_log_.AddBegunAnew(id);
-    if (lost_->IsGivenUp(id)) continue;
+    if (!lost_->IsMissing(id)) continue;
     if (lost_->IsInMap(id)) track_log_.AddLost(id);
     track_log_.AddFound(id);
   }
@@ -305,6 +310,11 @@ void Pipeline::TakeOutLost(const Frame& frame, const AssociatedObjects& associat
   // Those that the frame shows, but not where they could be registered.
   KeepThoseNotInPlace(frame, association, tracked.T_WO, is_frozen);
   for (const InstanceId id : lost_->TakeOut({}, *map_, tracked.T_WO)) lost.push_back(id);
+  if (SaysWhatIsWhere(association.labels)) {
+    for (const InstanceId id : lost_->TakeBack(tracked.seen, *map_, tracked.T_WO)) {
+      lost.push_back(id);
+    }
+  }
   for (const InstanceId id : lost) track_log_.AddLost(id);
   lost_->Watch(tracked.seen);
 }

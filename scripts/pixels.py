@@ -2,12 +2,13 @@
 """The whole pipeline from pixels: scenes mapped with a Kinect's noise, segments of depth and our own network joined, ids by
 votes, objects tracked; beside it the same with the true masks.
 
-    /usr/bin/python3 scripts/pixels.py --out out/pixels [--scenes toycar3,tumble] [--program build/release/tsdfpp]
+    /usr/bin/python3 scripts/pixels.py --out out/pixels [--scenes toycar3,tumble] [--mask-repair on]
+        [--program build/release/tsdfpp]
 
 Runs `tsdfpp compare` twice a scene and writes OUT/pixels.csv, a row a scene, of tsdf++/anchored at the examined frame:
 objects of the map that are true ones, of how many true ones, and those that are nobody's; the hidden table kept and the
 completion of the moving objects, from pixels and with true masks; the greatest unaligned ATE and rotation error of the objects
-that moved and were found.
+that moved and were found. --mask-repair on repairs the masks from pixels (docs/segmentation.md, Wrong masks), not the true ones.
 """
 import argparse
 import csv
@@ -40,8 +41,8 @@ def worst(run, key, factor, digits):
     return text(max(values), digits) if values else "-"
 
 
-def row_of(program, scene, out):
-    pixels, at_pixels = compare(program, scene, out / f"{scene}-pixels", ["--segmentation", "full"])
+def row_of(program, scene, out, repair):
+    pixels, at_pixels = compare(program, scene, out / f"{scene}-pixels", ["--segmentation", "full", "--mask-repair", repair])
     masks, at_masks = compare(program, scene, out / f"{scene}-masks", [])
     matched = pixels["matched_ids"]
     true = {entry["object"] for entry in matched if entry["object"] is not None}
@@ -61,12 +62,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--scenes", default=SCENES)
+    parser.add_argument("--mask-repair", choices=("off", "on"), default="off")
     parser.add_argument("--program", default="build/release/tsdfpp")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for scene in options.scenes.split(","):
-        rows.append(row_of(options.program, scene, options.out))
+        rows.append(row_of(options.program, scene, options.out, options.mask_repair))
         print(", ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
     part = options.out / "pixels.csv.part"
     with open(part, "w", newline="") as file:

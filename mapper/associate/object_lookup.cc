@@ -1,6 +1,7 @@
 #include "mapper/associate/object_lookup.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -97,6 +98,41 @@ std::vector<std::size_t> ObjectLookup::Around(const std::vector<Eigen::Vector3d>
     if (one_field_ || wide_W.intersects(places_[i].box_W)) objects.push_back(i);
   }
   return objects;
+}
+
+ObjectLookup::SurfaceBox ObjectLookup::BoxOfSurface(std::size_t object) const {
+  const Place& place = one_field_ ? places_.front() : places_[object];
+  std::array<std::vector<int>, 3> along;
+  for (const TsdfGrid::Entry* entry : voxels_->GridOf(ids_[object])->Sorted()) {
+    const TsdfBlock& block = *entry->block;
+    if (!block.AnyNegative()) continue;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (!(block.weight[at] > 0) ||
+          std::abs(float{block.distance[at]}) > static_cast<float>(voxel_m_)) {
+        continue;
+      }
+      const Index3 voxel = VoxelAt(entry->index, i);
+      if (one_field_ && !voxels_->ValueAt(ids_[object], {voxel.x, voxel.y, voxel.z})) continue;
+      along[0].push_back(voxel.x);
+      along[1].push_back(voxel.y);
+      along[2].push_back(voxel.z);
+    }
+  }
+  SurfaceBox result{place.T_LW, {}};
+  if (along[0].empty()) return result;
+  const auto stray = static_cast<std::ptrdiff_t>(kStray * static_cast<double>(along[0].size()));
+  Eigen::Vector3d low;
+  Eigen::Vector3d high;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<int>& values = along[static_cast<std::size_t>(axis)];
+    std::nth_element(values.begin(), values.begin() + stray, values.end());
+    low[axis] = voxel_m_ * values[static_cast<std::size_t>(stray)];
+    std::nth_element(values.begin(), values.end() - 1 - stray, values.end());
+    high[axis] = voxel_m_ * *(values.end() - 1 - stray);
+  }
+  result.box_L = Eigen::AlignedBox3d(low, high);
+  return result;
 }
 
 bool ObjectLookup::HasSurfaceAround(std::size_t object, const Eigen::Vector3d& p_W) const {

@@ -44,6 +44,16 @@ class ObjectLookup {
   void Distances(const Eigen::Vector3d& p_W, std::span<const std::size_t> objects,
                  std::vector<Distance>& distances) const;
 
+  // The box around an object's surface voxels, along the axes of its lattice (of the world, of one
+  // field, whose voxels are of the object that their label says), but for a share of kStray of them
+  // on each side: masks that bleed leave some far from all others. Empty where it has none.
+  struct SurfaceBox {
+    Pose T_LW = Pose::Identity();
+    Eigen::AlignedBox3d box_L;  // metres
+  };
+  static constexpr double kStray = 0.03;
+  SurfaceBox BoxOfSurface(std::size_t object) const;
+
   // Whether the volume of an object (one of ids(); all of one field) has a surface in the block of
   // the point, which is of the world's frame, or in one beside it.
   bool HasSurfaceAround(std::size_t object, const Eigen::Vector3d& p_W) const;

@@ -4,10 +4,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <span>
 
 #include "core/pixel_ray.h"
+#include "mapper/associate/far_part.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -21,6 +24,9 @@ Eigen::Vector3d PointOf(const Frame& frame, int pixel) {
   const double z = frame.depth.at<float>(v, u);
   return frame.T_WC * (z * PixelRay(frame.intrinsics, u, v));
 }
+
+// A step in depth that parts two surfaces: what is seen at a flat angle has smaller ones.
+constexpr double kStep_voxels = 4;
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
@@ -40,6 +46,18 @@ bool IsShare(int count, double share, std::size_t of) {
 
 VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id) : config_(config) {
   state_.next_id = first_id;
+}
+
+void VoxelVotes::TakePoints(const Frame& frame, double voxel_m, Segment& segment) const {
+  segment.points_W.clear();
+  const std::size_t all = segment.pixels.size();
+  const std::size_t count = std::min(all, static_cast<std::size_t>(config_.max_points));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d p_W = PointOf(frame, segment.pixels[i * all / count]);
+    // Beyond all voxels: CheckReach() refuses the frame, or the segment is of no use.
+    if (!(p_W.cwiseAbs().maxCoeff() < kFarthest_voxels * voxel_m)) continue;
+    segment.points_W.push_back(p_W);
+  }
 }
 
 std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
@@ -65,14 +83,7 @@ std::vector<VoxelVotes::Segment> VoxelVotes::FindSegments(const Frame& frame,
     segment.is_known =
         !std::binary_search(segments.unknown.begin(), segments.unknown.end(), segment.id);
     segment.pixels = std::move(pixels[id]);
-    const std::size_t all = segment.pixels.size();
-    const std::size_t count = std::min(all, static_cast<std::size_t>(config_.max_points));
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector3d p_W = PointOf(frame, segment.pixels[i * all / count]);
-      // Beyond all voxels: CheckReach() refuses the frame, or the segment is of no use.
-      if (!(p_W.cwiseAbs().maxCoeff() < kFarthest_voxels * voxel_m)) continue;
-      segment.points_W.push_back(p_W);
-    }
+    TakePoints(frame, voxel_m, segment);
     found.push_back(std::move(segment));
   }
   return found;
@@ -115,7 +126,7 @@ void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const 
   }
 }
 
-void VoxelVotes::Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const {
+void VoxelVotes::Claim(const ObjectLookup& lookup, std::span<Segment> segments) const {
   tbb::parallel_for(std::size_t{0}, segments.size(),
                     [&](std::size_t s) { CountVotes(lookup, segments[s]); });
   for (Segment& segment : segments) {
@@ -127,6 +138,39 @@ void VoxelVotes::Claim(const ObjectLookup& lookup, std::vector<Segment>& segment
       segment.object = most->object;
     }
   }
+}
+
+void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
+                               double voxel_m, std::vector<Segment>& segments) const {
+  if (config_.far_share == 0) return;
+  const FarPartConfig config{.share = config_.far_share,
+                             .least_m = config_.near_voxels * voxel_m,
+                             .step_m = std::max(FarPartConfig{}.step_m, kStep_voxels * voxel_m),
+                             .least_pixels = config_.min_points};
+  std::vector<std::vector<int>> far(segments.size());
+  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t s) {
+    const Segment& segment = segments[s];
+    if (!segment.is_known || !segment.object) return;
+    far[s] = FindFarPart(frame, ids, segment.pixels, lookup, *segment.object, config);
+  });
+  const std::size_t wholes = segments.size();
+  for (std::size_t s = 0; s < wholes; ++s) {
+    if (far[s].size() == segments[s].pixels.size()) segments[s].object.reset();
+    if (far[s].empty() || !segments[s].object) continue;
+    std::vector<int> rest;
+    std::ranges::set_difference(segments[s].pixels, far[s], std::back_inserter(rest));
+    segments[s].pixels = std::move(rest);
+    TakePoints(frame, voxel_m, segments[s]);
+    segments[s].votes.clear();
+    CountVotes(lookup, segments[s]);
+    Segment part;
+    part.id = segments[s].id;
+    part.is_far_part = true;
+    part.pixels = std::move(far[s]);
+    TakePoints(frame, voxel_m, part);
+    segments.push_back(std::move(part));
+  }
+  Claim(lookup, std::span(segments).subspan(wholes));
 }
 
 void VoxelVotes::ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const {
@@ -165,7 +209,8 @@ void VoxelVotes::ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& se
 void VoxelVotes::FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segments) const {
   std::vector<bool> has_segment(lookup.ids().size());
   for (const Segment& segment : segments) {
-    if (segment.object) has_segment[*segment.object] = true;
+    // A far part is of the mask that may have to be cut.
+    if (segment.object && !segment.is_far_part) has_segment[*segment.object] = true;
   }
   for (Segment& segment : segments) {
     if (!segment.object) continue;
@@ -281,6 +326,7 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   if (!lookup.ids().empty()) next_.next_id = std::max(next_.next_id, lookup.ids().back() + 1);
   std::vector<Segment> found = FindSegments(frame, segments, map.config().voxel_m);
   Claim(lookup, found);
+  SplitFarParts(frame, segments.ids, lookup, map.config().voxel_m, found);
   ClaimMoved(lookup, found);
   FindCuts(lookup, found);
   GiveBirth(lookup, found, map.config().voxel_m);
@@ -290,11 +336,11 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   label_of[kBackground] = kBackground;
   for (Segment& segment : found) {
     if (segment.object) segment.label = lookup.ids()[*segment.object];
-    label_of[segment.id] = segment.label;
+    if (!segment.is_far_part) label_of[segment.id] = segment.label;
     if (segment.label == kNoInstance || segment.label == kBackground) continue;
     next_.last_seen[segment.label] = next_.frame;
     const auto named = segments.classes.find(segment.id);
-    if (named != segments.classes.end()) {
+    if (!segment.is_far_part && named != segments.classes.end()) {
       association.classes.emplace(segment.label, named->second);
     }
   }
@@ -303,6 +349,13 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
     const auto* from = segments.ids.ptr<InstanceId>(v);
     auto* to = association.labels.ptr<InstanceId>(v);
     for (int u = 0; u < segments.ids.cols; ++u) to[u] = label_of[from[u]];
+  }
+  for (const Segment& segment : found) {
+    if (!segment.is_far_part) continue;
+    for (const int pixel : segment.pixels) {
+      association.labels.at<InstanceId>(pixel / segments.ids.cols, pixel % segments.ids.cols) =
+          segment.label;
+    }
   }
   for (Segment& segment : found) {
     const bool is_born = segment.label != kNoInstance && segment.label != kBackground;

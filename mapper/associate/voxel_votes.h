@@ -4,6 +4,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "mapper/associate/associator.h"
@@ -30,6 +31,9 @@ class VoxelVotes : public Associator {
   //     points of theirs do not vote where they are nearer to the background's surface, count for
   //     no claim (of 2 and 3) where they are within at_voxels of it, and are nobody's where they
   //     are nearer to it than to the object that the segment joins.
+  //     Of a known segment that has joined one, the part that is far from it (FindFarPart(),
+  //     far_share) is a segment of its own, with votes and a claim of its own. Where all of it is
+  //     far, what it voted for are stray voxels, and it has not joined the object.
   //  3. *Moved objects.* Of the segments that are left and the objects that have none and had one
   //     at most recent_frames frames ago, those belong together of which the greatest share of
   //     points, and near_share at least, is within near_voxels of the object; one segment an
@@ -71,6 +75,7 @@ class VoxelVotes : public Associator {
   struct Segment {
     InstanceId id = kNoInstance;            // in the frame's segments
     bool is_known = true;                   // not one of Segments::unknown
+    bool is_far_part = false;               // of another, whose id it has
     std::vector<int> pixels;                // with valid depth, by rows
     std::vector<Eigen::Vector3d> points_W;  // of them, thinned
     std::vector<Votes> votes;               // of objects that got any, by ObjectLookup::ids()
@@ -79,10 +84,13 @@ class VoxelVotes : public Associator {
     InstanceId label = kNoInstance;
   };
 
+  void TakePoints(const Frame& frame, double voxel_m, Segment& segment) const;
   std::vector<Segment> FindSegments(const Frame& frame, const Segments& segments,
                                     double voxel_m) const;
   void CountVotes(const ObjectLookup& lookup, Segment& segment) const;
-  void Claim(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
+  void Claim(const ObjectLookup& lookup, std::span<Segment> segments) const;
+  void SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
+                     double voxel_m, std::vector<Segment>& segments) const;
   void ClaimMoved(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   void FindCuts(const ObjectLookup& lookup, std::vector<Segment>& segments) const;
   // Whether cut_share of its points vote for one object.

@@ -22,82 +22,14 @@ constexpr int kLeastGone = 20;
 // something else, through which nothing is seen. What was moved a little hides most of its old
 // place itself.
 constexpr double kLeastThrough = 0.04;
-// A segment that comes nearer to the picture's edge goes on outside.
-constexpr int kEdge_px = 3;
-// So much of a segment's outline may be beside something nearer.
-constexpr double kMostCovered = 0.1;
 // What a segment has of an object's colours to be looked at as it, and to be it by its looks alone,
 // which it must have by so much more than others have of it.
 constexpr double kLeastAlike = 0.3;
 constexpr double kLeastLikeness = 0.5;
 constexpr double kLeastLead = 0.1;
 constexpr int kEvery_frames = 3;
-constexpr int kMostPoints = 1500;  // of a segment, to say where it is
 // Searches in one frame, of the pairs of segments and objects that are the most alike.
 constexpr int kMostSearches = 8;
-// A segment whose rectangle has more pixels than so many times its own is no thing.
-constexpr double kMostSpread = 100;
-
-// A segment's pixels within the rectangle around them and a margin; 255, else 0.
-struct CutOut {
-  cv::Mat inside;
-  cv::Point corner;  // in the image, or beside it
-};
-constexpr int kBeyond_px = 2;
-
-cv::Rect RectangleOf(const LoosePixels& pixels, int columns) {
-  if (pixels.empty()) return {};
-  int left = columns;
-  int right = 0;
-  for (const int pixel : pixels) {
-    left = std::min(left, pixel % columns);
-    right = std::max(right, pixel % columns);
-  }
-  const int top = pixels.front() / columns;
-  return {left, top, right - left + 1, pixels.back() / columns - top + 1};
-}
-
-CutOut CutOutOf(const LoosePixels& pixels, const cv::Rect& around, int columns) {
-  const cv::Point margin(kBeyond_px, kBeyond_px);
-  CutOut cut{cv::Mat::zeros(around.size() + cv::Size(2 * margin), CV_8UC1), around.tl() - margin};
-  for (const int pixel : pixels) {
-    cut.inside.at<std::uint8_t>(cv::Point(pixel % columns, pixel / columns) - cut.corner) = 255;
-  }
-  return cut;
-}
-
-// Whether its outline comes near the picture's edge, beyond which the rest of it may be.
-bool ReachesTheEdge(const CutOut& cut, const cv::Size& size) {
-  const cv::Rect around(cut.corner + cv::Point(kBeyond_px, kBeyond_px),
-                        cut.inside.size() - cv::Size(2 * kBeyond_px, 2 * kBeyond_px));
-  return std::min({around.x, around.y, size.width - around.br().x, size.height - around.br().y}) <
-         kEdge_px;
-}
-
-// Whether much of its outline is beside something nearer.
-bool IsCovered(const Frame& frame, const CutOut& cut, double voxel_m) {
-  const cv::Rect image(cv::Point(), frame.depth.size());
-  int outline = 0;
-  int covered = 0;
-  for (int v = kBeyond_px; v < cut.inside.rows - kBeyond_px; ++v) {
-    for (int u = kBeyond_px; u < cut.inside.cols - kBeyond_px; ++u) {
-      const cv::Point own(u, v);
-      if (cut.inside.at<std::uint8_t>(own) == 0) continue;
-      const float z = frame.depth.at<float>(own + cut.corner);
-      for (const cv::Point step : {cv::Point(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
-        if (cut.inside.at<std::uint8_t>(own + step) != 0) continue;
-        ++outline;
-        const cv::Point beyond = own + kBeyond_px * step + cut.corner;
-        if (!image.contains(beyond)) continue;
-        const float beside = frame.depth.at<float>(beyond);
-        if (IsValidDepth(beside) && double{beside} < double{z} - kMargin_voxels * voxel_m) {
-          ++covered;
-        }
-      }
-    }
-  }
-  return covered > kMostCovered * outline;
-}
 
 // 255 at the pixels, else 0.
 cv::Mat MaskOf(const LoosePixels& pixels, const cv::Size& size) {
@@ -119,36 +51,6 @@ bool IsPartlyUnseen(const Frame& frame, const ObjectModel& model, double voxel_m
 }
 
 }  // namespace
-
-struct LostObjects::Look {
-  std::vector<SegmentPoint> points;
-  Appearance appearance;
-  bool is_large = false;
-  bool is_at_edge = false;
-  bool is_covered = false;
-  bool IsWhole() const { return is_large && !is_at_edge && !is_covered; }
-};
-
-LostObjects::Look LostObjects::LookAt(const Frame& frame, const LoosePixels& pixels,
-                                      double voxel_m) const {
-  Look look;
-  SdfTrackConfig config = config_;
-  config.max_points = std::min(config.max_points, kMostPoints);
-  look.points = SegmentPointsOf(frame, pixels, voxel_m, config);
-  look.is_large =
-      look.points.size() >= static_cast<std::size_t>(std::min(config_.min_points, kMostPoints));
-  if (!look.is_large) return look;
-  look.appearance = AppearanceOf(frame, look.points);
-  const cv::Rect around = RectangleOf(pixels, frame.depth.cols);
-  if (around.area() > kMostSpread * static_cast<double>(pixels.size())) {
-    look.is_at_edge = true;
-    return look;
-  }
-  const CutOut cut = CutOutOf(pixels, around, frame.depth.cols);
-  look.is_at_edge = ReachesTheEdge(cut, frame.depth.size());
-  look.is_covered = IsCovered(frame, cut, voxel_m);
-  return look;
-}
 
 std::vector<InstanceId> LostObjects::NotInPlace(const Frame& frame, const MapRepresentation& map,
                                                 const ObjectPoses& T_WO_asked,
@@ -189,10 +91,13 @@ void LostObjects::GiveUpUnsure(const Frame& frame,
     const auto pose = T_WO.find(id);
     const auto pixels = pixels_of.find(id);
     if (frozen < config_.return_frames || pose == T_WO.end() || pixels == pixels_of.end()) continue;
-    const Look look = LookAt(frame, pixels->second, map.config().voxel_m);
+    const SegmentLook look = LookAtSegment(frame, pixels->second, map.config().voxel_m, config_);
     if (Has(id) || !look.is_large || look.is_at_edge) continue;
     Keep(id, map, pose->second);
-    if (const auto kept = kept_.find(id); kept != kept_.end()) kept->second.is_given_up = true;
+    if (const auto kept = kept_.find(id); kept != kept_.end()) {
+      kept->second.is_given_up = true;
+      kept->second.is_missing = false;
+    }
   }
 }
 
@@ -223,7 +128,7 @@ Associator::MayBeMissing LostObjects::Awaited(const Frame& frame,
                                       const std::vector<InstanceId>& unseen) {
     if (kept_.empty() && unseen.empty()) return false;
     const double voxel_m = map.config().voxel_m;
-    const Look look = LookAt(frame, pixels, voxel_m);
+    const SegmentLook look = LookAtSegment(frame, pixels, voxel_m, config_);
     if (!look.is_large) return false;
     const auto may_be = [&](const Appearance& model) {
       return look.IsWhole() ? IsAlike(look.appearance, model, voxel_m)
@@ -242,9 +147,9 @@ Associator::MayBeMissing LostObjects::Awaited(const Frame& frame,
   };
 }
 
-LostObjects::Return LostObjects::Find(InstanceId id, const Frame& frame, const LoosePixels& pixels,
-                                      const Look& look, std::size_t segment) const {
-  const Kept& kept = kept_.at(id);
+LostObjects::Return LostObjects::Find(InstanceId id, const Kept& kept, const Frame& frame,
+                                      const LoosePixels& pixels, const SegmentLook& look,
+                                      std::size_t segment) const {
   if (look.points.size() >= kLeastSearchedPoints) {
     const ModelSearch search{&frame,       &look.points, MaskOf(pixels, frame.depth.size()),
                              &kept.volume, kept.T_WL,    kept.voxel_m};
@@ -263,9 +168,9 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
                                                         std::span<const InstanceId> id_of) {
   std::vector<Return> returns;
   if (kept_.empty()) return returns;
-  std::vector<Look> looks;
+  std::vector<SegmentLook> looks;
   for (const LoosePixels& pixels : segments) {
-    looks.push_back(LookAt(frame, pixels, kept_.begin()->second.voxel_m));
+    looks.push_back(LookAtSegment(frame, pixels, kept_.begin()->second.voxel_m, config_));
   }
   // Who is like whom, the most alike first.
   struct Pair {
@@ -295,8 +200,8 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
   };
   const auto search = [&](Pair& pair) -> const Return& {
     if (!pair.searched) {
-      pair.searched =
-          Find(pair.id, frame, segments[pair.segment], looks[pair.segment], pair.segment);
+      pair.searched = Find(pair.id, kept_.at(pair.id), frame, segments[pair.segment],
+                           looks[pair.segment], pair.segment);
     }
     return *pair.searched;
   };
@@ -352,19 +257,81 @@ Expected<void> LostObjects::PutBack(const Return& found, MapRepresentation& map,
 std::vector<InstanceId> LostObjects::TakeOut(const std::vector<InstanceId>& found,
                                              MapRepresentation& map, ObjectPoses& T_WO) {
   for (const InstanceId id : found) {
-    kept_.erase(id);
+    const auto kept = kept_.find(id);
+    const bool begins_anew = !ModelOf(map, id);
+    // What was given up had its chance.
+    if (begins_anew && !kept->second.is_given_up) {
+      on_trial_.insert_or_assign(id, Trial{std::move(kept->second)});
+    } else {
+      on_trial_.erase(id);
+    }
+    kept_.erase(kept);
     unsure_[id] = 0;
   }
   std::vector<InstanceId> lost;
   for (auto& [id, kept] : kept_) {
     if (!kept.is_in_map) continue;
     kept.is_in_map = kept.is_given_up = false;
+    kept.is_missing = true;
+    if (const auto trial = on_trial_.find(id); trial != on_trial_.end()) {
+      KeepAsItWas(id, trial->second.before);
+      on_trial_.erase(trial);
+    }
     unsure_.erase(id);
     map.Remove(id);
     T_WO.erase(id);
     lost.push_back(id);
   }
   return lost;
+}
+
+void LostObjects::AskTrials(const Frame& frame,
+                            const std::map<InstanceId, LoosePixels>& pixels_of) {
+  for (auto trial = on_trial_.begin(); trial != on_trial_.end();) {
+    const auto& [before, frames_seen, frames_unseen] = trial->second;
+    const auto pixels = pixels_of.find(trial->first);
+    const bool is_asked = pixels != pixels_of.end() && frames_seen % kEvery_frames == 0;
+    const SegmentLook look =
+        is_asked ? LookAtSegment(frame, pixels->second, before.voxel_m, config_) : SegmentLook{};
+    if (!look.is_large || look.is_at_edge ||
+        Find(trial->first, before, frame, pixels->second, look, 0).begins_anew) {
+      ++trial;
+      continue;
+    }
+    KeepAsItWas(trial->first, before);
+    kept_.at(trial->first).is_missing = false;
+    trial = on_trial_.erase(trial);
+  }
+}
+
+void LostObjects::KeepAsItWas(InstanceId id, const Kept& kept) {
+  const auto entry = kept_.insert_or_assign(id, kept).first;
+  entry->second.is_in_map = false;
+  entry->second.is_missing = true;
+  entry->second.frames_in_sight = 0;
+}
+
+std::vector<InstanceId> LostObjects::TakeBack(const std::map<InstanceId, TrackStatus>& seen,
+                                              MapRepresentation& map, ObjectPoses& T_WO) {
+  std::vector<InstanceId> taken;
+  for (auto trial = on_trial_.begin(); trial != on_trial_.end();) {
+    const InstanceId id = trial->first;
+    const bool is_seen = seen.contains(id);
+    int& frames = is_seen ? trial->second.frames_seen : trial->second.frames_unseen;
+    if (++frames < config_.return_frames) {
+      ++trial;
+      continue;
+    }
+    if (!is_seen) {
+      KeepAsItWas(id, trial->second.before);
+      unsure_.erase(id);
+      map.Remove(id);
+      T_WO.erase(id);
+      taken.push_back(id);
+    }
+    trial = on_trial_.erase(trial);
+  }
+  return taken;
 }
 
 void LostObjects::Undo(const std::vector<InstanceId>& found, MapRepresentation& map,

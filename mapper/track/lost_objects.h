@@ -11,12 +11,10 @@
 #include "mapper/track/appearance.h"
 #include "mapper/track/model_search.h"
 #include "mapper/track/sdf_track_config.h"
+#include "mapper/track/segment_look.h"
 #include "mapper/track/tracker.h"
 
 namespace tsdfpp {
-
-// Pixels of one segment that has no object of the map, by rows (PixelsByLabel()).
-using LoosePixels = std::vector<int>;
 
 class LostObjects {
  public:
@@ -41,10 +39,21 @@ class LostObjects {
   // What became of the objects in a frame (TrackedPoses::seen).
   void Watch(const std::map<InstanceId, TrackStatus>& seen);
 
-  // Ends a frame: of those found then (FindAgain()) nothing is kept any more; the others are taken
-  // out of the map and of `T_WO`.
+  // Ends a frame: of those found then (FindAgain()) nothing is kept any more, but for those that
+  // begin anew, until they have been seen in return_frames frames; the others are taken out of the
+  // map and of `T_WO`. One that is lost before it has been seen in so many is kept as it was before
+  // it began anew.
   std::vector<InstanceId> TakeOut(const std::vector<InstanceId>& found, MapRepresentation& map,
                                   ObjectPoses& T_WO);
+  // Of those that began anew, by the pixels that are theirs: keeps those as they were before of
+  // which FindModel() is certain now, so that FindAgain() finds them. Looks at every third frame.
+  void AskTrials(const Frame& frame, const std::map<InstanceId, LoosePixels>& pixels_of);
+  // Of those that began anew: takes out of the map and of `T_WO`, and keeps as they were before,
+  // those that were out of sight in return_frames frames before they were seen in as many. What
+  // they began on was not theirs, or was seen too little. `seen` is TrackedPoses::seen of a frame
+  // with labels.
+  std::vector<InstanceId> TakeBack(const std::map<InstanceId, TrackStatus>& seen,
+                                   MapRepresentation& map, ObjectPoses& T_WO);
   // Undoes PutBack() and, for those that the map had, Keep().
   void Undo(const std::vector<InstanceId>& found, MapRepresentation& map, ObjectPoses& T_WO);
 
@@ -53,8 +62,9 @@ class LostObjects {
   std::vector<InstanceId> Ids() const;
   // Of one that is kept: whether it was lost in this frame, and the map still has it.
   bool IsInMap(InstanceId id) const { return kept_.at(id).is_in_map; }
-  // Whether it was kept by GiveUpUnsure().
-  bool IsGivenUp(InstanceId id) const { return kept_.at(id).is_given_up; }
+  // Whether it was not known where it is: not of those that are kept by GiveUpUnsure() or
+  // AskTrials().
+  bool IsMissing(InstanceId id) const { return kept_.at(id).is_missing; }
 
   // Whether a segment of the frame may be one of the kept objects, or one of those of the map that
   // the frame does not show: it has some of their colours, and about their size where it is seen
@@ -93,17 +103,26 @@ class LostObjects {
     bool is_in_map = true;
     int frames_in_sight = 0;   // in which something was that may be it
     bool is_given_up = false;  // the model is
+    bool is_missing = true;
   };
-  struct Look;  // a segment as one frame shows it
-  Look LookAt(const Frame& frame, const LoosePixels& pixels, double voxel_m) const;
   // Begins anew where it is not certain; where nothing is found, too, turned as it was last.
-  Return Find(InstanceId id, const Frame& frame, const LoosePixels& pixels, const Look& look,
-              std::size_t segment) const;
+  Return Find(InstanceId id, const Kept& kept, const Frame& frame, const LoosePixels& pixels,
+              const SegmentLook& look, std::size_t segment) const;
+
+  // Its kept object, from now on one that the map does not have.
+  void KeepAsItWas(InstanceId id, const Kept& kept);
 
   SdfTrackConfig config_;
   std::map<InstanceId, Kept> kept_;
   // Those that were found and not registered since, with the frames in which they were frozen.
   std::map<InstanceId, int> unsure_;
+  // Those that began anew, as they were before.
+  struct Trial {
+    Kept before;
+    int frames_seen = 0;
+    int frames_unseen = 0;
+  };
+  std::map<InstanceId, Trial> on_trial_;
 };
 
 }  // namespace tsdfpp

@@ -10,10 +10,12 @@
 
 #include "core/files.h"
 #include "mapper/associate/given_ids.h"
+#include "mapper/pipeline.h"
 #include "mapper/segment/given_masks.h"
 #include "mapper/segment/no_masks.h"
 #include "mapper/track/given_poses.h"
 #include "mapper/track/pcl_icp.h"
+#include "tests/mapper/toy_scene.h"
 
 namespace tsdfpp {
 namespace {
@@ -143,6 +145,31 @@ TEST(PipelineVerbs, TheStartOfAMapAsksOnlyWhetherThereAreMasks) {
   const std::string text = ReadFile(fs::path(TSDFPP_SOURCE_DIR) / "cli" / "map_start.cc").value();
   const std::regex mask(R"(\.mask\b(?!\.empty\(\)))");
   EXPECT_FALSE(std::regex_search(text, mask));
+}
+
+// A mask over a brick and a ball far behind it: two objects where masks are repaired, else one.
+TEST(PipelineVerbs, AssociationPartsMasksWhereTheyAreRepaired) {
+  for (const MaskRepairMode mode : {MaskRepairMode::kOff, MaskRepairMode::kOn}) {
+    SCOPED_TRACE(MaskRepairModeName(mode));
+    PipelineConfig config;
+    config.method = Method::kTsdfppAnchored;
+    config.map = ToyConfig();
+    config.associate = AssociationMode::kVotes;
+    config.poses = PoseSource::kTrack;
+    config.tracked = TrackChoice::kAll;
+    config.mask_repair = mode;
+    Pipeline pipeline(config, {});
+    for (int i = 1; i < 10; ++i) {
+      reference::Scene scene = TableOnly();
+      AddBrick(scene, 0, {0.12, 0, kTableTop_m + 0.045});
+      if (i > 4) AddBall(scene, {-0.2, 0.18, kTableTop_m + 0.055});
+      Frame frame = reference::Render(scene, reference::LookAt({0.7, 0.02 * i, 0.2}, {0, 0, 0.05}),
+                                      i, {256, 192, 215.0, 215.0, 127.5, 95.5});
+      frame.mask.setTo(static_cast<double>(kBrick), frame.mask == static_cast<double>(kBall));
+      ASSERT_TRUE(pipeline.Process(frame));
+    }
+    EXPECT_EQ(pipeline.Objects().size(), mode == MaskRepairMode::kOn ? 3U : 2U);
+  }
 }
 
 }  // namespace
