@@ -19,17 +19,6 @@ constexpr int kEdge_px = 3;
 constexpr double kMostCovered = 0.1;
 constexpr int kBeyond_px = 6;
 
-cv::Rect RectangleOf(std::span<const int> pixels, int columns) {
-  int left = columns;
-  int right = 0;
-  for (const int pixel : pixels) {
-    left = std::min(left, pixel % columns);
-    right = std::max(right, pixel % columns);
-  }
-  const int top = pixels.front() / columns;
-  return {left, top, right - left + 1, pixels.back() / columns - top + 1};
-}
-
 // A segment's pixels within the rectangle around them.
 class CutOutSegment {
  public:

@@ -285,6 +285,18 @@ std::vector<int> OutermostOf(const cv::Mat& known, const PixelLinks& links, cons
 
 }  // namespace
 
+cv::Rect RectangleOf(std::span<const int> pixels, int columns) {
+  if (pixels.empty()) return {};
+  int left = columns;
+  int right = 0;
+  for (const int pixel : pixels) {
+    left = std::min(left, pixel % columns);
+    right = std::max(right, pixel % columns);
+  }
+  const int top = pixels.front() / columns;
+  return {left, top, right - left + 1, pixels.back() / columns - top + 1};
+}
+
 std::int32_t LabelComponents(const cv::Mat& member, const PixelLinks& links, std::int32_t first,
                              cv::Mat& labels) {
   const int rows = member.rows;

@@ -3,9 +3,14 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <span>
 #include <vector>
 
 namespace tsdfpp {
+
+// The rectangle around pixels of an image with so many columns (row times columns plus column, by
+// rows); empty where there are none.
+cv::Rect RectangleOf(std::span<const int> pixels, int columns);
 
 // Which neighbours in a row (`right`, a pixel and the next) and in a column (`down`) are connected:
 // CV_8UC1, 0 where they are not. The last column and the last row have no next.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mapper/segment/components.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -21,18 +23,6 @@ struct CutOut {
   cv::Point corner;  // in the image, or beside it
 };
 constexpr int kBeyond_px = 2;
-
-cv::Rect RectangleOf(const LoosePixels& pixels, int columns) {
-  if (pixels.empty()) return {};
-  int left = columns;
-  int right = 0;
-  for (const int pixel : pixels) {
-    left = std::min(left, pixel % columns);
-    right = std::max(right, pixel % columns);
-  }
-  const int top = pixels.front() / columns;
-  return {left, top, right - left + 1, pixels.back() / columns - top + 1};
-}
 
 CutOut CutOutOf(const LoosePixels& pixels, const cv::Rect& around, int columns) {
   const cv::Point margin(kBeyond_px, kBeyond_px);

@@ -58,10 +58,11 @@ Expected<Tally> Associate(const std::string& scene, int last_frame) {
   TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(config, options));
   MapConfig map;
   TSDFPP_RETURN_IF_ERROR(map.SetProfile("close"));
-  // As the pipeline has it where masks are not repaired: true masks lose parts of objects otherwise
-  // (in occlusion 13 further ids).
+  // By default as the pipeline has it where masks are not repaired: true masks lose parts of
+  // objects otherwise.
   VoteConfig votes;
-  votes.far_share = 0;
+  const char* far_share = std::getenv("TSDFPP_FAR_SHARE");
+  votes.far_share = far_share == nullptr ? 0 : std::atof(far_share);
   VoteWorld world(Method::kTsdfppAnchored, map, votes);
   Tally tally;
   const int last = std::min(last_frame, source->info().frame_count);

@@ -1,5 +1,5 @@
 // A lost object that begins anew on a segment that is not its own gets its model back, where that
-// segment is soon out of sight.
+// segment is soon out of sight, or where its model fits what is seen of it.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -76,7 +76,7 @@ class BegunAnew : public testing::Test {
   void Show(Shown shown, int frames) {
     for (int i = 0; i < frames; ++i) ASSERT_TRUE(pipeline_.Process(FrameOf(++frame_, shown)));
   }
-  // Until it has begun anew on the sham; in how many frames it was then seen.
+  // Until it has begun anew on the sham.
   void BeginOnSham() {
     const int most = SdfTrackConfig{}.return_frames + 3;
     for (int i = 0; i < most && Brick().begun_anew == 0; ++i) Show(Shown::kSham, 1);
