@@ -195,7 +195,7 @@ def parts_of(commands, options):
 
 
 def run_all(lab, options, record):
-    lab.inputs.make()
+    lab.inputs.make(options.quick)
     record.figures["version"] = lab.inputs.program
     chosen, kinds = parts_of(fault_commands.commands_of(lab.inputs), options)
     for command in chosen:

@@ -27,7 +27,7 @@ Expected<void> SavePng(const std::filesystem::path& path, const cv::Mat& rgb) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   TSDFPP_ASSIGN(const std::string bytes,
-                EncodeImage(bgr, ".png", path.string(), {cv::IMWRITE_PNG_COMPRESSION, 9}));
+                EncodeImage(bgr, ".png", path.string(), {cv::IMWRITE_PNG_COMPRESSION, 6}));
   return WriteFile(path, bytes);
 }
 
