@@ -63,10 +63,9 @@ std::unique_ptr<Associator> MakeAssociator(
     case AssociationMode::kGiven:
       return std::make_unique<GivenIds>();
     case AssociationMode::kVotes: {
-      VoteConfig votes = config.votes;
-      // Masks are taken as they are unless they are repaired.
-      if (config.mask_repair == MaskRepairMode::kOff) votes.far_share = 0;
-      return std::make_unique<VoxelVotes>(votes, NextId(born, trajectories));
+      const bool repairs = config.mask_repair == MaskRepairMode::kOn;
+      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories),
+                                          repairs ? config.repair.far_share : 0);
     }
   }
   std::abort();

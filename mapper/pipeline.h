@@ -38,7 +38,7 @@ struct PipelineConfig {
   SegmenterParts segmenter{};
   BleedingPixels bleeding = BleedingPixels::kAuto;
   AssociationMode associate = AssociationMode::kGiven;
-  VoteConfig votes{};  // far_share only where masks are repaired
+  VoteConfig votes{};
   MaskRepairMode mask_repair = MaskRepairMode::kOff;
   MaskRepairConfig repair{};
   CameraSource camera = CameraSource::kGiven;

@@ -45,6 +45,7 @@ Expected<void> MaskRepairConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckRepair("cell_voxels", cell_voxels, 0.5, 100));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("forget_frames", forget_frames, 1, 1'000'000));
+  TSDFPP_RETURN_IF_ERROR(CheckRepair("far_share", far_share, 0, 100));
   return {};
 }
 
@@ -58,7 +59,8 @@ Expected<MaskRepairConfig> MaskRepairConfig::FromToml(const toml::table& table,
       .Get("own_factor", config.own_factor)
       .Get("cell_voxels", config.cell_voxels)
       .Get("confirm_frames", config.confirm_frames)
-      .Get("forget_frames", config.forget_frames);
+      .Get("forget_frames", config.forget_frames)
+      .Get("far_share", config.far_share);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
@@ -67,10 +69,10 @@ Expected<MaskRepairConfig> MaskRepairConfig::FromToml(const toml::table& table,
 }
 
 toml::table MaskRepairConfig::ToToml() const {
-  return toml::table{{"keep_voxels", keep_voxels},    {"take_voxels", take_voxels},
-                     {"sigma_voxels", sigma_voxels},  {"own_factor", own_factor},
-                     {"cell_voxels", cell_voxels},    {"confirm_frames", confirm_frames},
-                     {"forget_frames", forget_frames}};
+  return toml::table{{"keep_voxels", keep_voxels},     {"take_voxels", take_voxels},
+                     {"sigma_voxels", sigma_voxels},   {"own_factor", own_factor},
+                     {"cell_voxels", cell_voxels},     {"confirm_frames", confirm_frames},
+                     {"forget_frames", forget_frames}, {"far_share", far_share}};
 }
 
 }  // namespace tsdfpp

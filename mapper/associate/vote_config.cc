@@ -19,7 +19,6 @@ Expected<void> VoteConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckVote("cut_share", cut_share, 0.01, 1));
   TSDFPP_RETURN_IF_ERROR(CheckVote("near_voxels", near_voxels, at_voxels, 100));
   TSDFPP_RETURN_IF_ERROR(CheckVote("near_share", near_share, 0.01, 1));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("far_share", far_share, 0, 100));
   TSDFPP_RETURN_IF_ERROR(CheckVote("recent_frames", recent_frames, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("max_points", max_points, 1, 1'000'000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("min_points", min_points, 1, 1'000'000));
@@ -37,7 +36,6 @@ Expected<VoteConfig> VoteConfig::FromToml(const toml::table& table, const std::s
       .Get("cut_share", config.cut_share)
       .Get("near_voxels", config.near_voxels)
       .Get("near_share", config.near_share)
-      .Get("far_share", config.far_share)
       .Get("recent_frames", config.recent_frames)
       .Get("max_points", config.max_points)
       .Get("min_points", config.min_points)
@@ -54,10 +52,10 @@ Expected<VoteConfig> VoteConfig::FromToml(const toml::table& table, const std::s
 toml::table VoteConfig::ToToml() const {
   return toml::table{{"at_voxels", at_voxels},           {"min_share", min_share},
                      {"cut_share", cut_share},           {"near_voxels", near_voxels},
-                     {"near_share", near_share},         {"far_share", far_share},
-                     {"recent_frames", recent_frames},   {"max_points", max_points},
-                     {"min_points", min_points},         {"confirm_frames", confirm_frames},
-                     {"confirm_window", confirm_window}, {"hold_frames", hold_frames}};
+                     {"near_share", near_share},         {"recent_frames", recent_frames},
+                     {"max_points", max_points},         {"min_points", min_points},
+                     {"confirm_frames", confirm_frames}, {"confirm_window", confirm_window},
+                     {"hold_frames", hold_frames}};
 }
 
 }  // namespace tsdfpp

@@ -14,16 +14,12 @@ struct VoteConfig {
   double cut_share = 0.2;   // of a segment's points make a second object of it, which is cut off
   double near_voxels = 5;   // an object that moved farther than at_voxels is looked for so far away
   double near_share = 0.5;  // of a segment's points have to be that near
-  // A part of a segment is not of the object that it joins if it is farther outside of the box
-  // around all that is known of the object than so much of the box's diagonal (and than
-  // near_voxels), and nothing hides what is between; 0: the segment is taken as it is.
-  double far_share = 0.15;
-  int recent_frames = 3;   // only for objects that had a segment so many frames ago at most
-  int max_points = 2000;   // of a segment; more are thinned evenly
-  int min_points = 50;     // of a segment that may become a new object
-  int confirm_frames = 3;  // it becomes one where it was there in so many frames ...
-  int confirm_window = 5;  // ... of so many
-  int hold_frames = 45;    // what may be a missing object is held back for so long at most
+  int recent_frames = 3;    // only for objects that had a segment so many frames ago at most
+  int max_points = 2000;    // of a segment; more are thinned evenly
+  int min_points = 50;      // of a segment that may become a new object
+  int confirm_frames = 3;   // it becomes one where it was there in so many frames ...
+  int confirm_window = 5;   // ... of so many
+  int hold_frames = 45;     // what may be a missing object is held back for so long at most
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

@@ -44,7 +44,8 @@ bool IsShare(int count, double share, std::size_t of) {
 
 }  // namespace
 
-VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id) : config_(config) {
+VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id, double far_share)
+    : config_(config), far_share_(far_share) {
   state_.next_id = first_id;
 }
 
@@ -142,8 +143,8 @@ void VoxelVotes::Claim(const ObjectLookup& lookup, std::span<Segment> segments) 
 
 void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
                                double voxel_m, std::vector<Segment>& segments) const {
-  if (config_.far_share == 0) return;
-  const FarPartConfig config{.share = config_.far_share,
+  if (far_share_ == 0) return;
+  const FarPartConfig config{.share = far_share_,
                              .least_m = config_.near_voxels * voxel_m,
                              .step_m = std::max(FarPartConfig{}.step_m, kStep_voxels * voxel_m),
                              .least_pixels = config_.min_points};
@@ -250,20 +251,20 @@ void VoxelVotes::GiveBirth(const ObjectLookup& lookup, std::vector<Segment>& seg
 
   std::vector<Segment*> unclaimed;
   std::vector<std::vector<Eigen::Vector3d>> points_W;
-  std::vector<bool> is_known;
+  std::vector<bool> may_begin;
   std::vector<bool> is_held;
   for (Segment& segment : segments) {
     if (segment.object || segment.points_W.empty()) continue;
     unclaimed.push_back(&segment);
     points_W.push_back(segment.points_W);
-    is_known.push_back(segment.is_known);
+    may_begin.push_back(segment.is_known && !segment.is_far_part);
     is_held.push_back(may_be_missing_ && may_be_missing_(segment.pixels, unseen));
   }
   if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
   using enum Candidates::Candidacy;
-  const auto candidacies = next_.candidates->Confirm(points_W, is_known, is_held);
+  const auto candidacies = next_.candidates->Confirm(points_W, may_begin, is_held);
   for (std::size_t i = 0; i < unclaimed.size(); ++i) {
-    if (candidacies[i] == kNone && !is_known[i] && !IsPartlyAnObject(*unclaimed[i])) {
+    if (candidacies[i] == kNone && !unclaimed[i]->is_known && !IsPartlyAnObject(*unclaimed[i])) {
       unclaimed[i]->label = kBackground;
     }
     if (candidacies[i] != kIsConfirmed) continue;

@@ -16,9 +16,9 @@ namespace tsdfpp {
 
 class VoxelVotes : public Associator {
  public:
-  // New objects get ids from `first_id` on, above all that the map has had. The config must be
-  // valid.
-  explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1);
+  // New objects get ids from `first_id` on, above all that the map has had. `far_share` is
+  // MaskRepairConfig's, or 0 where masks are not repaired. The configs must be valid.
+  explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1, double far_share = 0);
 
   // In this order:
   //  1. *Votes.* Each point of a segment (a pixel with valid depth, taken through the camera's
@@ -47,9 +47,9 @@ class VoxelVotes : public Associator {
   //     (mapper/track/lost_objects.h), for hold_frames frames at most. Ids count up and are never
   //     used again; after the last one, kNoInstance - 1, nothing is born any more, and Remarks()
   //     says so.
-  //     Unknown segments may be the candidate that a known one was before, which waits on, but
-  //     begin none. Else they are background, or held back where cut_share of their points vote
-  //     for one object.
+  //     Unknown segments and far parts may be the candidate that a known one was before, which
+  //     waits on, but begin none. Else, if they are unknown, they are background, or held back
+  //     where cut_share of their points vote for one object.
   // The background (id 0 of the segments) stays the background. Ties go to the lower id.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
@@ -115,6 +115,7 @@ class VoxelVotes : public Associator {
   };
 
   VoteConfig config_;
+  double far_share_ = 0;
   MayBeMissing may_be_missing_;
   State state_;  // after the frame accepted last
   State next_;   // after the frame associated last

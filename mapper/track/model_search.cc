@@ -133,13 +133,15 @@ class Search {
 
   std::optional<FoundModel> Find() const {
     if (surface_.points_L.empty()) return std::nullopt;
-    const std::vector<Place> seeds = Distinct(PlacesAround(), kRoughly);
-    const std::vector<Place> rough = Distinct(Registered(seeds, true), kExactly);
-    std::vector<Place> exact = Registered(rough, false);
+    std::vector<Place> seeds = Distinct(PlacesAround(), kRoughly);
+    const std::vector<Place> as_it_was = PlacesAsItWas();
+    seeds.insert(seeds.end(), as_it_was.begin(), as_it_was.end());
+    std::vector<Place> rough = Registered(seeds, true);
+    SetScores(rough);
+    std::vector<Place> exact = Registered(Distinct(std::move(rough), kExactly), false);
     std::erase_if(exact, [](const Place& place) { return !std::isfinite(place.cost); });
     if (exact.empty()) return std::nullopt;
-    tbb::parallel_for(std::size_t{0}, exact.size(),
-                      [&](std::size_t i) { exact[i].cost = -Score(exact[i].T_LC); });
+    SetScores(exact);
     std::stable_sort(exact.begin(), exact.end(), CostsLess);
     return BestOf(exact);
   }
@@ -173,9 +175,33 @@ class Search {
     return cost / count;
   }
 
-  std::vector<Place> PlacesAround() const {
+  // Places at which the model is turned like this: what is seen of it at the middle of the points,
+  // and shifted. Their cost is asked of one point in `stride`.
+  std::vector<Place> ShiftedPlaces(const Eigen::Matrix3d& R_LC, const Eigen::Vector3d& centre_L,
+                                   std::size_t stride) const {
     constexpr std::array<std::array<double, 3>, 7> kShifts{
         {{0, 0, 0}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+    std::vector<Place> places;
+    for (const auto& shift : kShifts) {
+      Place place;
+      place.T_LC.linear() = R_LC;
+      place.T_LC.translation() =
+          centre_L + kShift * radius_m_ * Eigen::Vector3d(shift[0], shift[1], shift[2]) -
+          R_LC * centre_C_;
+      place.cost = RoughCost(rough_points_, stride, place.T_LC);
+      places.push_back(place);
+    }
+    return places;
+  }
+
+  std::vector<Place> PlacesAsItWas() const {
+    const Eigen::Matrix3d R_LC =
+        search_.T_WL_last.linear().transpose() * search_.frame->T_WC.linear();
+    const Eigen::Vector3d along_L = R_LC * centre_C_.normalized();
+    return ShiftedPlaces(R_LC, CentreSeen(surface_, along_L), 1);
+  }
+
+  std::vector<Place> PlacesAround() const {
     const std::size_t stride = std::max<std::size_t>(1, rough_points_.size() / kPointsToTry);
     std::vector<Place> places(std::size_t{kViews} * kTurns);
     tbb::parallel_for(0, kViews, [&](int view) {
@@ -185,16 +211,10 @@ class Search {
           Eigen::Quaterniond::FromTwoVectors(centre_C_.normalized(), along_L);
       for (int turn = 0; turn < kTurns; ++turn) {
         const Eigen::AngleAxisd about(2 * std::numbers::pi * turn / kTurns, along_L);
-        Place& best = places[static_cast<std::size_t>(view * kTurns + turn)];
-        for (const auto& shift : kShifts) {
-          Place place;
-          place.T_LC.linear() = (about * to_view).toRotationMatrix();
-          place.T_LC.translation() =
-              centre_L + kShift * radius_m_ * Eigen::Vector3d(shift[0], shift[1], shift[2]) -
-              place.T_LC.linear() * centre_C_;
-          place.cost = RoughCost(rough_points_, stride, place.T_LC);
-          if (place.cost < best.cost) best = place;
-        }
+        const std::vector<Place> shifted =
+            ShiftedPlaces((about * to_view).toRotationMatrix(), centre_L, stride);
+        places[static_cast<std::size_t>(view * kTurns + turn)] =
+            *std::ranges::min_element(shifted, CostsLess);
       }
     });
     return places;
@@ -266,6 +286,12 @@ class Search {
     const double chroma = std::hypot(a.first - b.first, a.second - b.second);
     const double ratio = std::max(a.sum, b.sum) / std::min(a.sum, b.sum);
     return chroma <= kSameChroma && ratio <= kSameBrightness ? 1 : -1;
+  }
+
+  // What a place costs is then its score, turned around.
+  void SetScores(std::vector<Place>& places) const {
+    tbb::parallel_for(std::size_t{0}, places.size(),
+                      [&](std::size_t i) { places[i].cost = -Score(places[i].T_LC); });
   }
 
   double Score(const Pose& T_LC) const {

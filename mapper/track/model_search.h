@@ -29,14 +29,14 @@ struct FoundModel {
   double other_score = 0;
 };
 
-// The best of all places that were tried: around the model from all sides, registered
-// (sdf_registration.h), first with few points, then the best of them with all. A place scores by
-// the segment's points that lie on the model's surface and have its colour, against those that lie
-// in what the model is known not to be, or have another colour, and against surface voxels that the
-// frame shows not to be there. Of places that look the same, as those of a box or a ball do, it is
-// the one that the object has turned least to since it was last seen. Nothing where the segment has
-// too few points or no place can be registered to. Costs some tens of milliseconds. Deterministic
-// for any number of threads; `config` must be valid.
+// The best of all places that were tried: around the model from all sides, and turned as it was
+// last, registered (sdf_registration.h), first with few points, then those of the best scores with
+// all. A place scores by the segment's points that lie on the model's surface and have its colour,
+// against those that lie in what the model is known not to be, or have another colour, and against
+// surface voxels that the frame shows not to be there. Of places that look the same, as those of a
+// box or a ball do, it is the one that the object has turned least to since it was last seen.
+// Nothing where the segment has too few points or no place can be registered to. Costs some tens of
+// milliseconds. Deterministic for any number of threads; `config` must be valid.
 std::optional<FoundModel> FindModel(const ModelSearch& search, const SdfTrackConfig& config);
 
 // Whether the best place may be taken for the right one: enough speaks for it, and clearly more

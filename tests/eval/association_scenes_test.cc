@@ -60,10 +60,9 @@ Expected<Tally> Associate(const std::string& scene, int last_frame) {
   TSDFPP_RETURN_IF_ERROR(map.SetProfile("close"));
   // By default as the pipeline has it where masks are not repaired: true masks lose parts of
   // objects otherwise.
-  VoteConfig votes;
   const char* far_share = std::getenv("TSDFPP_FAR_SHARE");
-  votes.far_share = far_share == nullptr ? 0 : std::atof(far_share);
-  VoteWorld world(Method::kTsdfppAnchored, map, votes);
+  VoteWorld world(Method::kTsdfppAnchored, map, {},
+                  far_share == nullptr ? 0 : std::atof(far_share));
   Tally tally;
   const int last = std::min(last_frame, source->info().frame_count);
   for (int index = 1; index <= last; ++index) {

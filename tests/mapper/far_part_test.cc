@@ -9,6 +9,7 @@
 #include <map>
 #include <vector>
 
+#include "mapper/associate/mask_repair_config.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/toy_votes.h"
 
@@ -172,34 +173,59 @@ TEST_P(FarPartOfMethod, IsMeasuredFromTheBoxOfTheSurface) {
   }
 }
 
-// In the pipeline's second verb: the ball, merged with the brick in every frame, is an object of
-// its own, and nothing of it becomes the brick's.
-TEST(FarPart, IsAnObjectOfItsOwn) {
-  const auto map_all = [](double far_share) {
-    VoteConfig votes;
-    votes.far_share = far_share;
-    VoteWorld world(Method::kTsdfppAnchored, ToyConfig(), votes);
-    for (int i = 0; i < 10; ++i) {
+// In the pipeline's second verb: nothing of the ball becomes the brick's, with which its mask is
+// merged. It is no object as long as no mask shows it alone; what shows it then is.
+TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
+  constexpr int kAlone = 10;
+  const auto map_all = [](int frames, double far_share) {
+    VoteWorld world(Method::kTsdfppAnchored, ToyConfig(), {}, far_share);
+    for (int i = 0; i < frames; ++i) {
       reference::Scene scene = BrickAlone();
       if (i > 3) AddBall(scene, {-0.2, 0.05 + 0.015 * (i - 4), kTableTop_m + 0.055});
       const Frame frame = View(scene, i);
-      world.Map(frame, {world.ids().Of(MergedMask(frame)), {}, {}});
+      world.Map(frame,
+                {world.ids().Of(i < kAlone ? MergedMask(frame) : cv::Mat(frame.mask)), {}, {}});
     }
     const ObjectLookup lookup(world.map());
     return std::pair(world.map().Objects(), lookup.BoxOfSurface(0).box_L.sizes().maxCoeff());
   };
-  const auto [objects, length_m] = map_all(VoteConfig{}.far_share);
-  EXPECT_EQ(objects, (std::vector<InstanceId>{0, 1, 2}));
+  const double far_share = MaskRepairConfig{}.far_share;
+  const auto [objects, length_m] = map_all(kAlone, far_share);
+  EXPECT_EQ(objects, (std::vector<InstanceId>{0, 1}));
   EXPECT_LT(length_m, 0.15 + 3 * kToyVoxel_m);
-  const auto [without, long_m] = map_all(0);
+  EXPECT_EQ(map_all(kAlone + kConfirmed, far_share).first, (std::vector<InstanceId>{0, 1, 2}));
+  const auto [without, long_m] = map_all(kAlone, 0);
   EXPECT_EQ(without, (std::vector<InstanceId>{0, 1}));
   EXPECT_GT(long_m, 0.3);
+}
+
+// Nor is it held for a new object: one that the map has is given it.
+TEST(FarPart, IsGivenToAnObjectOfTheMap) {
+  ToyVotes world(Method::kTsdfppAnchored, MaskRepairConfig{}.far_share);
+  const auto frame_of = [](int index) {
+    reference::Scene scene = BrickAlone();
+    AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});
+    return View(scene, index);
+  };
+  int index = 0;
+  for (; index < 5; ++index) world.Map(frame_of(index));
+  std::map<InstanceId, InstanceId> id_of;
+  for (const auto& [id, truth] : world.truth_of()) id_of[truth] = id;
+  const Frame frame = frame_of(index);
+  const cv::Mat labels = world.Map(frame, {world.ids().Of(MergedMask(frame)), {}, {}});
+  for (const InstanceId truth : {kBrick, kBall}) {
+    const auto pixels = PixelsOf(frame, frame.mask, truth);
+    const auto right = std::ranges::count_if(pixels, [&](int pixel) {
+      return labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) == id_of.at(truth);
+    });
+    EXPECT_GT(static_cast<double>(right), kNearlyAll * static_cast<double>(pixels.size())) << truth;
+  }
 }
 
 // Of another object that the map knows one part is far, the other near: a mask over all is cut
 // between the two objects.
 TEST(FarPart, DoesNotKeepTheRestFromBeingCut) {
-  ToyVotes world;
+  ToyVotes world(Method::kTsdfppAnchored, MaskRepairConfig{}.far_share);
   const auto frame_of = [](int index) {
     reference::Scene scene = BrickAlone();
     AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});

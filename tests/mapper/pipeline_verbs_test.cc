@@ -10,6 +10,7 @@
 
 #include "core/files.h"
 #include "mapper/associate/given_ids.h"
+#include "mapper/associate/object_lookup.h"
 #include "mapper/pipeline.h"
 #include "mapper/segment/given_masks.h"
 #include "mapper/segment/no_masks.h"
@@ -168,7 +169,11 @@ TEST(PipelineVerbs, AssociationPartsMasksWhereTheyAreRepaired) {
       frame.mask.setTo(static_cast<double>(kBrick), frame.mask == static_cast<double>(kBall));
       ASSERT_TRUE(pipeline.Process(frame));
     }
-    EXPECT_EQ(pipeline.Objects().size(), mode == MaskRepairMode::kOn ? 3U : 2U);
+    EXPECT_EQ(pipeline.map().Objects(), (std::vector<InstanceId>{0, 1}));
+    // The brick is 150 mm long, the ball 300 mm off.
+    const ObjectLookup lookup(pipeline.map());
+    const double length_m = lookup.BoxOfSurface(0).box_L.sizes().maxCoeff();
+    EXPECT_EQ(length_m < 0.2, mode == MaskRepairMode::kOn) << length_m;
   }
 }
 

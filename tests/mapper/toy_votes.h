@@ -11,7 +11,8 @@ inline constexpr int kConfirmed = 3;
 
 class ToyVotes : public VoteWorld {
  public:
-  explicit ToyVotes(Method method = Method::kTsdfppAnchored) : VoteWorld(method, ToyConfig()) {}
+  explicit ToyVotes(Method method = Method::kTsdfppAnchored, double far_share = 0)
+      : VoteWorld(method, ToyConfig(), {}, far_share) {}
 };
 
 inline int CountOf(const cv::Mat& labels, InstanceId id) {
