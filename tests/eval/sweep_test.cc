@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "core/files.h"
+#include "eval/run/folder_lock.h"
 #include "eval/sweep/sequence_variant.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
@@ -200,6 +201,10 @@ TEST_F(Sweep, AKilledRunLeavesNoHalfCellAndGoesOn) {
     waitpid(process, &status, 0);
     EXPECT_TRUE(WIFSIGNALED(status));
     EXPECT_EQ(WTERMSIG(status), signal);
+    // Its workers end a moment later, and hold the folder until then.
+    for (int i = 0; i < 1000 && !FolderLock::Take(folder_ / out); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
     int whole = 0;
     for (const std::string& cell : CellFiles(out)) {
       if (!cell.ends_with(".json")) continue;
