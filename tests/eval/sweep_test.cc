@@ -1,5 +1,6 @@
 // Experiments run by the command: what they say is what a comparison says, nothing runs twice, a
-// killed run goes on, and any frame can be made again.
+// killed run goes on, and any frame can be made again. Longer than most files: a sweep is started,
+// killed, edited and replayed in one folder.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
