@@ -31,7 +31,7 @@ class Command:
     done_is_refused: bool = False  # a rerun over what is whole says so, with exit code 2
     ours: bool = True  # tsdfpp, no script
     variant: bool = False  # of a command that meets every fault; meets those of writers alone
-    quick: bool = False  # what a build's tests do not kill elsewhere (tests/kill, Sweep.AKilledRun...), and is short
+    quick: bool = False  # short; longer ones a build's tests kill in tests/kill and tests/eval/sweep_test.cc
     goes_on: str = ""  # what it prints where it goes on without a child that was killed
 
 

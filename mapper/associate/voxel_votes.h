@@ -17,7 +17,7 @@ namespace tsdfpp {
 class VoxelVotes : public Associator {
  public:
   // New objects get ids from `first_id` on, above all that the map has had. `far_share` is
-  // MaskRepairConfig's, or 0 where masks are not repaired. The configs must be valid.
+  // MaskRepairConfig's, or 0 where masks are not repaired. The config must be valid.
   explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1, double far_share = 0);
 
   // In this order:

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 
@@ -24,13 +25,13 @@ constexpr double kUnobserved = 0.35;    // what one costs where the model was no
 // Of the root of the points' mean squared distance from their middle.
 constexpr double kShift = 0.6;
 
-// The best of them are registered with few points ...
+// The best of them, and those turned as the object was last, are registered with few points ...
 constexpr std::size_t kRoughly = 40;
 constexpr std::size_t kRoughPoints = 250;
 constexpr int kRoughIterations = 10;
 constexpr double kSameTurn_rad = 0.4;  // places that differ by less register to the same one
 constexpr double kSameShift = 0.5;     // of the points' radius
-// ... and the best of these with all.
+// ... and those of the best scores with all.
 constexpr std::size_t kExactly = 8;
 constexpr int kAgain = 2;  // where the search has not settled
 
@@ -134,14 +135,10 @@ class Search {
   std::optional<FoundModel> Find() const {
     if (surface_.points_L.empty()) return std::nullopt;
     std::vector<Place> seeds = Distinct(PlacesAround(), kRoughly);
-    const std::vector<Place> as_it_was = PlacesAsItWas();
-    seeds.insert(seeds.end(), as_it_was.begin(), as_it_was.end());
-    std::vector<Place> rough = Registered(seeds, true);
-    SetScores(rough);
-    std::vector<Place> exact = Registered(Distinct(std::move(rough), kExactly), false);
+    std::ranges::copy(PlacesAsItWas(), std::back_inserter(seeds));
+    std::vector<Place> exact = Registered(Distinct(Registered(seeds, true), kExactly), false);
     std::erase_if(exact, [](const Place& place) { return !std::isfinite(place.cost); });
     if (exact.empty()) return std::nullopt;
-    SetScores(exact);
     std::stable_sort(exact.begin(), exact.end(), CostsLess);
     return BestOf(exact);
   }
@@ -155,13 +152,13 @@ class Search {
     return thinned;
   }
 
-  // What the points say against a place, at most 1 each.
-  double RoughCost(const std::vector<SegmentPoint>& points, std::size_t stride,
-                   const Pose& T_LC) const {
+  // What a few of the points say against a place, at most 1 each.
+  double RoughCost(const Pose& T_LC) const {
+    const std::size_t stride = std::max<std::size_t>(1, rough_points_.size() / kPointsToTry);
     double cost = 0;
     int count = 0;
-    for (std::size_t i = 0; i < points.size(); i += stride) {
-      const SurfaceSample at = reader_.At(T_LC * points[i].p_C.cast<double>());
+    for (std::size_t i = 0; i < rough_points_.size(); i += stride) {
+      const SurfaceSample at = reader_.At(T_LC * rough_points_[i].p_C.cast<double>());
       ++count;
       if (!at.is_observed) {
         cost += kUnobserved;
@@ -175,34 +172,30 @@ class Search {
     return cost / count;
   }
 
-  // Places at which the model is turned like this: what is seen of it at the middle of the points,
-  // and shifted. Their cost is asked of one point in `stride`.
-  std::vector<Place> ShiftedPlaces(const Eigen::Matrix3d& R_LC, const Eigen::Vector3d& centre_L,
-                                   std::size_t stride) const {
+  // The model turned like this: what is seen of it at the middle of the points, and shifted.
+  std::array<Place, 7> Shifted(const Eigen::Matrix3d& R_LC, const Eigen::Vector3d& centre_L) const {
     constexpr std::array<std::array<double, 3>, 7> kShifts{
         {{0, 0, 0}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
-    std::vector<Place> places;
-    for (const auto& shift : kShifts) {
-      Place place;
-      place.T_LC.linear() = R_LC;
-      place.T_LC.translation() =
-          centre_L + kShift * radius_m_ * Eigen::Vector3d(shift[0], shift[1], shift[2]) -
+    std::array<Place, 7> places;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      places[i].T_LC.linear() = R_LC;
+      places[i].T_LC.translation() =
+          centre_L +
+          kShift * radius_m_ * Eigen::Vector3d(kShifts[i][0], kShifts[i][1], kShifts[i][2]) -
           R_LC * centre_C_;
-      place.cost = RoughCost(rough_points_, stride, place.T_LC);
-      places.push_back(place);
     }
     return places;
   }
 
-  std::vector<Place> PlacesAsItWas() const {
+  // Turned as it was last.
+  std::array<Place, 7> PlacesAsItWas() const {
     const Eigen::Matrix3d R_LC =
         search_.T_WL_last.linear().transpose() * search_.frame->T_WC.linear();
-    const Eigen::Vector3d along_L = R_LC * centre_C_.normalized();
-    return ShiftedPlaces(R_LC, CentreSeen(surface_, along_L), 1);
+    return Shifted(R_LC, CentreSeen(surface_, R_LC * centre_C_.normalized()));
   }
 
+  // Of each view and turn the shift that costs the least.
   std::vector<Place> PlacesAround() const {
-    const std::size_t stride = std::max<std::size_t>(1, rough_points_.size() / kPointsToTry);
     std::vector<Place> places(std::size_t{kViews} * kTurns);
     tbb::parallel_for(0, kViews, [&](int view) {
       const Eigen::Vector3d along_L = Direction(view);
@@ -211,8 +204,8 @@ class Search {
           Eigen::Quaterniond::FromTwoVectors(centre_C_.normalized(), along_L);
       for (int turn = 0; turn < kTurns; ++turn) {
         const Eigen::AngleAxisd about(2 * std::numbers::pi * turn / kTurns, along_L);
-        const std::vector<Place> shifted =
-            ShiftedPlaces((about * to_view).toRotationMatrix(), centre_L, stride);
+        std::array<Place, 7> shifted = Shifted((about * to_view).toRotationMatrix(), centre_L);
+        for (Place& place : shifted) place.cost = RoughCost(place.T_LC);
         places[static_cast<std::size_t>(view * kTurns + turn)] =
             *std::ranges::min_element(shifted, CostsLess);
       }
@@ -240,7 +233,7 @@ class Search {
     return distinct;
   }
 
-  // Each registered, and what the points say against it; infinity where it does not settle.
+  // Each registered; it costs its score, negated, or infinity where it does not settle.
   std::vector<Place> Registered(const std::vector<Place>& seeds, bool is_rough) const {
     SdfTrackConfig config = config_;
     if (is_rough) {
@@ -261,9 +254,7 @@ class Search {
       }
       places[i].T_LC = result.T_LC;
       // A rough search need not have settled.
-      if (is_rough || result.converged) {
-        places[i].cost = RoughCost(rough_points_, 1, result.T_LC);
-      }
+      if (is_rough || result.converged) places[i].cost = -Score(result.T_LC);
     });
     return places;
   }
@@ -286,12 +277,6 @@ class Search {
     const double chroma = std::hypot(a.first - b.first, a.second - b.second);
     const double ratio = std::max(a.sum, b.sum) / std::min(a.sum, b.sum);
     return chroma <= kSameChroma && ratio <= kSameBrightness ? 1 : -1;
-  }
-
-  // What a place costs is then its score, turned around.
-  void SetScores(std::vector<Place>& places) const {
-    tbb::parallel_for(std::size_t{0}, places.size(),
-                      [&](std::size_t i) { places[i].cost = -Score(places[i].T_LC); });
   }
 
   double Score(const Pose& T_LC) const {

@@ -30,16 +30,10 @@ enum class Shown { kBrick, kNothing, kSham, kShamBehindScreen, kUnknownSide, kBr
 
 Frame FrameOf(int index, Shown shown) {
   reference::Scene scene = TableOnly();
-  const auto add_brick = [&](double yaw_rad, const Eigen::Vector3d& place) {
-    AddBrick(scene, yaw_rad, place);
-    scene.shapes.push_back(reference::Cuboid(
-        kBrick, {200, 30, 30}, MakePose(0, Eigen::Vector3d::UnitZ(), {0.045, 0.02, 0.075}),
-        {0.025, 0.03, 0.03}));
-  };
   const Pose T_WC = CircleCamera(0.02 * index);
-  if (shown == Shown::kBrick) add_brick(kBeforeYaw_rad, kBefore);
-  if (shown == Shown::kUnknownSide) add_brick(kUnknownYaw_rad, kAfter);
-  if (shown == Shown::kBrickElsewhere) add_brick(kAfterYaw_rad, kAfter);
+  if (shown == Shown::kBrick) AddKnobbedBrick(scene, kBeforeYaw_rad, kBefore);
+  if (shown == Shown::kUnknownSide) AddKnobbedBrick(scene, kUnknownYaw_rad, kAfter);
+  if (shown == Shown::kBrickElsewhere) AddKnobbedBrick(scene, kAfterYaw_rad, kAfter);
   if (shown == Shown::kSham || shown == Shown::kShamBehindScreen) {
     scene.shapes.push_back(reference::Sphere(kBrick, {200, 30, 30}, Eigen::Vector3d::Zero(), 0.05));
     scene.T_WO[kBrick] = MakePose(0, Eigen::Vector3d::UnitZ(), kBeside);

@@ -199,7 +199,19 @@ TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
   EXPECT_GT(long_m, 0.3);
 }
 
-// Nor is it held for a new object: one that the map has is given it.
+// That nearly all of the brick and of the ball has the label of its object.
+void ExpectBothHaveTheirs(const Frame& frame, const cv::Mat& labels,
+                          const std::map<InstanceId, InstanceId>& id_of) {
+  for (const InstanceId truth : {kBrick, kBall}) {
+    const auto pixels = PixelsOf(frame, frame.mask, truth);
+    const auto right = std::ranges::count_if(pixels, [&](int pixel) {
+      return labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) == id_of.at(truth);
+    });
+    EXPECT_GT(static_cast<double>(right), kNearlyAll * static_cast<double>(pixels.size())) << truth;
+  }
+}
+
+// Nor is it nobody's where the map has the object that it is of.
 TEST(FarPart, IsGivenToAnObjectOfTheMap) {
   ToyVotes world(Method::kTsdfppAnchored, MaskRepairConfig{}.far_share);
   const auto frame_of = [](int index) {
@@ -213,13 +225,7 @@ TEST(FarPart, IsGivenToAnObjectOfTheMap) {
   for (const auto& [id, truth] : world.truth_of()) id_of[truth] = id;
   const Frame frame = frame_of(index);
   const cv::Mat labels = world.Map(frame, {world.ids().Of(MergedMask(frame)), {}, {}});
-  for (const InstanceId truth : {kBrick, kBall}) {
-    const auto pixels = PixelsOf(frame, frame.mask, truth);
-    const auto right = std::ranges::count_if(pixels, [&](int pixel) {
-      return labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) == id_of.at(truth);
-    });
-    EXPECT_GT(static_cast<double>(right), kNearlyAll * static_cast<double>(pixels.size())) << truth;
-  }
+  ExpectBothHaveTheirs(frame, labels, id_of);
 }
 
 // Of another object that the map knows one part is far, the other near: a mask over all is cut
@@ -246,13 +252,7 @@ TEST(FarPart, DoesNotKeepTheRestFromBeingCut) {
   ASSERT_GT(far.size(), ball.size() / 5);
   ASSERT_LT(far.size(), ball.size() / 2);
   const cv::Mat labels = world.Map(frame, {world.ids().Of(merged), {}, {}});
-  for (const InstanceId truth : {kBrick, kBall}) {
-    const auto pixels = PixelsOf(frame, frame.mask, truth);
-    const auto right = std::ranges::count_if(pixels, [&](int pixel) {
-      return labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) == id_of.at(truth);
-    });
-    EXPECT_GT(static_cast<double>(right), kNearlyAll * static_cast<double>(pixels.size())) << truth;
-  }
+  ExpectBothHaveTheirs(frame, labels, id_of);
 }
 
 }  // namespace

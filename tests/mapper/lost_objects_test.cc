@@ -29,14 +29,6 @@ constexpr double kMostTurned_voxels = 1;
 
 Intrinsics Camera() { return {256, 192, 215.0, 215.0, 127.5, 95.5}; }
 
-// A brick with a knob, which turned by half a turn is another one.
-void AddKnobbedBrick(reference::Scene& scene, double yaw_rad, const Eigen::Vector3d& place) {
-  AddBrick(scene, yaw_rad, place);
-  scene.shapes.push_back(reference::Cuboid(
-      kBrick, {200, 30, 30}, MakePose(0, Eigen::Vector3d::UnitZ(), {0.045, 0.02, 0.075}),
-      {0.025, 0.03, 0.03}));
-}
-
 const Eigen::Vector3d kBefore(-0.12, -0.06, kTableTop_m + 0.045);
 const Eigen::Vector3d kAfter(0.12, -0.1, kTableTop_m + 0.045);
 

@@ -45,6 +45,13 @@ inline void AddBrick(reference::Scene& scene, double yaw_rad, const Eigen::Vecto
       reference::Cuboid(kBrick, {200, 30, 30}, Pose::Identity(), {0.075, 0.05, 0.045}));
   scene.T_WO[kBrick] = reference::MakePose(yaw_rad, Eigen::Vector3d::UnitZ(), place);
 }
+// With a knob, which turned by half a turn is another one.
+inline void AddKnobbedBrick(reference::Scene& scene, double yaw_rad, const Eigen::Vector3d& place) {
+  AddBrick(scene, yaw_rad, place);
+  scene.shapes.push_back(reference::Cuboid(
+      kBrick, {200, 30, 30}, reference::MakePose(0, Eigen::Vector3d::UnitZ(), {0.045, 0.02, 0.075}),
+      {0.025, 0.03, 0.03}));
+}
 inline void AddBall(reference::Scene& scene, const Eigen::Vector3d& place) {
   scene.shapes.push_back(reference::Sphere(kBall, {30, 30, 200}, Eigen::Vector3d::Zero(), 0.055));
   scene.T_WO[kBall] = reference::MakePose(0, Eigen::Vector3d::UnitZ(), place);
