@@ -193,7 +193,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   times.track_s = watch.Lap();
   UpdatePoses(frame->index, std::move(tracked->T_WO));
   times.update_poses_s = watch.Lap();
-  const cv::Mat labels = RepairMasks(*frame, tracked->labels);
+  const cv::Mat labels = RepairMasks(*frame, *tracked);
   times.repair_s = watch.Lap();
   Fuse(*frame, labels);
   times.fuse_s = watch.Lap();
@@ -236,27 +236,23 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   lost_->GiveUpUnsure(frame, pixels_of, *map_, T_WO_);
   lost_->AskTrials(frame, pixels_of);
   if (lost_->empty()) return found;
-  std::vector<LoosePixels> segments = association.unclaimed;
-  std::vector<InstanceId> id_of(segments.size(), kNoInstance);
+  std::vector<LostObjects::Segment> segments;
+  for (std::size_t s = 0; s < association.unclaimed.size(); ++s) {
+    segments.push_back({association.unclaimed[s], kNoInstance, association.may_begin[s]});
+  }
   cv::Mat labels = association.labels.clone();
   for (auto& [id, pixels] : pixels_of) {
     if (!lost_->Has(id)) continue;
     labels.setTo(static_cast<double>(kNoInstance), labels == static_cast<double>(id));
-    segments.push_back(std::move(pixels));
-    id_of.push_back(id);
+    segments.push_back({std::move(pixels), id});
   }
-  const std::vector<LostObjects::Return> returns = lost_->FindAgain(frame, segments, id_of);
+  const std::vector<LostObjects::Return> returns = lost_->FindAgain(frame, segments);
   for (const LostObjects::Return& of : returns) {
-    // What no network knows begins nothing.
-    const int first = segments[of.segment].front();
-    const bool is_unknown =
-        labels.at<InstanceId>(first / labels.cols, first % labels.cols) == kBackground;
-    if (of.begins_anew && is_unknown) continue;
     if (!lost_->PutBack(of, *map_, T_WO_)) continue;
     associator_->Found(of.id);
     tracker_->Place(of.id, frame.index);
     found.push_back(of.id);
-    for (const int pixel : segments[of.segment]) {
+    for (const int pixel : segments[of.segment].pixels) {
       labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) = of.id;
     }
   }
@@ -326,8 +322,18 @@ void Pipeline::UpdatePoses(int frame, ObjectPoses T_WO) {
   }
 }
 
-cv::Mat Pipeline::RepairMasks(const Frame& frame, const cv::Mat& labels) {
-  return repair_ == nullptr ? labels : repair_->Repair(frame, labels, T_WO_, *map_);
+cv::Mat Pipeline::RepairMasks(const Frame& frame, const TrackedFrame& tracked) {
+  if (repair_ == nullptr) return tracked.labels;
+  std::set<InstanceId> unplaced;
+  for (const auto& [id, pose] : T_WO_) {
+    if (config_.poses == PoseSource::kGiven || !tracked_.Contains(id)) continue;
+    const auto status = tracked.seen.find(id);
+    const bool is_placed =
+        status != tracked.seen.end() &&
+        (status->second == TrackStatus::kBegun || status->second == TrackStatus::kTracked);
+    if (!is_placed) unplaced.insert(id);
+  }
+  return repair_->Repair(frame, tracked.labels, T_WO_, unplaced, *map_);
 }
 
 void Pipeline::Fuse(const Frame& frame, const cv::Mat& labels) {

@@ -150,7 +150,7 @@ class Pipeline {
   // Moves the objects to where they are after the frame, and writes it down.
   void UpdatePoses(int frame, ObjectPoses T_WO);
   // The labels to fuse, where the objects are now.
-  cv::Mat RepairMasks(const Frame& frame, const cv::Mat& labels);
+  cv::Mat RepairMasks(const Frame& frame, const TrackedFrame& tracked);
   void Fuse(const Frame& frame, const cv::Mat& labels);
   // Looks at the pixels only while the map is empty.
   void CountWhileEmpty(const Frame& frame, const cv::Mat& labels);

@@ -6,9 +6,9 @@ votes, objects tracked; beside it the same with the true masks.
         [--program build/release/tsdfpp]
 
 Runs `tsdfpp compare` twice a scene and writes OUT/pixels.csv, a row a scene, of tsdf++/anchored at the examined frame:
-objects of the map that are true ones, of how many true ones, and those that are nobody's; the hidden table kept and the
-completion of the moving objects, from pixels and with true masks; the greatest unaligned ATE and rotation error of the objects
-that moved and were found. --mask-repair on repairs the masks from pixels (docs/segmentation.md, Wrong masks), not the true ones.
+true objects that were found, of how many, those of which the map has anything at the end, and its objects that are nobody's;
+the hidden table kept and the completion of the moving objects, from pixels and with true masks; the greatest unaligned ATE and
+rotation error of the objects that moved, in the frames in which the map had them. --mask-repair on repairs the masks from pixels (docs/segmentation.md, Wrong masks), not the true ones.
 """
 import argparse
 import csv
@@ -47,7 +47,8 @@ def row_of(program, scene, out, repair):
     matched = pixels["matched_ids"]
     true = {entry["object"] for entry in matched if entry["object"] is not None}
     objects = [entry for entry in pixels["examined"]["objects"] if entry["id"] != 0]
-    row = {"scene": scene, "objects found": f"{len(true)} of {len(objects)}",
+    there = sum(isinstance(entry["accuracy"]["mean_m"], float) for entry in objects)
+    row = {"scene": scene, "objects found": f"{len(true)} of {len(objects)}", "there at the end": there,
            "nobody's": str(sum(entry["object"] is None for entry in matched))}
     for title, column in (("hidden table kept", "table_preservation_behind_other"), ("movers' completion", "movers_completion")):
         row[f"{title}: from pixels"] = text(at_pixels[column], 3)

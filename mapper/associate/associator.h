@@ -22,6 +22,8 @@ struct AssociatedObjects {
   std::map<InstanceId, std::string> classes{};
   // The pixels, with valid depth, of each segment that is none of the map's objects.
   std::vector<std::vector<int>> unclaimed{};
+  // Of each of those: whether an object may begin with it.
+  std::vector<bool> may_begin{};
 };
 
 class Associator {

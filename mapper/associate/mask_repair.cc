@@ -102,10 +102,12 @@ std::optional<InstanceId> MaskRepair::LikeliestOf(const ObjectLookup& lookup,
 
 void MaskRepair::Testify(const ObjectLookup& lookup,
                          std::span<const ObjectLookup::Distance> distances,
-                         const ObjectCells& cells, const Eigen::Vector3d& p_W, InstanceId label,
+                         const ObjectCells& cells, const std::set<InstanceId>& unplaced,
+                         const Eigen::Vector3d& p_W, InstanceId label,
                          std::vector<Testimony>& said) const {
   for (const auto& [object, voxels, weight] : distances) {
     const InstanceId id = lookup.ids()[object];
+    if (unplaced.contains(id)) continue;
     const bool is_own = id == label;
     if (voxels > config_.take_voxels || (is_own && !contested_.HasAny(id))) continue;
     const auto cell = cells.CellOf(id, p_W);
@@ -135,7 +137,7 @@ MaskRepair::OfTile MaskRepair::ExplainTile(const ObjectLookup& lookup, const Obj
     lookup.Distances(points_W[i], around, distances);
     InstanceId& label = work.labels.at<InstanceId>(pixels[i]);
     if (is_changed_.at<std::uint8_t>(pixels[i]) == 0) {
-      Testify(lookup, distances, cells, points_W[i], label, of_tile.said);
+      Testify(lookup, distances, cells, work.unplaced, points_W[i], label, of_tile.said);
     }
     const auto object = LikeliestOf(lookup, distances, cells, points_W[i], label);
     if (!object) continue;
@@ -171,7 +173,8 @@ cv::Mat MaskRepair::SetOutlines(const Frame& frame, const cv::Mat& ids, double v
 }
 
 cv::Mat MaskRepair::Repair(const Frame& frame, const cv::Mat& labels,
-                           const std::map<InstanceId, Pose>& T_WO, MapRepresentation& map) {
+                           const std::map<InstanceId, Pose>& T_WO,
+                           const std::set<InstanceId>& unplaced, MapRepresentation& map) {
   const double voxel_m = map.config().voxel_m;
   const ObjectCells voxels(T_WO, voxel_m);
   for (const auto& [object, cells] : contested_.TakeLost()) {
@@ -179,7 +182,7 @@ cv::Mat MaskRepair::Repair(const Frame& frame, const cv::Mat& labels,
     TakeOut(cells, voxel_m, object, pose == T_WO.end() ? Pose::Identity() : pose->second, map);
   }
   const ObjectLookup lookup(map, ObjectLookup::Of::kObjectsAndBackground);
-  Work work{frame, labels.clone(), LabelledPixels(frame, labels), {}, {}};
+  Work work{frame, unplaced, labels.clone(), LabelledPixels(frame, labels), {}, {}};
   Explain(lookup, voxels, work);
   FollowExplained(lookup, work.explained, work.is_open, work.labels);
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -46,7 +47,8 @@ class MaskRepair {
   // poses, T_WO. In this order:
   //  1. *Taking out.* Cells of a voxel on an object's surface that frames gave to others more often
   //     than to it are taken out of the object (mapper/associate/take_out.h). Points say so that
-  //     are within take_voxels of it, and whose segment SetOutlines() did not change.
+  //     are within take_voxels of it, and whose segment SetOutlines() did not change. Nothing is
+  //     said of the `unplaced`: objects that the frame does not show to be where their pose says.
   //  2. *Known surfaces.* A point is explained by an object to whose surface it is near:
   //     keep_voxels for the label's own, take_voxels for another one's, where that is its own in at
   //     least half of the frames that disputed it. It becomes that of the likeliest: weight times
@@ -60,7 +62,7 @@ class MaskRepair {
   // Pixels without valid depth keep their label, and kNoInstance stays. The same for any number of
   // threads.
   cv::Mat Repair(const Frame& frame, const cv::Mat& labels, const std::map<InstanceId, Pose>& T_WO,
-                 MapRepresentation& map);
+                 const std::set<InstanceId>& unplaced, MapRepresentation& map);
 
  private:
   // Of a label and an object: points with that label which became the object's.
@@ -69,6 +71,7 @@ class MaskRepair {
   // A frame on its way. Of `labels` those are the map's own word where `is_open` is 0.
   struct Work {
     const Frame& frame;
+    const std::set<InstanceId>& unplaced;
     cv::Mat labels;
     cv::Mat is_open;  // CV_8UC1
     Explained explained;
@@ -88,8 +91,8 @@ class MaskRepair {
                                         const ObjectCells& cells, const Eigen::Vector3d& p_W,
                                         InstanceId label) const;
   void Testify(const ObjectLookup& lookup, std::span<const ObjectLookup::Distance> distances,
-               const ObjectCells& cells, const Eigen::Vector3d& p_W, InstanceId label,
-               std::vector<Testimony>& said) const;
+               const ObjectCells& cells, const std::set<InstanceId>& unplaced,
+               const Eigen::Vector3d& p_W, InstanceId label, std::vector<Testimony>& said) const;
 
   MaskRepairConfig config_;
   SurfaceMapper surfaces_;

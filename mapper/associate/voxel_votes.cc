@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "core/pixel_ray.h"
 #include "mapper/associate/far_part.h"
@@ -95,6 +96,7 @@ void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const 
   const bool may_be_background = !segment.is_known && background;
   std::vector<std::size_t> around = lookup.Around(segment.points_W);
   if (background) std::erase(around, *background);
+  if (segment.far_from) std::erase(around, *segment.far_from);
   if (around.empty()) return;
   std::vector<Votes> counts(around.size());
   for (std::size_t i = 0; i < around.size(); ++i) counts[i].object = around[i];
@@ -127,18 +129,21 @@ void VoxelVotes::CountVotes(const ObjectLookup& lookup, Segment& segment) const 
   }
 }
 
-void VoxelVotes::Claim(const ObjectLookup& lookup, std::span<Segment> segments) const {
-  tbb::parallel_for(std::size_t{0}, segments.size(),
-                    [&](std::size_t s) { CountVotes(lookup, segments[s]); });
-  for (Segment& segment : segments) {
-    const auto most =
-        std::max_element(segment.votes.begin(), segment.votes.end(),
-                         [](const Votes& a, const Votes& b) { return a.alone < b.alone; });
-    if (most == segment.votes.end()) continue;
-    if (IsShare(most->alone, config_.min_share, segment.points_W.size())) {
-      segment.object = most->object;
-    }
+void VoxelVotes::Join(Segment& segment) const {
+  const auto most =
+      std::max_element(segment.votes.begin(), segment.votes.end(),
+                       [](const Votes& a, const Votes& b) { return a.alone < b.alone; });
+  if (most == segment.votes.end()) return;
+  if (IsShare(most->alone, config_.min_share, segment.points_W.size())) {
+    segment.object = most->object;
   }
+}
+
+void VoxelVotes::Claim(const ObjectLookup& lookup, std::span<Segment> segments) const {
+  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t s) {
+    CountVotes(lookup, segments[s]);
+    Join(segments[s]);
+  });
 }
 
 void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
@@ -156,8 +161,13 @@ void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const Obj
   });
   const std::size_t wholes = segments.size();
   for (std::size_t s = 0; s < wholes; ++s) {
-    if (far[s].size() == segments[s].pixels.size()) segments[s].object.reset();
-    if (far[s].empty() || !segments[s].object) continue;
+    if (far[s].empty()) continue;
+    if (far[s].size() == segments[s].pixels.size()) {
+      segments[s].far_from = std::exchange(segments[s].object, std::nullopt);
+      segments[s].votes.clear();
+      Claim(lookup, {&segments[s], 1});
+      continue;
+    }
     std::vector<int> rest;
     std::ranges::set_difference(segments[s].pixels, far[s], std::back_inserter(rest));
     segments[s].pixels = std::move(rest);
@@ -167,6 +177,7 @@ void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const Obj
     Segment part;
     part.id = segments[s].id;
     part.is_far_part = true;
+    part.far_from = segments[s].object;
     part.pixels = std::move(far[s]);
     TakePoints(frame, voxel_m, part);
     segments.push_back(std::move(part));
@@ -281,40 +292,31 @@ void VoxelVotes::Cut(const Frame& frame, const ObjectLookup& lookup, const Segme
   std::vector<std::size_t> sharers = segment.shared_with;
   sharers.push_back(*segment.object);
   std::sort(sharers.begin(), sharers.end());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      std::vector<ObjectLookup::Distance> distances;
-                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                        const int pixel = segment.pixels[i];
-                        lookup.Distances(PointOf(frame, pixel), sharers, distances);
-                        const auto nearest = std::min_element(
-                            distances.begin(), distances.end(),
-                            [](const auto& a, const auto& b) { return a.voxels < b.voxels; });
-                        const bool is_near =
-                            nearest != distances.end() && nearest->voxels <= config_.near_voxels;
-                        labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) =
-                            is_near ? lookup.ids()[nearest->object] : kNoInstance;
-                      }
-                    });
-}
-
-void VoxelVotes::LeaveBackground(const Frame& frame, const ObjectLookup& lookup,
-                                 const Segment& segment, cv::Mat& labels) {
-  const std::optional<std::size_t> background = lookup.NumberOf(kBackground);
-  if (!background) return;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      std::vector<ObjectLookup::Distance> scratch;
-                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                        const int pixel = segment.pixels[i];
-                        const Eigen::Vector3d p_W = PointOf(frame, pixel);
-                        if (DistanceOf(lookup, *background, p_W, scratch) <
-                            DistanceOf(lookup, *segment.object, p_W, scratch)) {
-                          labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) =
-                              kNoInstance;
-                        }
-                      }
-                    });
+  const std::optional<std::size_t> background =
+      segment.is_known ? std::nullopt : lookup.NumberOf(kBackground);
+  const bool is_cut = !segment.shared_with.empty();
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, segment.pixels.size()),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        std::vector<ObjectLookup::Distance> distances;
+        std::vector<ObjectLookup::Distance> scratch;
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const int pixel = segment.pixels[i];
+          const Eigen::Vector3d p_W = PointOf(frame, pixel);
+          lookup.Distances(p_W, sharers, distances);
+          const auto nearest =
+              std::min_element(distances.begin(), distances.end(),
+                               [](const auto& a, const auto& b) { return a.voxels < b.voxels; });
+          const float least = nearest == distances.end() ? kFar : nearest->voxels;
+          InstanceId& label = labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols);
+          if (is_cut) {
+            label = least <= config_.near_voxels ? lookup.ids()[nearest->object] : kNoInstance;
+          }
+          if (background && DistanceOf(lookup, *background, p_W, scratch) < least) {
+            label = kNoInstance;
+          }
+        }
+      });
 }
 
 AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segments,
@@ -360,15 +362,12 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
   }
   for (Segment& segment : found) {
     const bool is_born = segment.label != kNoInstance && segment.label != kBackground;
-    if (!is_born) association.unclaimed.push_back(std::move(segment.pixels));
+    if (is_born) continue;
+    association.unclaimed.push_back(std::move(segment.pixels));
+    association.may_begin.push_back(segment.is_known);
   }
   for (const Segment& segment : found) {
-    if (segment.object && !segment.is_known) {
-      LeaveBackground(frame, lookup, segment, association.labels);
-    }
-  }
-  for (const Segment& segment : found) {
-    if (segment.shared_with.empty()) continue;
+    if (!segment.object || (segment.is_known && segment.shared_with.empty())) continue;
     Cut(frame, lookup, segment, association.labels);
     for (const std::size_t o : segment.shared_with) {
       next_.last_seen[lookup.ids()[o]] = next_.frame;

@@ -32,15 +32,16 @@ class VoxelVotes : public Associator {
   //     no claim (of 2 and 3) where they are within at_voxels of it, and are nobody's where they
   //     are nearer to it than to the object that the segment joins.
   //     Of a known segment that has joined one, the part that is far from it (FindFarPart(),
-  //     far_share) is a segment of its own, with votes and a claim of its own. Where all of it is
-  //     far, what it voted for are stray voxels, and it has not joined the object.
+  //     far_share) is a segment of its own, with votes and a claim of its own. What is far votes
+  //     for the object no more, here and below: it voted for stray voxels.
   //  3. *Moved objects.* Of the segments that are left and the objects that have none and had one
   //     at most recent_frames frames ago, those belong together of which the greatest share of
   //     points, and near_share at least, is within near_voxels of the object; one segment an
   //     object.
   //  4. *Cuts.* Where cut_share of a claimed segment's points vote for another object that has no
   //     segment, the mask has merged the two: each pixel is then the nearest one's of those, and
-  //     nobody's beyond near_voxels.
+  //     nobody's beyond near_voxels. (Of an unknown segment also where it is nearer to the
+  //     background.)
   //  5. *Births.* What is left is held back (kNoInstance: not fused, so that nothing of a false
   //     segment enters the map) until Candidates confirm it, and then a new object. One that may be
   //     an object that is missing (ExpectReturns()) is held back until it is found to be that
@@ -75,11 +76,12 @@ class VoxelVotes : public Associator {
   struct Segment {
     InstanceId id = kNoInstance;            // in the frame's segments
     bool is_known = true;                   // not one of Segments::unknown
-    bool is_far_part = false;               // of another, whose id it has
+    bool is_far_part = false;               // of another segment, whose id it has
     std::vector<int> pixels;                // with valid depth, by rows
     std::vector<Eigen::Vector3d> points_W;  // of them, thinned
     std::vector<Votes> votes;               // of objects that got any, by ObjectLookup::ids()
     std::optional<std::size_t> object;      // by ObjectLookup::ids()
+    std::optional<std::size_t> far_from;    // the object whose far part it is, which gets no votes
     std::vector<std::size_t> shared_with;   // objects to be cut off
     InstanceId label = kNoInstance;
   };
@@ -88,6 +90,8 @@ class VoxelVotes : public Associator {
   std::vector<Segment> FindSegments(const Frame& frame, const Segments& segments,
                                     double voxel_m) const;
   void CountVotes(const ObjectLookup& lookup, Segment& segment) const;
+  // Whom it joins, by its votes.
+  void Join(Segment& segment) const;
   void Claim(const ObjectLookup& lookup, std::span<Segment> segments) const;
   void SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
                      double voxel_m, std::vector<Segment>& segments) const;
@@ -99,11 +103,10 @@ class VoxelVotes : public Associator {
   // The objects without a segment.
   static std::vector<InstanceId> UnseenOf(const ObjectLookup& lookup,
                                           const std::vector<Segment>& segments);
+  // Gives the pixels of a claimed segment to those that share it, and takes from an unknown one
+  // what is the background's.
   void Cut(const Frame& frame, const ObjectLookup& lookup, const Segment& segment,
            cv::Mat& labels) const;
-
-  static void LeaveBackground(const Frame& frame, const ObjectLookup& lookup,
-                              const Segment& segment, cv::Mat& labels);
 
   // What is remembered from frame to frame.
   struct State {

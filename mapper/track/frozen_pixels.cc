@@ -6,14 +6,17 @@
 #include <vector>
 
 #include "core/pixel_ray.h"
+#include "mapper/track/block_view.h"
 #include "mapper/track/object_model.h"
 #include "mapper/volume/fusion_kernels.h"
 
 namespace tsdfpp {
 namespace {
 
-// The pixels that the voxels of a block fall on; the whole image where some are beside the camera.
+// The pixels that the voxels of a block fall on; the whole image where it surrounds the camera's
+// own place.
 cv::Rect PixelsOf(const Index3& block, const Pose& T_CL, double voxel_m, const Intrinsics& camera) {
+  if (IsOutOfView(block, T_CL, voxel_m, camera)) return {};
   const cv::Rect image(0, 0, camera.width, camera.height);
   double left = camera.width;
   double top = camera.height;

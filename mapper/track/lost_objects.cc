@@ -164,13 +164,12 @@ LostObjects::Return LostObjects::Find(InstanceId id, const Kept& kept, const Fra
 }
 
 std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
-                                                        std::span<const LoosePixels> segments,
-                                                        std::span<const InstanceId> id_of) {
+                                                        std::span<const Segment> segments) {
   std::vector<Return> returns;
   if (kept_.empty()) return returns;
   std::vector<SegmentLook> looks;
-  for (const LoosePixels& pixels : segments) {
-    looks.push_back(LookAtSegment(frame, pixels, kept_.begin()->second.voxel_m, config_));
+  for (const Segment& segment : segments) {
+    looks.push_back(LookAtSegment(frame, segment.pixels, kept_.begin()->second.voxel_m, config_));
   }
   // Who is like whom, the most alike first.
   struct Pair {
@@ -183,8 +182,8 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
   for (std::size_t s = 0; s < segments.size(); ++s) {
     if (!looks[s].is_large || looks[s].is_at_edge) continue;
     for (const auto& [id, kept] : kept_) {
-      if (id_of[s] != kNoInstance && id_of[s] != id) continue;
-      const bool is_given = id_of[s] == id;
+      if (segments[s].id != kNoInstance && segments[s].id != id) continue;
+      const bool is_given = segments[s].id == id;
       if (!is_given && !IsAlike(looks[s].appearance, kept.appearance, kept.voxel_m)) continue;
       pairs.push_back(
           {is_given ? 2 : ColoursInCommon(looks[s].appearance, kept.appearance), id, s});
@@ -200,7 +199,7 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
   };
   const auto search = [&](Pair& pair) -> const Return& {
     if (!pair.searched) {
-      pair.searched = Find(pair.id, kept_.at(pair.id), frame, segments[pair.segment],
+      pair.searched = Find(pair.id, kept_.at(pair.id), frame, segments[pair.segment].pixels,
                            looks[pair.segment], pair.segment);
     }
     return *pair.searched;
@@ -208,7 +207,7 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
   int searches = 0;
   for (Pair& pair : pairs) {
     const Kept& kept = kept_.at(pair.id);
-    if (kept.is_given_up && id_of[pair.segment] == pair.id) {
+    if (kept.is_given_up && segments[pair.segment].id == pair.id) {
       take({pair.id, pair.segment, kept.T_WO, true});
       continue;
     }
@@ -218,13 +217,15 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
     if (!found.begins_anew) take(found);
   }
   // Of the others, by their looks.
+  std::erase_if(pairs, [&](const Pair& pair) { return !segments[pair.segment].may_begin; });
   std::set<InstanceId> waited;
   for (Pair& pair : pairs) {
     Kept& kept = kept_.at(pair.id);
     if (taken_ids.contains(pair.id) || !waited.insert(pair.id).second) continue;
     ++kept.frames_in_sight;
     const int wait = config_.return_frames * (looks[pair.segment].is_covered ? 2 : 1);
-    if (kept.frames_in_sight <= wait) continue;
+    const int over = kept.frames_in_sight - wait;
+    if (over <= 0 || over % kEvery_frames != 1) continue;
     if (taken_segments.contains(pair.segment)) continue;
     const bool is_clear = std::ranges::none_of(pairs, [&](const Pair& other) {
       const bool is_rival = (other.id == pair.id) != (other.segment == pair.segment);
@@ -260,10 +261,10 @@ std::vector<InstanceId> LostObjects::TakeOut(const std::vector<InstanceId>& foun
     const auto kept = kept_.find(id);
     const bool begins_anew = !ModelOf(map, id);
     // What was given up had its chance.
-    if (begins_anew && !kept->second.is_given_up) {
-      on_trial_.insert_or_assign(id, Trial{std::move(kept->second)});
-    } else {
+    if (kept->second.is_given_up) {
       on_trial_.erase(id);
+    } else if (begins_anew) {
+      on_trial_.insert_or_assign(id, Trial{std::move(kept->second)});
     }
     kept_.erase(kept);
     unsure_[id] = 0;

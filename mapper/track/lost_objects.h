@@ -71,6 +71,12 @@ class LostObjects {
   // whole. To be asked while frame, map and this are as they are.
   Associator::MayBeMissing Awaited(const Frame& frame, const MapRepresentation& map) const;
 
+  // A segment of the frame.
+  struct Segment {
+    LoosePixels pixels;
+    InstanceId id = kNoInstance;  // the kept object that it is, or it is to be found
+    bool may_begin = true;        // a model may begin with it
+  };
   // A segment that is a kept object's.
   struct Return {
     InstanceId id = kNoInstance;
@@ -80,14 +86,12 @@ class LostObjects {
     // frames: the model is to be begun anew, at the best place that there is.
     bool begins_anew = false;
   };
-  // Which of the segments are whose: `id_of` is that of each, or kNoInstance where it is to be
-  // found, too. A segment is an object's where FindModel() is certain of its place. Where it is
-  // not, but the segment looks like the object, and like no other that is missing, the object waits
-  // for return_frames frames in which such a segment is in sight, twice as many where something
-  // covers it. A segment at the picture's edge is left alone. Looks for an object in every third
-  // of these frames.
-  std::vector<Return> FindAgain(const Frame& frame, std::span<const LoosePixels> segments,
-                                std::span<const InstanceId> id_of);
+  // Which of the segments are whose. A segment is an object's where FindModel() is certain of its
+  // place. Where it is not, but the segment may begin a model, and looks like the object and like
+  // no other that is missing, the object waits for return_frames frames in which such a segment is
+  // in sight, twice as many where something covers it. A segment at the picture's edge is left
+  // alone. Looks for an object in every third of these frames.
+  std::vector<Return> FindAgain(const Frame& frame, std::span<const Segment> segments);
 
   // Puts a kept object where it was found, into the map and `T_WO`; one that begins anew into
   // `T_WO` alone. Errors: MapEditing::Add's.

@@ -162,6 +162,9 @@ class Search {
       ++count;
       if (!at.is_observed) {
         cost += kUnobserved;
+      } else if (at.distance_m() < 0) {
+        cost +=
+            std::min(kUnobserved, double{-at.distance_m()} / (kFarthest_voxels * search_.voxel_m));
       } else if (!at.has_slope) {
         cost += 1;  // in what was seen to be free
       } else {
@@ -291,7 +294,9 @@ class Search {
       if (!at.is_observed) continue;
       const double limit_m = config_.inlier_voxels * search_.voxel_m +
                              kNoiseDeviations * config_.Axial_m(points[i].p_C.z());
-      if (!at.has_slope || double{std::abs(at.distance_m())} > limit_m) {
+      // Behind what was seen of it the other side of a thin thing may be.
+      if (double{at.distance_m()} < -limit_m) continue;
+      if (!at.has_slope || double{at.distance_m()} > limit_m) {
         sum -= kWrong;
         continue;
       }

@@ -13,7 +13,7 @@ namespace tsdfpp {
 struct ModelSearch {
   const Frame* frame = nullptr;
   const std::vector<SegmentPoint>* points = nullptr;
-  cv::Mat may_be;  // LookAtModel()'s: the segment, and what belongs to no segment
+  cv::Mat may_be;  // LookAtModel()'s: the segment
   const TsdfGrid* model = nullptr;
   Pose T_WL_last = Pose::Identity();  // where the model's lattice was last
   double voxel_m = 0;
@@ -32,8 +32,9 @@ struct FoundModel {
 // The best of all places that were tried: around the model from all sides, and turned as it was
 // last, registered (sdf_registration.h), first with few points, then those of the best scores with
 // all. A place scores by the segment's points that lie on the model's surface and have its colour,
-// against those that lie in what the model is known not to be, or have another colour, and against
-// surface voxels that the frame shows not to be there. Of places that look the same, as those of a
+// against those that lie in what was seen to be free, or have another colour, and against surface
+// voxels that the frame shows not to be there. Behind a surface nothing was seen: there the other
+// side of a thin thing may be. Of places that look the same, as those of a
 // box or a ball do, it is the one that the object has turned least to since it was last seen.
 // Nothing where the segment has too few points or no place can be registered to. Costs some tens of
 // milliseconds. Deterministic for any number of threads; `config` must be valid.

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/pixel_ray.h"
+#include "mapper/track/block_view.h"
 #include "mapper/track/surface_reader.h"
 #include "mapper/volume/fusion_kernels.h"
 
@@ -62,6 +63,7 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
   const Pose T_CL = frame.T_WC.inverse() * T_WL;
   const Intrinsics& camera = frame.intrinsics;
   for (const auto& entry : model.entries()) {
+    if (IsOutOfView(entry.index, T_CL, voxel_m, camera)) continue;
     ForEachSurfaceVoxel(entry, voxel_m, [&](std::size_t /*place*/, const Index3& voxel) {
       const Eigen::Vector3d p_C = T_CL * (voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z));
       if (const auto pixel = NearestPixel(camera, p_C, 1)) {
@@ -82,6 +84,7 @@ FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId 
   const SurfaceReader reader(model, voxel_m);
   VoxelCube cube;
   for (const auto& entry : model.entries()) {
+    if (IsOutOfView(entry.index, T_CL, voxel_m, camera)) continue;
     ForEachSurfaceVoxel(entry, voxel_m, [&](std::size_t /*place*/, const Index3& voxel) {
       const Eigen::Vector3d p_L = voxel_m * Eigen::Vector3d(voxel.x, voxel.y, voxel.z);
       SurfaceReader::Linear at;

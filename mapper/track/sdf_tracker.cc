@@ -128,19 +128,17 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
   // Its pixels may have waited until now, so that the map has nothing of it.
   if (known == before.end() || !model) {
     turn.status = TrackStatus::kBegun;
-    // One that begins anew is the same object.
+    // A model that is begun anew has a pose already.
+    const Pose T_OC = known == before.end() ? frame.T_WC : known->second.inverse() * frame.T_WC;
+    // It is the same object.
     Memory anew;
     anew.frame = frame.index;
-    anew.centre_L = frame.T_WC * sight.centre_C;
+    anew.centre_O = T_OC * sight.centre_C;
     anew.T_WO_begun = memory.T_WO_begun;
     anew.has_moved = memory.has_moved;
     anew.is_placed = memory.is_placed;
     memory = std::move(anew);
-    if (config_.keyframe_turn_rad > 0) {
-      // A model that is begun anew has a pose already.
-      const Pose T_OC = known == before.end() ? frame.T_WC : known->second.inverse() * frame.T_WC;
-      memory.keyframe = KeyframeOf(sight, T_OC);
-    }
+    if (config_.keyframe_turn_rad > 0) memory.keyframe = KeyframeOf(sight, T_OC);
     return;
   }
   const auto registered = Register(sight, *model, known->second, memory);
@@ -156,8 +154,11 @@ void SdfTracker::Place(InstanceId id, int frame) {
   Memory& memory = memory_[id];
   memory.frame = frame - 1;
   memory.motion_L = Pose::Identity();
-  memory.centre_L.reset();
+  memory.centre_O.reset();
   memory.leaning.reset();
+  // They may be of a model that the object has no more.
+  memory.keyframe.reset();
+  memory.place.reset();
   memory.is_placed = true;
 }
 
@@ -171,7 +172,7 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
   sight.T_WL = model.T_WL;
   sight.T_LO = model.T_WL.inverse() * T_WO;
   // An object from a map's file has no memory yet.
-  if (memory.centre_L) {
+  if (memory.centre_O) {
     const std::int64_t passed = std::int64_t{frame.index} - memory.frame;
     sight.passed = static_cast<int>(std::clamp<std::int64_t>(passed, 1, kMostPassed));
   }
@@ -213,8 +214,8 @@ SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) con
   };
   add_seed(T_LC_stay);
   // As if the same part of it were in sight.
-  if (memory.centre_L) {
-    add_seed(Eigen::Translation3d(*memory.centre_L - expected_L) * task.T_LC_expected);
+  if (memory.centre_O) {
+    add_seed(Eigen::Translation3d(sight.T_LO * *memory.centre_O - expected_L) * task.T_LC_expected);
   }
   return task;
 }
@@ -345,15 +346,16 @@ MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrat
 
 void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found,
                           Memory& memory) const {
-  if (memory.keyframe) {
-    const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
+  const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
+  const auto has_turned = [&] {
     const Eigen::Matrix3d turn = memory.keyframe->T_OC.linear().transpose() * T_OC.linear();
-    if (Eigen::AngleAxisd(turn).angle() > config_.keyframe_turn_rad) {
-      memory.keyframe = KeyframeOf(sight, T_OC);
-    }
+    return Eigen::AngleAxisd(turn).angle() > config_.keyframe_turn_rad;
+  };
+  if (config_.keyframe_turn_rad > 0 && (!memory.keyframe || has_turned())) {
+    memory.keyframe = KeyframeOf(sight, T_OC);
   }
   memory.frame = sight.frame->index;
-  memory.centre_L = found.T_LC * sight.centre_C;
+  memory.centre_O = T_OC * sight.centre_C;
   const Pose motion_L = MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC);
   memory.motion_L = KnownPart(motion_L, found, config_.weak_share);
   if (sight.passed > 1) {

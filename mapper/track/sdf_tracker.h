@@ -51,7 +51,7 @@ class SdfTracker : public Tracker {
   struct Memory {
     int frame = 0;                            // the last at which it was tracked
     Pose motion_L = Pose::Identity();         // a frame: T_WL(before)^-1 * T_WL(after)
-    std::optional<Eigen::Vector3d> centre_L;  // of its segment then
+    std::optional<Eigen::Vector3d> centre_O;  // of its segment then
     std::optional<Keyframe> keyframe;
     std::optional<PlaceUncertainty> place;  // then
     std::optional<Vector6> leaning;         // of what was left at rest: to where it was found

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mapper/pipeline.h"
+#include "mapper/track/lost_objects.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -159,6 +160,58 @@ TEST_F(BegunAnew, OnWhatStaysInSight) {
   EXPECT_EQ(Brick().lost, 1);
   EXPECT_GT(Voxels(), 0U);
   EXPECT_LT(Voxels(), voxels_before_);
+}
+
+// What it began anew on is lost and found again in one frame: it has not been seen the longer.
+TEST(BegunAnewAlone, IsOnTrialWhereItIsLostAndFoundAtOnce) {
+  const Frame frame = FrameOf(1, Shown::kBrick);
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
+  map->SetObjectPose(kBrick, Pose::Identity());
+  map->Fuse(frame, frame.mask);
+  const auto voxels = [&] { return VoxelsOf(*map).ObservedVoxels(kBrick).size(); };
+  const std::size_t before = voxels();
+  LostObjects lost{SdfTrackConfig{}};
+  lost.Keep(kBrick, *map, T_WO.at(kBrick));
+  ASSERT_TRUE(lost.PutBack({kBrick, 0, Pose::Identity(), true}, *map, T_WO));
+  ASSERT_TRUE(lost.TakeOut({kBrick}, *map, T_WO).empty());
+  cv::Mat half = frame.mask.clone();
+  half(cv::Rect(0, 0, half.cols, half.rows * 45 / 100)).setTo(static_cast<double>(kNoInstance));
+  map->Fuse(frame, half);
+  const std::size_t begun = voxels();
+  ASSERT_GT(begun, 0U);
+  ASSERT_LT(begun, before);
+  lost.Keep(kBrick, *map, T_WO.at(kBrick));
+  ASSERT_TRUE(lost.PutBack({kBrick, 0, Pose::Identity(), false}, *map, T_WO));
+  ASSERT_TRUE(lost.TakeOut({kBrick}, *map, T_WO).empty());
+  EXPECT_EQ(voxels(), begun);
+  lost.Keep(kBrick, *map, T_WO.at(kBrick));
+  EXPECT_EQ(lost.TakeOut({}, *map, T_WO), std::vector<InstanceId>{kBrick});
+  ASSERT_TRUE(lost.PutBack({kBrick, 0, Pose::Identity(), false}, *map, T_WO));
+  EXPECT_EQ(voxels(), before);
+}
+
+// A piece of furniture that no network knows may look like it.
+TEST(BegunAnewAlone, IsNotOnWhatMayBeginNothing) {
+  SdfTrackConfig config;
+  const Frame frame = FrameOf(1, Shown::kBrick);
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  map->SetObjectPose(kBrick, Pose::Identity());
+  map->Fuse(frame, frame.mask);
+  const Frame there = FrameOf(kBrickFrames, Shown::kUnknownSide);
+  LostObjects::Segment segment{PixelsByLabel(there.mask, 0).at(kBrick)};
+  for (const bool may_begin : {false, true}) {
+    segment.may_begin = may_begin;
+    LostObjects lost(config);
+    lost.Keep(kBrick, *map, Pose::Identity());
+    std::size_t returns = 0;
+    for (int i = 0; i < 2 * config.return_frames; ++i) {
+      const auto found = lost.FindAgain(there, {&segment, 1});
+      for (const auto& of : found) EXPECT_TRUE(of.begins_anew);
+      returns += found.size();
+    }
+    EXPECT_EQ(returns > 0, may_begin);
+  }
 }
 
 }  // namespace

@@ -62,6 +62,7 @@ class PlainCandidates {
       if (may_begin[s]) candidate.seen.push_back(frame_);
       candidate.points_W = segments_W[s];
       const bool is_confirmed =
+          may_begin[s] &&
           SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames &&
           (!is_held[s] || frame_ >= candidate.first + config_.hold_frames);
       candidacies[s] = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
@@ -167,6 +168,19 @@ TEST(Candidates, AreThoseOfPlainPairs) {
 
 // Time and memory would grow with the square of the segments, which are as many as a frame's masks
 // have ids; those that find no place wait until others have become objects.
+// One that was held, and is there once more in a frame in which its segment may begin nothing.
+TEST(Candidates, AreNotConfirmedByWhatMayBeginNone) {
+  Clouds clouds;
+  const VoteConfig config;
+  const Points points = clouds.Around({0, 0, 1}, 0.05, 2 * config.min_points);
+  Candidates candidates(config, kVoxel_m);
+  for (int i = 0; i < config.confirm_frames + 1; ++i) {
+    EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kWaits) << i;
+  }
+  EXPECT_EQ(candidates.Confirm({points}, {false}, {false}).front(), Candidacy::kWaits);
+  EXPECT_EQ(candidates.Confirm({points}, {true}, {false}).front(), Candidacy::kIsConfirmed);
+}
+
 TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
   constexpr int kSegments = 5000;
   const VoteConfig config;

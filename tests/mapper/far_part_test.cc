@@ -7,6 +7,7 @@
 #include <array>
 #include <iterator>
 #include <map>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "mapper/associate/mask_repair_config.h"
@@ -226,6 +227,29 @@ TEST(FarPart, IsGivenToAnObjectOfTheMap) {
   const Frame frame = frame_of(index);
   const cv::Mat labels = world.Map(frame, {world.ids().Of(MergedMask(frame)), {}, {}});
   ExpectBothHaveTheirs(frame, labels, id_of);
+}
+
+// A little of it got into the object before it was far from anything known; that takes no more.
+TEST(FarPart, DoesNotComeBackThroughWhatOfItIsInTheObject) {
+  // So fine that what gets in is a small share of the brick's surface, and more than a voxel.
+  MapConfig config = ToyConfig();
+  config.voxel_m = kToyVoxel_m / 2;
+  VoteWorld world(Method::kTsdfppAnchored, config, {}, MaskRepairConfig{}.far_share);
+  reference::Scene scene = BrickAlone();
+  AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});
+  for (int i = 0; i < 3 * kConfirmed; ++i) {
+    const Frame frame = View(scene, i);
+    const cv::Moments ball = cv::moments(frame.mask == static_cast<double>(kBall), true);
+    const cv::Rect patch(static_cast<int>(ball.m10 / ball.m00) - 2,
+                         static_cast<int>(ball.m01 / ball.m00) - 2, 5, 5);
+    cv::Mat mask = frame.mask.clone();
+    mask.setTo(static_cast<double>(kNoInstance), mask == static_cast<double>(kBall));
+    mask(patch) = static_cast<double>(kBrick);
+    const cv::Mat labels = world.Map(frame, {world.ids().Of(mask), {}, {}});
+    const int taken = cv::countNonZero(labels(patch) != static_cast<double>(kNoInstance));
+    if (i + 1 < kConfirmed) continue;
+    EXPECT_EQ(taken, i + 1 == kConfirmed ? patch.area() : 0) << i;
+  }
 }
 
 // Of another object that the map knows one part is far, the other near: a mask over all is cut

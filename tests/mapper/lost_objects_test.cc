@@ -262,7 +262,7 @@ TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
   const LoosePixels pixels = PixelsWhere(frame.mask == kBrick);
   const std::map<InstanceId, LoosePixels> shown{{kBrick, pixels}};
   const LoosePixels few(pixels.begin(), pixels.begin() + 10);
-  const InstanceId id_of = kBrick;
+  const LostObjects::Segment segment{pixels, kBrick};
   for (const bool is_registered_once : {false, true}) {
     SCOPED_TRACE(is_registered_once);
     const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
@@ -289,7 +289,7 @@ TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
     lost.GiveUpUnsure(frame, shown, *map, T_WO);
     ASSERT_EQ(lost.Has(kBrick), !is_registered_once);
     if (is_registered_once) continue;
-    const auto returns = lost.FindAgain(frame, {&pixels, 1}, {&id_of, 1});
+    const auto returns = lost.FindAgain(frame, {&segment, 1});
     ASSERT_EQ(returns.size(), 1U);
     EXPECT_TRUE(returns[0].begins_anew);
     EXPECT_EQ(returns[0].T_WO.matrix(), elsewhere.matrix());

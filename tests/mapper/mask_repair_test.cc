@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <set>
+
+#include "core/pixel_ray.h"
 #include "mapper/associate/take_out.h"
 #include "mapper/map_file.h"
 #include "tests/mapper/every_method.h"
@@ -199,10 +202,10 @@ class RepairedWorld {
       : map_(MakeMap(method, ToyConfig())), repair_(config) {}
 
   // `mask` is what is seen of the frame, whose own is the truth.
-  Wrong Map(const Frame& frame, const cv::Mat& mask) {
+  Wrong Map(const Frame& frame, const cv::Mat& mask, const std::set<InstanceId>& unplaced = {}) {
     for (const auto& [id, pose] : frame.T_WO) map_->SetObjectPose(id, pose);
     const cv::Mat outlined = repair_.SetOutlines(frame, mask, map_->config().voxel_m);
-    labels_ = repair_.Repair(frame, outlined, frame.T_WO, *map_);
+    labels_ = repair_.Repair(frame, outlined, frame.T_WO, unplaced, *map_);
     map_->Fuse(frame, labels_);
     Wrong wrong;
     for (int v = 0; v < labels_.rows; ++v) {
@@ -307,45 +310,56 @@ TEST_P(MaskRepairOfMethod, MapsAreTheSameForAnyNumberOfThreads) {
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(cv::countNonZero(all[i] != alone[i]), 0);
 }
 
-class MaskRepairOfVolumes : public MaskRepairOfMethod {};
-TSDFPP_FOR_METHODS(MaskRepairOfVolumes,
-                   (std::vector<Method>{Method::kTsdfpp, Method::kTsdfppAnchored,
-                                        Method::kVolumes}));
-
-// A piece of the table that the first frames give to the ball is the table's once others say so.
-TEST_P(MaskRepairOfVolumes, WhatWasFusedUnderAWrongLabelIsTakenOut) {
-  const auto with_piece = [](const Frame& frame) {
+// A piece of the table is given to the ball in the first frames, and to the table in later ones.
+class MaskRepairOfVolumes : public MaskRepairOfMethod {
+ protected:
+  static cv::Mat WithPiece(const Frame& frame) {
     cv::Mat mask = frame.mask.clone();
     for (int v = 0; v < mask.rows; ++v) {
       for (int u = 0; u < mask.cols; ++u) {
-        if (mask.at<InstanceId>(v, u) != kBackground ||
-            !IsValidDepth(frame.depth.at<float>(v, u))) {
-          continue;
-        }
-        const double z = frame.depth.at<float>(v, u);
-        const Intrinsics& k = frame.intrinsics;
-        const Eigen::Vector3d p_W =
-            frame.T_WC * Eigen::Vector3d((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
-        const Eigen::Vector3d p_B = frame.T_WO.at(kBall).inverse() * p_W;
+        const float depth_m = frame.depth.at<float>(v, u);
+        if (mask.at<InstanceId>(v, u) != kBackground || !IsValidDepth(depth_m)) continue;
+        const Eigen::Vector3d p_C = double{depth_m} * PixelRay(frame.intrinsics, u, v);
+        const Eigen::Vector3d p_B = frame.T_WO.at(kBall).inverse() * (frame.T_WC * p_C);
         if (p_B.head<2>().norm() < 0.12) mask.at<InstanceId>(v, u) = kBall;
       }
     }
     return mask;
-  };
-  const auto beside = [this] {  // vertices of the ball's mesh that are not the ball's
+  }
+  // Vertices of the ball's mesh that are not the ball's.
+  int Beside() const {
     int count = 0;
     const Pose T_BW = StillFrame(0).T_WO.at(kBall).inverse();
     for (const auto& vertex : world_.map().ObjectMesh(kBall).vertices) {
       count += (T_BW * vertex.template cast<double>()).norm() > 0.055 + kToyVoxel_m ? 1 : 0;
     }
     return count;
-  };
-  for (int i = 0; i < kKnown; ++i) world_.Map(StillFrame(i), with_piece(StillFrame(i)));
-  const int at_first = beside();
+  }
+  void LearnWithPiece() {
+    for (int i = 0; i < kKnown; ++i) world_.Map(StillFrame(i), WithPiece(StillFrame(i)));
+  }
+};
+TSDFPP_FOR_METHODS(MaskRepairOfVolumes,
+                   (std::vector<Method>{Method::kTsdfpp, Method::kTsdfppAnchored,
+                                        Method::kVolumes}));
+
+TEST_P(MaskRepairOfVolumes, WhatWasFusedUnderAWrongLabelIsTakenOut) {
+  LearnWithPiece();
+  const int at_first = Beside();
   EXPECT_GT(at_first, 20);
   for (int i = kKnown; i < 4 * kKnown; ++i) world_.Map(StillFrame(i));
-  EXPECT_LT(beside(), at_first / 4);
+  EXPECT_LT(Beside(), at_first / 4);
   EXPECT_EQ(VoxelsOf(world_.map()).FindFault(), std::nullopt);
+}
+
+// What is there need not be where the object is, so it says nothing of the object.
+TEST_P(MaskRepairOfVolumes, NothingIsTakenOutOfWhatIsNotKnownToBeThere) {
+  LearnWithPiece();
+  const auto at_first = VoxelsOf(world_.map()).ObservedVoxels(kBall).size();
+  for (int i = kKnown; i < 3 * kKnown; ++i) {
+    world_.Map(StillFrame(i), With(StillFrame(i).mask, kBall, kBackground), {kBall});
+  }
+  EXPECT_GE(VoxelsOf(world_.map()).ObservedVoxels(kBall).size(), at_first);
 }
 
 // --- Settings ----------------------------------------------------------------------------------

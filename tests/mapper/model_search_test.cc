@@ -53,6 +53,7 @@ TEST_P(ModelSearchTest, FindsWhatMovedWithoutATurn) {
   const Pose moved = T_WL * model->T_WL.inverse();
   EXPECT_LT((moved * kBefore - after).norm(), kMost_voxels * kToyVoxel_m);
   EXPECT_LT(Eigen::AngleAxisd(moved.linear()).angle(), kMost_deg * kDegree);
+  EXPECT_EQ(IsCertain(*found), GetParam() != 60);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sides, ModelSearchTest, testing::Values(20, 40, 60, 280, 320, 340));

@@ -9,6 +9,7 @@
 #include "core/units.h"
 #include "mapper/pipeline.h"
 #include "mapper/voxel_inspection.h"
+#include "tests/mapper/every_method.h"
 #include "tests/mapper/noisy_toys.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -303,6 +304,27 @@ TEST(SdfTracker, BeginsAnObjectOnceItIsLargeEnough) {
   EXPECT_TRUE(VoxelsOf(pipeline.map()).ObservedVoxels(kBrick).empty());
   ASSERT_TRUE(pipeline.Process(MovingToys(2)));
   EXPECT_EQ(pipeline.trajectories().at(kBrick).at(2).matrix(), Pose::Identity().matrix());
+}
+
+// An object that began anew somewhere, and is then put back with the model that it had: what was
+// seen of the other one says nothing of this.
+TEST(SdfTracker, ForgetsAnotherModelWhereAnObjectIsPlaced) {
+  constexpr int kPlaced = 8;
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  for (int i = 1; i <= 4; ++i) SetPosesThenFuse(*map, MovingToys(i));
+  SdfTracker tracker(SdfTrackConfig{});
+  const Frame begun = MovingToys(4);
+  const auto nothing = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  Pose elsewhere = begun.T_WO.at(kBrick);
+  elsewhere.translation().x() += 2 * kToyVoxel_m;
+  const auto first = tracker.Track(begun, begun.mask, *nothing, {{kBrick, elsewhere}});
+  ASSERT_EQ(first.seen.at(kBrick), TrackStatus::kBegun);
+  const Frame frame = MovingToys(kPlaced);
+  tracker.Place(kBrick, kPlaced);
+  const auto found = tracker.Track(frame, frame.mask, *map, {{kBrick, begun.T_WO.at(kBrick)}});
+  ASSERT_EQ(found.seen.at(kBrick), TrackStatus::kTracked);
+  EXPECT_LT((found.T_WO.at(kBrick).translation() - frame.T_WO.at(kBrick).translation()).norm(),
+            kPixel_voxels * kToyVoxel_m);
 }
 
 TEST(SdfTracker, TellsAnObjectFromItsTwinBesideIt) {

@@ -132,6 +132,46 @@ TEST(UnknownSegments, WhereAnObjectWasAreNotIt) {
   EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1}));
 }
 
+// One segment of two toys, and of the table at their feet, which it is cut from as well.
+TEST(UnknownSegments, OfTwoToysAreCutFromTheTableToo) {
+  constexpr InstanceId kBoth = 77;
+  constexpr int kAround_px = 2;
+  constexpr double kMostTaken = 0.02;  // of the table's pixels: one where it meets a toy
+  ToyVotes world;
+  const auto frame_of = [](int index) {
+    reference::Scene scene = TableOnly();
+    AddBrick(scene, 0, {-0.06, 0, kTableTop_m + 0.045});
+    AddBall(scene, {0.1, 0, kTableTop_m + 0.055});
+    return RenderToys(scene, 0.3 + 0.02 * index, index);
+  };
+  int index = 0;
+  for (; index < 6; ++index) world.Map(frame_of(index));
+  const Frame frame = frame_of(index);
+  cv::Mat toys = frame.mask != 0;
+  cv::Mat around(toys.size(), CV_8UC1, cv::Scalar(0));
+  for (int v = kAround_px; v < toys.rows - kAround_px; ++v) {
+    for (int u = kAround_px; u < toys.cols - kAround_px; ++u) {
+      const cv::Rect beside(u - kAround_px, v - kAround_px, 2 * kAround_px + 1, 2 * kAround_px + 1);
+      if (cv::countNonZero(toys(beside)) > 0) around.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  cv::Mat segments(frame.mask.size(), CV_16UC1, cv::Scalar(0));
+  segments.setTo(static_cast<double>(kBoth), around);
+  const cv::Mat labels = world.Map(frame, {segments, {}, {kBoth}});
+  const cv::Mat ids = IdsOf(world, labels);
+  const cv::Mat of_table = (frame.mask == 0) & (segments != 0) & (frame.depth > 0);
+  ASSERT_GT(cv::countNonZero(of_table), 100);
+  EXPECT_LE(cv::countNonZero(of_table & (labels != static_cast<double>(kNoInstance))),
+            kMostTaken * cv::countNonZero(of_table));
+  for (const InstanceId toy : {kBrick, kBall}) {
+    const int pixels = CountOf(frame.mask, toy);
+    EXPECT_GT(cv::countNonZero((frame.mask == static_cast<double>(toy)) &
+                               (ids == static_cast<double>(toy))),
+              pixels * 9 / 10)
+        << toy;
+  }
+}
+
 // A network that finds a thing in every second frame: what waits to be an object is not fused
 // between, nor do those frames count.
 TEST(UnknownSegments, OfACandidateWaitWithIt) {
