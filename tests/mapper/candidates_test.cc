@@ -187,8 +187,10 @@ TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
   Clouds clouds;
   Candidates candidates(config, kVoxel_m);
   std::vector<Points> segments_W;
+  segments_W.reserve(kSegments);
   for (int s = 0; s < kSegments; ++s) {
-    segments_W.push_back(clouds.Around(Eigen::Vector3d(s % 100, s / 100, 1), 0.02, 50));
+    const int row = s / 100;
+    segments_W.push_back(clouds.Around(Eigen::Vector3d(s % 100, row, 1), 0.02, 50));
   }
   std::size_t confirmed = 0;
   int frames = 0;
