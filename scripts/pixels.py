@@ -8,7 +8,8 @@ votes, objects tracked; beside it the same with the true masks.
 Runs `tsdfpp compare` twice a scene and writes OUT/pixels.csv, a row a scene, of tsdf++/anchored at the examined frame:
 true objects that were found, of how many, those of which the map has anything at the end, and its objects that are nobody's;
 the hidden table kept and the completion of the moving objects, from pixels and with true masks; the greatest unaligned ATE and
-rotation error of the objects that moved, in the frames in which the map had them. --mask-repair on repairs the masks from pixels (docs/segmentation.md, Wrong masks), not the true ones.
+rotation error of the objects that moved, in the frames in which the map had them. --mask-repair on repairs the masks from
+pixels (docs/segmentation.md, Wrong masks), not the true ones.
 """
 import argparse
 import csv

@@ -34,10 +34,10 @@ struct FoundModel {
 // all. A place scores by the segment's points that lie on the model's surface and have its colour,
 // against those that lie in what was seen to be free, or have another colour, and against surface
 // voxels that the frame shows not to be there. Behind a surface nothing was seen: there the other
-// side of a thin thing may be. Of places that look the same, as those of a
-// box or a ball do, it is the one that the object has turned least to since it was last seen.
-// Nothing where the segment has too few points or no place can be registered to. Costs some tens of
-// milliseconds. Deterministic for any number of threads; `config` must be valid.
+// side of a thin thing may be. Of places that look the same, as those of a box or a ball do, it is
+// the one that the object has turned least to since it was last seen. Nothing where the segment has
+// too few points or no place can be registered to. Costs some tens of milliseconds. Deterministic
+// for any number of threads; `config` must be valid.
 std::optional<FoundModel> FindModel(const ModelSearch& search, const SdfTrackConfig& config);
 
 // Whether the best place may be taken for the right one: enough speaks for it, and clearly more

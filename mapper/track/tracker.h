@@ -44,8 +44,8 @@ class Tracker {
   virtual TrackedPoses Track(const Frame& frame, const cv::Mat& labels,
                              const MapRepresentation& map, const ObjectPoses& before) = 0;
 
-  // Called before Track() where an object was put where it is in that frame, by others: how it
-  // moved before says nothing any more.
+  // Called before Track() where an object was put where it is in that frame, by others, perhaps
+  // with another model: how it moved before, and how it was seen, says nothing any more.
   virtual void Place(InstanceId /*id*/, int /*frame*/) {}
 };
 

@@ -166,8 +166,6 @@ TEST(Candidates, AreThoseOfPlainPairs) {
   }
 }
 
-// Time and memory would grow with the square of the segments, which are as many as a frame's masks
-// have ids; those that find no place wait until others have become objects.
 // One that was held, and is there once more in a frame in which its segment may begin nothing.
 TEST(Candidates, AreNotConfirmedByWhatMayBeginNone) {
   Clouds clouds;
@@ -181,6 +179,8 @@ TEST(Candidates, AreNotConfirmedByWhatMayBeginNone) {
   EXPECT_EQ(candidates.Confirm({points}, {true}, {false}).front(), Candidacy::kIsConfirmed);
 }
 
+// Time and memory would grow with the square of the segments, which are as many as a frame's masks
+// have ids; those that find no place wait until others have become objects.
 TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
   constexpr int kSegments = 5000;
   const VoteConfig config;
