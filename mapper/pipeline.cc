@@ -250,7 +250,7 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   for (const LostObjects::Return& of : returns) {
     if (!lost_->PutBack(of, *map_, T_WO_)) continue;
     associator_->Found(of.id);
-    tracker_->Place(of.id, frame.index);
+    tracker_->Place(of.id, frame.index, of.model);
     found.push_back(of.id);
     for (const int pixel : segments[of.segment].pixels) {
       labels.at<InstanceId>(pixel / labels.cols, pixel % labels.cols) = of.id;

@@ -154,8 +154,9 @@ LostObjects::Return LostObjects::Find(InstanceId id, const Kept& kept, const Fra
     const ModelSearch search{&frame,       &look.points, MaskOf(pixels, frame.depth.size()),
                              &kept.volume, kept.T_WL,    kept.voxel_m};
     if (const auto found = FindModel(search, config_)) {
+      const bool is_certain = IsCertain(*found);
       return {id, segment, frame.T_WC * found->T_LC.inverse() * kept.T_WL.inverse() * kept.T_WO,
-              !IsCertain(*found)};
+              !is_certain, is_certain ? kept.model : PlacedModel::kOther};
     }
   }
   const Eigen::Vector3d way_W =
@@ -310,6 +311,7 @@ void LostObjects::KeepAsItWas(InstanceId id, const Kept& kept) {
   entry->second.is_in_map = false;
   entry->second.is_missing = true;
   entry->second.frames_in_sight = 0;
+  entry->second.model = PlacedModel::kOther;
 }
 
 std::vector<InstanceId> LostObjects::TakeBack(const std::map<InstanceId, TrackStatus>& seen,

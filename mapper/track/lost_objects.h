@@ -85,6 +85,7 @@ class LostObjects {
     // Nothing says where the segment is on the model, but it has been there for return_frames
     // frames: the model is to be begun anew, at the best place that there is.
     bool begins_anew = false;
+    PlacedModel model = PlacedModel::kOther;
   };
   // Which of the segments are whose. A segment is an object's where FindModel() is certain of its
   // place. Where it is not, but the segment may begin a model, and looks like the object and like
@@ -108,6 +109,7 @@ class LostObjects {
     int frames_in_sight = 0;   // in which something was that may be it
     bool is_given_up = false;  // the model is
     bool is_missing = true;
+    PlacedModel model = PlacedModel::kSame;  // that it has here, once it is put back
   };
   // Begins anew where it is not certain; where nothing is found, too, turned as it was last.
   Return Find(InstanceId id, const Kept& kept, const Frame& frame, const LoosePixels& pixels,

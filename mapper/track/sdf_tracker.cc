@@ -150,15 +150,14 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
   turn.moved_to = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
 }
 
-void SdfTracker::Place(InstanceId id, int frame) {
+void SdfTracker::Place(InstanceId id, int frame, PlacedModel model) {
   Memory& memory = memory_[id];
   memory.frame = frame - 1;
   memory.motion_L = Pose::Identity();
   memory.centre_O.reset();
   memory.leaning.reset();
-  // They may be of a model that the object has no more.
-  memory.keyframe.reset();
   memory.place.reset();
+  if (model == PlacedModel::kOther) memory.keyframe.reset();
   memory.is_placed = true;
 }
 

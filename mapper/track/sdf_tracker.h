@@ -35,7 +35,7 @@ class SdfTracker : public Tracker {
   TrackedPoses Track(const Frame& frame, const cv::Mat& labels, const MapRepresentation& map,
                      const ObjectPoses& before) override;
 
-  void Place(InstanceId id, int frame) override;
+  void Place(InstanceId id, int frame, PlacedModel model) override;
 
  private:
   // A segment whose place on the object is known: how far off it is when it is registered to the

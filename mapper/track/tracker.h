@@ -34,6 +34,12 @@ struct TrackedPoses {
   std::vector<InstanceId> moved{};
 };
 
+// The model of an object that is put somewhere.
+enum class PlacedModel {
+  kSame,   // the one that it was tracked by last
+  kOther,  // perhaps not
+};
+
 class Tracker {
  public:
   virtual ~Tracker() = default;
@@ -44,9 +50,9 @@ class Tracker {
   virtual TrackedPoses Track(const Frame& frame, const cv::Mat& labels,
                              const MapRepresentation& map, const ObjectPoses& before) = 0;
 
-  // Called before Track() where an object was put where it is in that frame, by others, perhaps
-  // with another model: how it moved before, and how it was seen, says nothing any more.
-  virtual void Place(InstanceId /*id*/, int /*frame*/) {}
+  // Called before Track() where an object was put where it is in that frame, by others: how it
+  // moved before says nothing any more, and how it was seen only of the model that it has.
+  virtual void Place(InstanceId /*id*/, int /*frame*/, PlacedModel /*model*/) {}
 };
 
 enum class PoseSource {

@@ -307,24 +307,28 @@ TEST(SdfTracker, BeginsAnObjectOnceItIsLargeEnough) {
 }
 
 // An object that began anew somewhere, and is then put back with the model that it had: what was
-// seen of the other one says nothing of this.
+// seen of the other one says nothing of this, and would draw it away.
 TEST(SdfTracker, ForgetsAnotherModelWhereAnObjectIsPlaced) {
   constexpr int kPlaced = 8;
   const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
   for (int i = 1; i <= 4; ++i) SetPosesThenFuse(*map, MovingToys(i));
-  SdfTracker tracker(SdfTrackConfig{});
   const Frame begun = MovingToys(4);
   const auto nothing = MakeMap(Method::kTsdfppAnchored, ToyConfig());
   Pose elsewhere = begun.T_WO.at(kBrick);
   elsewhere.translation().x() += 2 * kToyVoxel_m;
-  const auto first = tracker.Track(begun, begun.mask, *nothing, {{kBrick, elsewhere}});
-  ASSERT_EQ(first.seen.at(kBrick), TrackStatus::kBegun);
   const Frame frame = MovingToys(kPlaced);
-  tracker.Place(kBrick, kPlaced);
-  const auto found = tracker.Track(frame, frame.mask, *map, {{kBrick, begun.T_WO.at(kBrick)}});
-  ASSERT_EQ(found.seen.at(kBrick), TrackStatus::kTracked);
-  EXPECT_LT((found.T_WO.at(kBrick).translation() - frame.T_WO.at(kBrick).translation()).norm(),
-            kPixel_voxels * kToyVoxel_m);
+  const auto off_voxels = [&](PlacedModel model) {
+    SdfTracker tracker(SdfTrackConfig{});
+    const auto first = tracker.Track(begun, begun.mask, *nothing, {{kBrick, elsewhere}});
+    EXPECT_EQ(first.seen.at(kBrick), TrackStatus::kBegun);
+    tracker.Place(kBrick, kPlaced, model);
+    const auto found = tracker.Track(frame, frame.mask, *map, {{kBrick, begun.T_WO.at(kBrick)}});
+    EXPECT_EQ(found.seen.at(kBrick), TrackStatus::kTracked);
+    const Pose& T_WO = found.T_WO.at(kBrick);
+    return (T_WO.translation() - frame.T_WO.at(kBrick).translation()).norm() / kToyVoxel_m;
+  };
+  EXPECT_LT(off_voxels(PlacedModel::kOther), kPixel_voxels);
+  EXPECT_GT(off_voxels(PlacedModel::kSame), kPixel_voxels) << "what was seen of its model counts";
 }
 
 TEST(SdfTracker, TellsAnObjectFromItsTwinBesideIt) {
