@@ -62,11 +62,8 @@ std::unique_ptr<Associator> MakeAssociator(
   switch (config.associate) {
     case AssociationMode::kGiven:
       return std::make_unique<GivenIds>();
-    case AssociationMode::kVotes: {
-      const bool repairs = config.mask_repair == MaskRepairMode::kOn;
-      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories),
-                                          repairs ? config.repair.far_share : 0);
-    }
+    case AssociationMode::kVotes:
+      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories));
   }
   std::abort();
 }

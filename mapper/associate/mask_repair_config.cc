@@ -45,7 +45,6 @@ Expected<void> MaskRepairConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckRepair("cell_voxels", cell_voxels, 0.5, 100));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("forget_frames", forget_frames, 1, 1'000'000));
-  TSDFPP_RETURN_IF_ERROR(CheckRepair("far_share", far_share, 0, 100));
   return {};
 }
 
@@ -59,8 +58,7 @@ Expected<MaskRepairConfig> MaskRepairConfig::FromToml(const toml::table& table,
       .Get("own_factor", config.own_factor)
       .Get("cell_voxels", config.cell_voxels)
       .Get("confirm_frames", config.confirm_frames)
-      .Get("forget_frames", config.forget_frames)
-      .Get("far_share", config.far_share);
+      .Get("forget_frames", config.forget_frames);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);

@@ -31,11 +31,6 @@ struct MaskRepairConfig {
   double cell_voxels = 2;     // new surface is counted in cells of this side
   int confirm_frames = 4;     // and fused where a label was seen in a cell in so many frames
   int forget_frames = 30;     // a cell that no frame showed for longer counts from 0 again
-  // Of association by votes: a part of a segment is not of the object that it joins if it is
-  // farther outside of the box around all that is known of the object than so much of the box's
-  // diagonal (and than VoteConfig::near_voxels), and nothing hides what is between (far_part.h);
-  // 0: the segment is taken as it is.
-  double far_share = 0.15;
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

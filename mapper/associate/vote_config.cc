@@ -25,6 +25,7 @@ Expected<void> VoteConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_window", confirm_window, confirm_frames, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("hold_frames", hold_frames, 0, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("far_share", far_share, 0, 100));
   return {};
 }
 
@@ -41,7 +42,8 @@ Expected<VoteConfig> VoteConfig::FromToml(const toml::table& table, const std::s
       .Get("min_points", config.min_points)
       .Get("confirm_frames", config.confirm_frames)
       .Get("confirm_window", config.confirm_window)
-      .Get("hold_frames", config.hold_frames);
+      .Get("hold_frames", config.hold_frames)
+      .Get("far_share", config.far_share);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
     return UsageError("{}: {}", where, valid.error().message);
@@ -55,7 +57,7 @@ toml::table VoteConfig::ToToml() const {
                      {"near_share", near_share},         {"recent_frames", recent_frames},
                      {"max_points", max_points},         {"min_points", min_points},
                      {"confirm_frames", confirm_frames}, {"confirm_window", confirm_window},
-                     {"hold_frames", hold_frames}};
+                     {"hold_frames", hold_frames},       {"far_share", far_share}};
 }
 
 }  // namespace tsdfpp

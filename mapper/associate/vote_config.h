@@ -20,6 +20,10 @@ struct VoteConfig {
   int confirm_frames = 3;   // it becomes one where it was there in so many frames ...
   int confirm_window = 5;   // ... of so many
   int hold_frames = 45;     // what may be a missing object is held back for so long at most
+  // A part of a segment is not of the object that it joins if it is farther outside of the box
+  // around all that is known of the object than so much of the box's diagonal (and than
+  // near_voxels), and nothing hides what is between (far_part.h); 0: the segment is taken as it is.
+  double far_share = 0.15;
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

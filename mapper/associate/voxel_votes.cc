@@ -45,8 +45,7 @@ bool IsShare(int count, double share, std::size_t of) {
 
 }  // namespace
 
-VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id, double far_share)
-    : config_(config), far_share_(far_share) {
+VoxelVotes::VoxelVotes(const VoteConfig& config, InstanceId first_id) : config_(config) {
   state_.next_id = first_id;
 }
 
@@ -148,8 +147,8 @@ void VoxelVotes::Claim(const ObjectLookup& lookup, std::span<Segment> segments) 
 
 void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
                                double voxel_m, std::vector<Segment>& segments) const {
-  if (far_share_ == 0) return;
-  const FarPartConfig config{.share = far_share_,
+  if (config_.far_share == 0) return;
+  const FarPartConfig config{.share = config_.far_share,
                              .least_m = config_.near_voxels * voxel_m,
                              .step_m = std::max(FarPartConfig{}.step_m, kStep_voxels * voxel_m),
                              .least_pixels = config_.min_points};

@@ -16,9 +16,9 @@ namespace tsdfpp {
 
 class VoxelVotes : public Associator {
  public:
-  // New objects get ids from `first_id` on, above all that the map has had. `far_share` is
-  // MaskRepairConfig's, or 0 where masks are not repaired. The config must be valid.
-  explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1, double far_share = 0);
+  // New objects get ids from `first_id` on, above all that the map has had. The config
+  // must be valid.
+  explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1);
 
   // In this order:
   //  1. *Votes.* Each point of a segment (a pixel with valid depth, taken through the camera's
@@ -118,7 +118,6 @@ class VoxelVotes : public Associator {
   };
 
   VoteConfig config_;
-  double far_share_ = 0;
   MayBeMissing may_be_missing_;
   State state_;  // after the frame accepted last
   State next_;   // after the frame associated last

@@ -58,11 +58,7 @@ Expected<Tally> Associate(const std::string& scene, int last_frame) {
   TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(config, options));
   MapConfig map;
   TSDFPP_RETURN_IF_ERROR(map.SetProfile("close"));
-  // By default as the pipeline has it where masks are not repaired: of true masks parts would be
-  // left out.
-  const char* far_share = std::getenv("TSDFPP_FAR_SHARE");
-  VoteWorld world(Method::kTsdfppAnchored, map, {},
-                  far_share == nullptr ? 0 : std::atof(far_share));
+  VoteWorld world(Method::kTsdfppAnchored, map);
   Tally tally;
   const int last = std::min(last_frame, source->info().frame_count);
   for (int index = 1; index <= last; ++index) {

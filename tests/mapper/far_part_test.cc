@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "mapper/associate/mask_repair_config.h"
+#include "mapper/associate/vote_config.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/toy_votes.h"
 
@@ -179,7 +179,9 @@ TEST_P(FarPartOfMethod, IsMeasuredFromTheBoxOfTheSurface) {
 TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
   constexpr int kAlone = 10;
   const auto map_all = [](int frames, double far_share) {
-    VoteWorld world(Method::kTsdfppAnchored, ToyConfig(), {}, far_share);
+    VoteConfig votes;
+    votes.far_share = far_share;
+    VoteWorld world(Method::kTsdfppAnchored, ToyConfig(), votes);
     for (int i = 0; i < frames; ++i) {
       reference::Scene scene = BrickAlone();
       if (i > 3) AddBall(scene, {-0.2, 0.05 + 0.015 * (i - 4), kTableTop_m + 0.055});
@@ -190,7 +192,7 @@ TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
     const ObjectLookup lookup(world.map());
     return std::pair(world.map().Objects(), lookup.BoxOfSurface(0).box_L.sizes().maxCoeff());
   };
-  const double far_share = MaskRepairConfig{}.far_share;
+  const double far_share = VoteConfig{}.far_share;
   const auto [objects, length_m] = map_all(kAlone, far_share);
   EXPECT_EQ(objects, (std::vector<InstanceId>{0, 1}));
   EXPECT_LT(length_m, 0.15 + 3 * kToyVoxel_m);
@@ -214,7 +216,7 @@ void ExpectBothHaveTheirs(const Frame& frame, const cv::Mat& labels,
 
 // Nor is it nobody's where the map has the object that it is of.
 TEST(FarPart, IsGivenToAnObjectOfTheMap) {
-  ToyVotes world(Method::kTsdfppAnchored, MaskRepairConfig{}.far_share);
+  ToyVotes world;
   const auto frame_of = [](int index) {
     reference::Scene scene = BrickAlone();
     AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});
@@ -234,7 +236,7 @@ TEST(FarPart, DoesNotComeBackThroughWhatOfItIsInTheObject) {
   // So fine that what gets in is a small share of the brick's surface, and more than a voxel.
   MapConfig config = ToyConfig();
   config.voxel_m = kToyVoxel_m / 2;
-  VoteWorld world(Method::kTsdfppAnchored, config, {}, MaskRepairConfig{}.far_share);
+  VoteWorld world(Method::kTsdfppAnchored, config);
   reference::Scene scene = BrickAlone();
   AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});
   for (int i = 0; i < 3 * kConfirmed; ++i) {
@@ -255,7 +257,7 @@ TEST(FarPart, DoesNotComeBackThroughWhatOfItIsInTheObject) {
 // Of another object that the map knows one part is far, the other near: a mask over all is cut
 // between the two objects.
 TEST(FarPart, DoesNotKeepTheRestFromBeingCut) {
-  ToyVotes world(Method::kTsdfppAnchored, MaskRepairConfig{}.far_share);
+  ToyVotes world;
   const auto frame_of = [](int index) {
     reference::Scene scene = BrickAlone();
     AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});

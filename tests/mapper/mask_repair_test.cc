@@ -373,7 +373,6 @@ TEST(MaskRepairConfig, ReadsWhatItWrites) {
   config.cell_voxels = 4;
   config.confirm_frames = 2;
   config.forget_frames = 7;
-  config.far_share = 0.3;
   const auto read = MaskRepairConfig::FromToml(config.ToToml(), "t.toml");
   ASSERT_TRUE(read.has_value()) << read.error().message;
   EXPECT_EQ(*read, config);
@@ -382,11 +381,11 @@ TEST(MaskRepairConfig, ReadsWhatItWrites) {
 
 TEST(MaskRepairConfig, RefusesWhatItCannotDo) {
   const std::vector<std::pair<std::string, std::string>> wrong{
-      {"keep_voxels = 0", "keep_voxels"},     {"take_voxels = 1.1", "take_voxels"},
-      {"sigma_voxels = nan", "sigma_voxels"}, {"own_factor = 0.5", "own_factor"},
-      {"cell_voxels = 0", "cell_voxels"},     {"confirm_frames = 0", "confirm_frames"},
-      {"forget_frames = 0", "forget_frames"}, {"forget = 3", "forget"},
-      {"far_share = -0.1", "far_share"},      {"confirm_frames = 'four'", "confirm_frames"}};
+      {"keep_voxels = 0", "keep_voxels"},           {"take_voxels = 1.1", "take_voxels"},
+      {"sigma_voxels = nan", "sigma_voxels"},       {"own_factor = 0.5", "own_factor"},
+      {"cell_voxels = 0", "cell_voxels"},           {"confirm_frames = 0", "confirm_frames"},
+      {"forget_frames = 0", "forget_frames"},       {"forget = 3", "forget"},
+      {"confirm_frames = 'four'", "confirm_frames"}};
   for (const auto& [text, named] : wrong) {
     const auto config = MaskRepairConfig::FromToml(toml::parse(text), "t.toml");
     ASSERT_FALSE(config.has_value()) << text;

@@ -11,8 +11,7 @@ inline constexpr int kConfirmed = 3;
 
 class ToyVotes : public VoteWorld {
  public:
-  explicit ToyVotes(Method method = Method::kTsdfppAnchored, double far_share = 0)
-      : VoteWorld(method, ToyConfig(), {}, far_share) {}
+  explicit ToyVotes(Method method = Method::kTsdfppAnchored) : VoteWorld(method, ToyConfig()) {}
 };
 
 inline int CountOf(const cv::Mat& labels, InstanceId id) {

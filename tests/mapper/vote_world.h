@@ -45,8 +45,8 @@ class DrawnIds {
 
 class VoteWorld {
  public:
-  VoteWorld(Method method, const MapConfig& map, const VoteConfig& votes = {}, double far_share = 0)
-      : map_(MakeMap(method, map)), votes_(votes, 1, far_share) {}
+  VoteWorld(Method method, const MapConfig& map, const VoteConfig& votes = {})
+      : map_(MakeMap(method, map)), votes_(votes) {}
 
   // Associates the frame's segments with the map and fuses it. An object of the map moves as the
   // true one does of which most of its pixels were when it was born.

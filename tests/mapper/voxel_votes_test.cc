@@ -338,7 +338,7 @@ TEST(VoxelVotes, ClassesGoToTheObjects) {
 }
 
 TEST(VoteConfig, SurvivesToml) {
-  const VoteConfig config{1.25, 0.25, 0.15, 4, 0.6, 2, 1000, 40, 2, 4, 30};
+  const VoteConfig config{1.25, 0.25, 0.15, 4, 0.6, 2, 1000, 40, 2, 4, 30, 0.3};
   const auto read = VoteConfig::FromToml(config.ToToml(), "t.toml");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(*read, config);
