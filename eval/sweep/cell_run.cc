@@ -76,7 +76,7 @@ namespace {
 // A cell while its frames go by.
 struct CellRun {
   Sabotage sabotage;
-  CellMapper mapper;
+  std::size_t mapper;  // which
   LastSeenStores last_seen;
   CellResult result;
 };
@@ -90,9 +90,9 @@ struct TruthNow {
   std::set<InstanceId> movers;
 };
 
-Expected<void> EvaluateCell(CellRun& run, int index, const TruthNow& now) {
-  run.mapper.SettleIds();
-  SceneMeshes meshes = run.mapper.Meshes(now.movers);
+// `meshes` are the mapper's.
+Expected<void> EvaluateCell(CellRun& run, const CellMapper& mapper, SceneMeshes meshes, int index,
+                            const TruthNow& now) {
   SabotageMeshes(run.sabotage, meshes);
   std::optional<SceneTruth> visible;
   if (run.sabotage == Sabotage::kVisibleOnly) {
@@ -101,8 +101,8 @@ Expected<void> EvaluateCell(CellRun& run, int index, const TruthNow& now) {
   CellFrame frame{index, index == now.variant.examined, {}, MeshDigest(meshes.scene)};
   const Evaluation evaluation =
       EvaluateMeshes(std::move(meshes), visible ? *visible : now.truth, now.names, now.movers,
-                     run.mapper.voxel_m(), run.last_seen);
-  std::vector<Measured> values = MeasureAll(evaluation, now.movers, run.mapper.costs());
+                     mapper.voxel_m(), run.last_seen);
+  std::vector<Measured> values = MeasureAll(evaluation, now.movers, mapper.costs());
   if (frame.examined) {
     run.result.examined = values;
     run.result.evaluation = ToJson(evaluation);
@@ -115,9 +115,8 @@ Expected<void> EvaluateCell(CellRun& run, int index, const TruthNow& now) {
 }
 
 // What is known of a cell once all frames went by.
-CellResult Finished(CellRun& run, const std::map<int, std::string>& image_digests,
-                    const std::string& timed_in) {
-  const RunCosts costs = run.mapper.costs();
+CellResult Finished(CellRun& run, const RunCosts& costs,
+                    const std::map<int, std::string>& image_digests, const std::string& timed_in) {
   run.result.times = costs.times ? costs.times->ToJson() : nlohmann::json(nullptr);
   for (const double seconds : costs.frame_s) run.result.frame_ms.push_back(1e3 * seconds);
   run.result.timed_in = timed_in;
@@ -126,6 +125,14 @@ CellResult Finished(CellRun& run, const std::map<int, std::string>& image_digest
 }
 
 }  // namespace
+
+bool HaveOneMap(const CellSettings& a, const CellSettings& b) {
+  const auto mapped = [](CellSettings settings) {
+    if (IsOfScoring(settings.sabotage)) settings.sabotage = Sabotage::kNone;
+    return SettingsJson(settings);
+  };
+  return mapped(a) == mapped(b);
+}
 
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
@@ -138,10 +145,21 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
   for (std::size_t i = 0; i < truth.trackers().size(); ++i) {
     now.names.push_back(truth.surface(i).model().info);
   }
+  std::vector<CellMapper> mappers;
   std::vector<CellRun> runs;
-  for (const Cell* cell : cells) {
-    TSDFPP_ASSIGN(CellMapper mapper, CellMapper::Make(cell->settings, source.info().objects));
-    runs.push_back({cell->settings.sabotage, std::move(mapper), MakeLastSeenStores(truth), {}});
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const CellSettings& settings = cells[i]->settings;
+    const auto same =
+        std::find_if(cells.begin(), cells.begin() + static_cast<std::ptrdiff_t>(i),
+                     [&](const Cell* c) { return HaveOneMap(c->settings, settings); });
+    std::size_t mapper = mappers.size();
+    if (const auto before = static_cast<std::size_t>(same - cells.begin()); before < i) {
+      mapper = runs[before].mapper;
+    } else {
+      TSDFPP_ASSIGN(CellMapper made, CellMapper::Make(settings, source.info().objects));
+      mappers.push_back(std::move(made));
+    }
+    runs.push_back({settings.sabotage, mapper, MakeLastSeenStores(truth), {}});
   }
   std::map<int, std::string> digests;
   for (const int index : variant.frames) {
@@ -150,15 +168,23 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
     TSDFPP_RETURN_IF_ERROR(truth.Observe(both.truth));
     const bool evaluated = variant.IsEvaluated(index);
     now.movers = MoversNow(source.info(), truth);
-    for (CellRun& run : runs) {
-      TSDFPP_RETURN_IF_ERROR(run.mapper.Process(both));
-      if (evaluated) TSDFPP_RETURN_IF_ERROR(EvaluateCell(run, index, now));
+    for (std::size_t m = 0; m < mappers.size(); ++m) {
+      TSDFPP_RETURN_IF_ERROR(mappers[m].Process(both));
+      if (!evaluated) continue;
+      mappers[m].SettleIds();
+      const SceneMeshes meshes = mappers[m].Meshes(now.movers);
+      for (CellRun& run : runs) {
+        if (run.mapper != m) continue;
+        TSDFPP_RETURN_IF_ERROR(EvaluateCell(run, mappers[m], meshes, index, now));
+      }
     }
     if (progress) progress();
   }
   std::vector<CellResult> results;
   results.reserve(runs.size());
-  for (CellRun& run : runs) results.push_back(Finished(run, digests, timed_in));
+  for (CellRun& run : runs) {
+    results.push_back(Finished(run, mappers[run.mapper].costs(), digests, timed_in));
+  }
   return results;
 }
 

@@ -170,6 +170,11 @@ bool IsOfSequence(Sabotage sabotage) {
   }
 }
 
+bool IsOfScoring(Sabotage sabotage) {
+  return sabotage == Sabotage::kInactiveDropped || sabotage == Sabotage::kLabelsPermuted ||
+         sabotage == Sabotage::kVisibleOnly;
+}
+
 Expected<void> FrameSabotage::Prepare(FrameSource& source, int index) {
   if (sabotage_ == Sabotage::kFrozenObject && first_T_WO_.empty()) {
     TSDFPP_ASSIGN(const Frame first, source.Read(frames_.front()));

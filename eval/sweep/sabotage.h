@@ -50,6 +50,9 @@ inline Expected<void> CheckSabotageName(std::string_view name) {
 }
 // Whether frames or truth differ by it, so that a sequence has to be made for it alone.
 bool IsOfSequence(Sabotage sabotage);
+// Whether frames, map and truth are the same with it and without: only how the map is looked at
+// differs.
+bool IsOfScoring(Sabotage sabotage);
 
 inline constexpr double kObjectPoseShift_m = 0.005;
 inline constexpr double kDepthScaleFactor = 1.005;

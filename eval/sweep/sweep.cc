@@ -53,10 +53,18 @@ std::vector<Task> TasksOf(const SweepPlan& plan, const CellStore& store) {
   std::set<std::string> planned;
   for (const auto& [id, variant] : plan.sequences) {
     Task task{&variant, {}};
+    std::vector<const Cell*> cells;
     for (const SweepPlan::Entry& entry : plan.entries) {
       if (entry.cell.sequence != id || !planned.insert(entry.cell.id).second) continue;
       if (store.Has(entry.cell)) continue;
-      task.cells.push_back(&entry.cell);
+      // Beside that of which it has the map.
+      const auto same = std::find_if(cells.begin(), cells.end(), [&](const Cell* cell) {
+        return HaveOneMap(cell->settings, entry.cell.settings);
+      });
+      cells.insert(same, &entry.cell);
+    }
+    for (const Cell* cell : cells) {
+      task.cells.push_back(cell);
       if (task.cells.size() == kMapsAtOnce) {
         tasks.push_back(task);
         task.cells.clear();

@@ -179,6 +179,29 @@ TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
             4);
 }
 
+// Cells that differ in what is scored alone are mapped once, and say what each says by itself.
+TEST_F(Sweep, OneMapIsLookedAtInManyWays) {
+  const auto grid = [](const std::string& sabotage) {
+    return "method = \"tsdf++/anchored\"\nvoxel_m = 0.02\nsabotage = " + sabotage;
+  };
+  const std::vector<std::string> ways{"'none'", "'inactive-dropped'", "'labels-permuted'",
+                                      "'visible-only'"};
+  RunSweep(Experiment(grid(fmt::format("[{}]", fmt::join(ways, ", ")))), "together");
+  ASSERT_EQ(CellFiles("together").size(), ways.size());
+  for (const std::string& way : ways) RunSweep(Experiment(grid(way)), "apart");
+  ASSERT_EQ(CellFiles("apart"), CellFiles("together"));
+  std::set<json> times;
+  std::set<json> examined;
+  for (const std::string& cell : CellFiles("together")) {
+    const json timeless = Timeless(fs::path("together/cells") / cell);
+    EXPECT_EQ(timeless, Timeless(fs::path("apart/cells") / cell));
+    times.insert(json::parse(Bytes(fs::path("together/cells") / cell)).at("times"));
+    examined.insert(timeless.at("examined"));
+  }
+  EXPECT_EQ(times.size(), 1U);
+  EXPECT_EQ(examined.size(), ways.size());
+}
+
 TEST_F(Sweep, AKilledRunLeavesNoHalfCellAndGoesOn) {
   const fs::path file =
       Experiment("method = [\"tsdf\", \"tsdf++\"]\nseed = [1, 2, 3]\nvoxel_m = 0.02", "");
