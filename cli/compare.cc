@@ -32,6 +32,7 @@ struct CompareArguments {
   std::string poses;
   TrackingOptions tracking;
   std::string associate;
+  std::string votes;
   SegmentationOptions segmentation{.segmentation = "gt"};
   std::vector<std::string> adapters;
   int reveal = -1;
@@ -185,6 +186,7 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
   }
   command += options.segmentation.Text();
   if (!options.associate.empty()) command += " --associate " + options.associate;
+  if (!options.votes.empty()) command += " --vote-config " + options.votes;
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   return command;
 }
@@ -234,7 +236,10 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
   }
+  TSDFPP_ASSIGN(const std::optional<VoteConfig> votes, ReadVotes(options.votes));
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
+  TSDFPP_RETURN_IF_ERROR(CheckVotes(votes, AssociationOf(config, opened.source->info())));
+  if (votes) config.votes = *votes;
   TSDFPP_ASSIGN(config.camera, CameraSourceFromName(options.camera));
   TSDFPP_ASSIGN(config.bleeding, BleedingPixelsFromName(options.bleeding));
   TSDFPP_ASSIGN(const RepairWishes repair, ReadRepair(options.repair));
@@ -279,6 +284,7 @@ Run AddCompare(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own and matched to the truth's by overlap, each once); by "
                  "default given unless ids are drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
+  AddVoteOption(app, options->votes);
   app.add_option("--bleeding", options->bleeding,
                  "For our maps, pixels beside an outline with the depth of its other side: keep "
                  "(mapped like others), wait (left out of the frame), auto (wait where objects or "

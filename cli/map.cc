@@ -29,6 +29,7 @@ struct MapArguments {
   std::string method = "tsdf++/anchored";
   SegmentationOptions segmentation;
   std::string associate;
+  std::string votes;
   std::string camera = "gt";
   std::string bleeding = "auto";
   RepairOptions repair;
@@ -83,6 +84,7 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(wishes.associate, AssociationModeFromName(options.associate));
   }
+  TSDFPP_ASSIGN(wishes.votes, ReadVotes(options.votes));
   if (const std::string& name = options.segmentation.segmentation; !name.empty()) {
     TSDFPP_ASSIGN(wishes.segmentation, SegmentationFromName(name));
     if (options.source.path.empty()) {
@@ -287,6 +289,7 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
                  "ids are the map's own; poses are then tracked); by default given unless ids are "
                  "drawn anew in every frame")
       ->check(OneOf({"given", "votes"}));
+  AddVoteOption(app, options->votes);
   app.add_option("--bleeding", options->bleeding,
                  "Pixels beside an outline with the depth of its other side: keep (mapped like "
                  "others), wait (left out of the frame), auto (wait where objects or the camera "

@@ -60,6 +60,12 @@ Expected<void> ChooseAssociation(MapStart& start, const MapWishes& wishes) {
       start.info.name);
 }
 
+Expected<void> ChooseVotes(MapStart& start, const MapWishes& wishes) {
+  TSDFPP_RETURN_IF_ERROR(CheckVotes(wishes.votes, start.config.associate));
+  if (wishes.votes) start.config.votes = *wishes.votes;
+  return {};
+}
+
 // Who says where that object is.
 Expected<void> ChoosePoses(MapStart& start, const MapWishes& wishes) {
   if (wishes.poses) {
@@ -112,6 +118,7 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
   start.config.segmenter = wishes.segmenter;
   TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
   TSDFPP_RETURN_IF_ERROR(ChooseAssociation(start, wishes));
+  TSDFPP_RETURN_IF_ERROR(ChooseVotes(start, wishes));
   TSDFPP_RETURN_IF_ERROR(ChoosePoses(start, wishes));
   start.config.camera = wishes.camera;
   start.config.bleeding = wishes.bleeding;
@@ -156,6 +163,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.config.bleeding = wishes.bleeding;
   start.config.mask_repair = wishes.repair.mode;
   start.config.repair = wishes.repair.config;
+  TSDFPP_RETURN_IF_ERROR(ChooseVotes(start, wishes));
   TSDFPP_RETURN_IF_ERROR(CheckCamera(start.config.method, wishes.camera));
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   const bool votes = start.by_votes();
@@ -195,6 +203,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     return UsageError("--bleeding {} needs a sequence to map", BleedingPixelsName(wishes.bleeding));
   } else if (wishes.repair.mode == MaskRepairMode::kOn) {
     return UsageError("--mask-repair on needs a sequence to map");
+  } else if (wishes.votes) {
+    return UsageError("--vote-config needs a sequence to map");
   }
   const std::vector<ObjectInfo> nobody;
   start.pipeline = std::make_unique<Pipeline>(

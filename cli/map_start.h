@@ -17,6 +17,7 @@ struct MapWishes {
   std::optional<Segmentation> segmentation;
   SegmenterParts segmenter{};
   std::optional<AssociationMode> associate;
+  std::optional<VoteConfig> votes;
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
   RepairWishes repair;
@@ -56,9 +57,9 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
                             const MapWishes& wishes, int until);
 
 // With the map in `file`; goes on after its last frame where `source` names a sequence. Of `wishes`
-// only segmentation, bleeding, repair, camera and tracking are looked at, as the file has the rest.
-// Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than the map's,
-// or nothing is left to map; kData where what the file says does not go together.
+// only segmentation, votes, bleeding, repair, camera and tracking are looked at, as the file has
+// the rest. Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than
+// the map's, or nothing is left to map; kData where what the file says does not go together.
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,
                                const MapWishes& wishes, int until);
 

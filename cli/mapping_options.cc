@@ -7,6 +7,23 @@
 
 namespace tsdfpp {
 
+void AddVoteOption(CLI::App& app, std::string& file) {
+  app.add_option("--vote-config", file,
+                 "Settings of --associate votes, a TOML file (mapper/associate/vote_config.h)")
+      ->check(NotEmpty("a file"));
+}
+
+Expected<std::optional<VoteConfig>> ReadVotes(const std::string& file) {
+  if (file.empty()) return std::nullopt;
+  TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(file));
+  return VoteConfig::FromToml(table, file);
+}
+
+Expected<void> CheckVotes(const std::optional<VoteConfig>& votes, AssociationMode mode) {
+  if (!votes || mode == AssociationMode::kVotes) return {};
+  return UsageError("--vote-config needs --associate votes: the masks' ids are the objects'");
+}
+
 std::string TrackingOptions::Text() const {
   std::string text;
   if (track != TrackChoiceName(TrackChoice::kAuto)) text += " --track " + track;

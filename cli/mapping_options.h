@@ -1,4 +1,4 @@
-// What `tsdfpp map` and `compare` may be told of tracking and of the repair of masks.
+// What `tsdfpp map` and `compare` may be told of votes, of tracking and of the repair of masks.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,6 +10,13 @@
 #include "mapper/pipeline.h"
 
 namespace tsdfpp {
+
+// --vote-config, a file's name.
+void AddVoteOption(CLI::App& app, std::string& file);
+// Nothing where there is no file. Errors: those of the file.
+Expected<std::optional<VoteConfig>> ReadVotes(const std::string& file);
+// Errors: kUsage where there are settings of votes, and no votes.
+Expected<void> CheckVotes(const std::optional<VoteConfig>& votes, AssociationMode mode);
 
 struct TrackingOptions {
   std::string track = "auto";

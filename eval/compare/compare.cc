@@ -79,6 +79,7 @@ Expected<std::vector<std::unique_ptr<CompareRun>>> MakeRuns(const CompareConfig&
                                 .segmenter = config.segmenter,
                                 .bleeding = config.bleeding,
                                 .associate = AssociationOf(config, info),
+                                .votes = config.votes,
                                 .mask_repair = config.mask_repair,
                                 .repair = config.repair,
                                 .camera = config.camera,

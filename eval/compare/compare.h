@@ -23,6 +23,7 @@ struct CompareConfig {
   SegmenterParts segmenter{};
   // Nothing: votes, unless the segments' ids are the truth's.
   std::optional<AssociationMode> associate;
+  VoteConfig votes{};
   CameraSource camera = CameraSource::kGiven;
   BleedingPixels bleeding = BleedingPixels::kAuto;
   MaskRepairMode mask_repair = MaskRepairMode::kOff;

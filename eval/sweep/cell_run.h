@@ -51,7 +51,8 @@ class CellMapper {
 bool HaveOneMap(const CellSettings& a, const CellSettings& b);
 
 // The results of `cells`, which all have the frames of `variant`, in their order. Those that
-// have one map (HaveOneMap()) are mapped once. `progress` is called after each frame. Errors: those of the source; kData where a frame does not fit the truth.
+// have one map (HaveOneMap()) are mapped once. `progress` is called after each frame. Errors: those
+// of the source; kData where a frame does not fit the truth.
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
                                            const std::function<void()>& progress);

@@ -37,6 +37,10 @@ class Associate : public testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunTsdfpp(arguments, folder_->path());
   }
+  static fs::path Settings(const std::string& text) {
+    std::ofstream(*folder_ / "settings.toml") << text;
+    return *folder_ / "settings.toml";
+  }
   static nlohmann::json Json(const std::string& file) {
     return nlohmann::json::parse(std::ifstream(*folder_ / file));
   }
@@ -73,7 +77,29 @@ TEST_F(Associate, GoesOnFromASavedMap) {
   EXPECT_FALSE(fs::exists(*folder_ / "rest/mesh/object3-3.ply")) << "a known object was born again";
 }
 
+// What needs more frames than there are to be confirmed is never born.
+TEST_F(Associate, SettingsReachTheVotes) {
+  ASSERT_EQ(Run("map", "half", {"--until", "4", "--save", *folder_ / "half.map"}).exit_code, 0);
+  const fs::path settings = Settings("confirm_frames = 7\nconfirm_window = 7");
+  ASSERT_EQ(Run("map", "late", {"--until", "6", "--vote-config", settings}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(*folder_ / "late/mesh/object1-1.ply"));
+  ASSERT_EQ(Run("map", "born",
+                {"--load", *folder_ / "half.map", "--until", "8", "--vote-config", settings})
+                .exit_code,
+            0);
+  EXPECT_TRUE(fs::exists(*folder_ / "born/mesh/object1-1.ply"));
+  ASSERT_EQ(Run("compare", "late-compare",
+                {"--until", "6", "--methods", "tsdf++/anchored", "--profiles", "close",
+                 "--vote-config", settings})
+                .exit_code,
+            0);
+  const nlohmann::json summary = Json("late-compare/summary.json");
+  EXPECT_TRUE(summary["runs"][0]["matched_ids"].empty());
+  EXPECT_NE(summary["command"].get<std::string>().find(" --vote-config "), std::string::npos);
+}
+
 TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
+  ASSERT_EQ(Run("map", "half", {"--until", "4", "--save", *folder_ / "half.map"}).exit_code, 0);
   const auto sentence = [](const CommandOutput& output) {
     EXPECT_EQ(output.exit_code, kUsage);
     return output.err;
@@ -92,6 +118,21 @@ TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
   EXPECT_NE(
       sentence(Run("compare", "no", {"--poses", "gt"})).find("given poses are those of given"),
       std::string::npos);
+  for (const std::string command : {"map", "compare"}) {
+    EXPECT_NE(sentence(Run(command, "no", {"--vote-config", Settings("far = 1")})).find("far"),
+              std::string::npos);
+    EXPECT_NE(sentence(RunTsdfpp({command, TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out",
+                                  *folder_ / "no", "--vote-config", Settings("")},
+                                 folder_->path()))
+                  .find("--vote-config needs --associate votes: the masks' ids are the objects'"),
+              std::string::npos);
+  }
+  EXPECT_NE(sentence(RunTsdfpp({"map", "--load", *folder_ / "half.map", "--out", *folder_ / "no",
+                                "--vote-config", Settings("")},
+                               folder_->path()))
+                .find("--vote-config needs a sequence to map"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(*folder_ / "no"));
   EXPECT_NE(sentence(Run("map", "no", {"--load", *folder_ / "half.map", "--associate", "votes"}))
                 .find("--associate cannot be given with --load, whose map has its own"),
             std::string::npos);
