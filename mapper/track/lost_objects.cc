@@ -213,9 +213,13 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
       continue;
     }
     if (taken_ids.contains(pair.id) || taken_segments.contains(pair.segment)) continue;
-    if (kept.frames_in_sight % kEvery_frames != 0 || ++searches > kMostSearches) continue;
+    if (kept.frames_asked % kEvery_frames != 0 || ++searches > kMostSearches) continue;
     const Return& found = search(pair);
     if (!found.begins_anew) take(found);
+  }
+  std::set<InstanceId> asked;
+  for (const Pair& pair : pairs) {
+    if (asked.insert(pair.id).second) ++kept_.at(pair.id).frames_asked;
   }
   // Of the others, by their looks.
   std::erase_if(pairs, [&](const Pair& pair) { return !segments[pair.segment].may_begin; });
@@ -310,7 +314,7 @@ void LostObjects::KeepAsItWas(InstanceId id, const Kept& kept) {
   const auto entry = kept_.insert_or_assign(id, kept).first;
   entry->second.is_in_map = false;
   entry->second.is_missing = true;
-  entry->second.frames_in_sight = 0;
+  entry->second.frames_asked = entry->second.frames_in_sight = 0;
   entry->second.model = PlacedModel::kOther;
 }
 

@@ -91,7 +91,7 @@ class LostObjects {
   // place. Where it is not, but the segment may begin a model, and looks like the object and like
   // no other that is missing, the object waits for return_frames frames in which such a segment is
   // in sight, twice as many where something covers it. A segment at the picture's edge is left
-  // alone. Looks for an object in every third of these frames.
+  // alone. Looks for an object in every third of the frames that have a segment that is like it.
   std::vector<Return> FindAgain(const Frame& frame, std::span<const Segment> segments);
 
   // Puts a kept object where it was found, into the map and `T_WO`; one that begins anew into
@@ -106,7 +106,8 @@ class LostObjects {
     Pose T_WO = Pose::Identity();
     double voxel_m = 0;
     bool is_in_map = true;
-    int frames_in_sight = 0;   // in which something was that may be it
+    int frames_asked = 0;      // in which something was like it
+    int frames_in_sight = 0;   // and might have begun a model
     bool is_given_up = false;  // the model is
     bool is_missing = true;
     PlacedModel model = PlacedModel::kSame;  // that it has here, once it is put back

@@ -329,6 +329,30 @@ TEST(LostObjects, SayWhoseModelTheyComeBackWith) {
   }
 }
 
+// A search takes many times as long as to track what is there. So it is made in every third frame,
+// also where what is like the object is such that no model may begin with it.
+TEST(LostObjects, AreLookedForInEveryThirdFrame) {
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
+  map->SetObjectPose(kBrick, Pose::Identity());
+  for (int i = 1; i < kLeaves; ++i) {
+    const Frame before = Coming(i, 0);
+    map->Fuse(before, before.mask);
+  }
+  LostObjects lost(SdfTrackConfig{});
+  lost.Keep(kBrick, *map, T_WO.at(kBrick));
+  lost.TakeOut({}, *map, T_WO);
+  const auto found = [&](double turn_deg) {
+    const Frame frame = Coming(kReturns, turn_deg * kDegree);
+    const LostObjects::Segment segment{PixelsWhere(frame.mask == kBrick), kNoInstance, false};
+    return !lost.FindAgain(frame, {&segment, 1}).empty();
+  };
+  EXPECT_FALSE(found(-70)) << "nothing says how it stands";
+  EXPECT_FALSE(found(40));
+  EXPECT_FALSE(found(40));
+  EXPECT_TRUE(found(40));
+}
+
 // A gate that says no in every frame does so in the pipeline.
 TEST(LostObjects, AreBegunAnewInThePipeline) {
   PipelineConfig config = TrackConfig(AssociationMode::kGiven);
