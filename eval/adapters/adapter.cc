@@ -295,12 +295,12 @@ Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task, const fs::pa
   limits.disk_bytes = bytes(run.config.disk_limit_mb);
   run.outcome = RunChildProcess(run.config.name, command, out, AbsolutePath(out / kLog), limits,
                                 shown / kLog);
-  run.failure = run.outcome.failure;
+  if (run.outcome.failure) run.Fail(*run.outcome.failure);
   // Also of one that failed: what it left must not be in anybody's way.
   const std::string odd = TidyOutput(run);
   if (run.failure) return {};
   if (!odd.empty()) {
-    run.failure = Error{ErrorKind::kData, fmt::format("{}: {}", run.config.name, odd)};
+    run.Fail({ErrorKind::kData, fmt::format("{}: {}", run.config.name, odd)});
     return {};
   }
   if (!fs::exists(out / kTiming, failure)) return {};
@@ -327,6 +327,13 @@ std::string WithShownFolder(const AdapterRun& run, std::string text) {
   return text;
 }
 
+void AdapterRun::Fail(Error error) {
+  failure = std::move(error);
+  evaluations.clear();
+  matches.clear();
+  trajectories.reset();
+}
+
 void EvaluateAdapter(AdapterRun& run, const SceneTruth& truth, const std::vector<ObjectInfo>& names,
                      const AdapterTask& task) {
   if (run.failure) return;
@@ -340,9 +347,8 @@ void EvaluateAdapter(AdapterRun& run, const SceneTruth& truth, const std::vector
   config.match = run.config.match;
   auto prepared = PrepareMeshes(truth, names, config);
   if (!prepared) {
-    run.failure = Error{
-        prepared.error().kind,
-        WithShownFolder(run, fmt::format("{}: {}", run.config.name, prepared.error().message))};
+    run.Fail({prepared.error().kind, WithShownFolder(run, fmt::format("{}: {}", run.config.name,
+                                                                      prepared.error().message))});
     return;
   }
   for (const std::string& found : prepared->remarks) {

@@ -63,11 +63,14 @@ Expected<std::vector<std::string>> CommandOf(const AdapterConfig& config, const 
 struct AdapterRun {
   explicit AdapterRun(AdapterConfig adapter) : config(std::move(adapter)) {}
 
+  // It has no scores then, those of earlier frames neither: they would be the easier ones.
+  void Fail(Error error);
+
   AdapterConfig config;
   std::filesystem::path folder;  // what it wrote: meshes/, trajectories/, timing.json; log.txt
   std::filesystem::path shown;   // what that folder will be called
   ChildOutcome outcome;
-  std::optional<Error> failure;  // the outcome's, or what is wrong with its files
+  std::optional<Error> failure;  // Fail()'s: the outcome's, or what is wrong with its files
   nlohmann::json timing;         // its own words; null where it wrote none
   LastSeenStores last_seen;
   std::vector<Evaluation> evaluations;

@@ -254,10 +254,14 @@ class FrameWalk {
       CompareRun& run = *result_.runs[r];
       const auto mapped = Guarded([&]() -> Expected<void> {
         const std::int64_t before = ResidentBytes();
+        const int lost_before = run.pipeline.camera_log().lost;
         TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
-        run.times.Add(step);
-        if (run.config.associate == AssociationMode::kVotes) {
-          run.matching.Observe(run.pipeline.labels(), true_mask);
+        // Where the camera was not found, nothing was mapped, and the labels are older.
+        if (run.pipeline.camera_log().lost == lost_before) {
+          run.times.Add(step);
+          if (run.config.associate == AssociationMode::kVotes) {
+            run.matching.Observe(run.pipeline.labels(), true_mask);
+          }
         }
         run.process_growth_bytes += ResidentBytes() - before;
         if (recorder_) recorder_->SeeMap(run);
@@ -316,8 +320,9 @@ class FrameWalk {
         DropMeshes(evaluation);
         return {};
       });
-      if (!scored)
-        run->failure = Error{scored.error().kind, run->config.name + ": " + scored.error().message};
+      if (!scored) {
+        run->Fail({scored.error().kind, run->config.name + ": " + scored.error().message});
+      }
     }
   }
 

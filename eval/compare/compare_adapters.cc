@@ -29,9 +29,9 @@ void RemoveWhatCannotBeListed(AdapterRun& run) {
   std::error_code ignored;
   std::filesystem::remove_all(run.folder, ignored);
   std::filesystem::create_directory(run.folder, ignored);
-  run.failure = Error{ErrorKind::kData,
-                      WithShownFolder(run, fmt::format("{}: what it left is removed: {}",
-                                                       run.config.name, files.error().message))};
+  run.Fail({ErrorKind::kData,
+            WithShownFolder(run, fmt::format("{}: what it left is removed: {}", run.config.name,
+                                             files.error().message))});
 }
 
 }  // namespace
@@ -93,9 +93,8 @@ void ScoreAdapterTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& na
   if (scores) {
     run.trajectories = std::move(*scores);
   } else {
-    run.failure =
-        Error{scores.error().kind,
-              WithShownFolder(run, fmt::format("{}: {}", run.config.name, scores.error().message))};
+    run.Fail({scores.error().kind, WithShownFolder(run, fmt::format("{}: {}", run.config.name,
+                                                                    scores.error().message))});
   }
 }
 

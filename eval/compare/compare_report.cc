@@ -88,10 +88,19 @@ nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run
         truth == result.truth->trajectories().end()) {
       continue;
     }
-    // The camera is given, so both camera poses of the Co-Fusion protocol are the true one and
-    // cancel.
+    const auto first =
+        std::find_if(estimate->second.begin(), estimate->second.end(),
+                     [&](const auto& pose) { return truth->second.contains(pose.first); });
+    // Where the camera is given, both of its poses are the true one.
+    Pose T_WC_estimate = Pose::Identity();
+    Pose T_WC_truth = Pose::Identity();
+    const auto& located = run.pipeline.camera_log().T_WC;
+    if (first != estimate->second.end() && located.contains(first->first)) {
+      T_WC_estimate = located.at(first->first);
+      T_WC_truth = result.camera.at(first->first);
+    }
     const ObjectTrajectoryScores scores =
-        ScoreObjectTrajectory(estimate->second, truth->second, Pose::Identity(), Pose::Identity());
+        ScoreObjectTrajectory(estimate->second, truth->second, T_WC_estimate, T_WC_truth);
     trajectories[std::to_string(id)] = ToJson(scores);
   }
   return trajectories;
@@ -205,7 +214,7 @@ std::string Headline(const CompareResult& result) {
     if (!preserved.preservation_behind_other.value) continue;
     text += fmt::format(
         "<li><b>{}</b> keeps {:.1f} % of the {:.0f} cm² of table that it had seen "
-        "and that the moving objects hide at frame {}: a hole of {:.0f} cm².</li>\n",
+        "and that other objects hide at frame {}: a hole of {:.0f} cm².</li>\n",
         run->Title(), 100 * *preserved.preservation_behind_other.value,
         preserved.behind_other_area_cm2, frame, *preserved.hole_area_cm2.value);
   }
@@ -305,7 +314,7 @@ std::string PageTable(const CompareResult& result) {
     html += "</tr>\n";
   }
   html +=
-      "</table></div>\n<p>kept: share of the table that was seen before, is hidden by a moving "
+      "</table></div>\n<p>kept: share of the table that was seen before, is hidden by another "
       "object now, and is "
       "within one voxel of the map's table after the removal. retention: the same, over what the "
       "map had of it "

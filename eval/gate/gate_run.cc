@@ -233,8 +233,9 @@ ControlOutcome DecideControl(const GatesConfig& config, const GateControl& contr
   return outcome;
 }
 
-// Cells that were not timed in one run, such as those of an experiment that got a method later.
-// They leave the folder, so that the next run makes them together. Whether there were any.
+// Cells that were not timed in one run, such as those of an experiment that got a method later, and
+// all that are to be timed with one of them. They leave the folder, so that the next run makes them
+// together. Whether there were any.
 bool ForgetTimedApart(const std::vector<PlannedPair>& together, const SweepResult& result,
                       const std::filesystem::path& out) {
   const CellStore store(out / "cells");
@@ -243,18 +244,24 @@ bool ForgetTimedApart(const std::vector<PlannedPair>& together, const SweepResul
       return SettingsJson(entry.cell.settings) == SettingsJson(settings);
     });
   };
-  bool any = false;
-  for (const PlannedPair& pair : together) {
-    const auto ours = entry_of(pair.ours);
-    const auto theirs = entry_of(*pair.theirs);
-    if (WereTimedTogether(ours->result, theirs->result)) continue;
-    any = true;
-    for (const auto& entry : {ours, theirs}) {
-      std::error_code ignored;
-      std::filesystem::remove(store.PathOf(entry->cell.id), ignored);
+  std::set<std::string> forgotten;
+  for (bool goes_on = true; goes_on;) {
+    goes_on = false;
+    for (const PlannedPair& pair : together) {
+      const auto ours = entry_of(pair.ours);
+      const auto theirs = entry_of(*pair.theirs);
+      const bool stays = !forgotten.contains(ours->cell.id) &&
+                         !forgotten.contains(theirs->cell.id) &&
+                         WereTimedTogether(ours->result, theirs->result);
+      if (stays) continue;
+      for (const auto& entry : {ours, theirs}) goes_on |= forgotten.insert(entry->cell.id).second;
     }
   }
-  return any;
+  for (const std::string& id : forgotten) {
+    std::error_code ignored;
+    std::filesystem::remove(store.PathOf(id), ignored);
+  }
+  return !forgotten.empty();
 }
 
 Expected<void> RunNeeds(const GatesConfig& config, const Needs& needs, const SweepOptions& options,

@@ -56,19 +56,24 @@ Expected<PreparedMeshes> PrepareMeshes(const SceneTruth& truth,
   }
   PreparedMeshes out;
   MatchedScene matched = MatchScene(loaded.scene, truth, objects, config.voxel_m, config.match);
-  out.matches = std::move(matched.matches);
   out.remarks = std::move(loaded.remarks);
   out.remarks.insert(out.remarks.end(), matched.remarks.begin(), matched.remarks.end());
   out.meshes.scene = std::move(matched.mesh);
+  out.matches = matched.matches;
   out.meshes.labelled = !out.meshes.scene.face_ids.empty();
   const std::set<std::set<InstanceId>> removals = RemovalsOf(config.removed);
   for (const std::set<InstanceId>& removed : removals) {
     if (removed.empty()) continue;
     const auto given = loaded.without.find(removed);
     if (!out.meshes.labelled) continue;
+    if (given != loaded.without.end() && given->second.parts.empty()) {
+      return DataError("{}: tells no objects apart, expected the labels of {}",
+                       given->second.source, loaded.scene.source);
+    }
     out.meshes.without[removed] = given == loaded.without.end()
                                       ? FacesWithout(out.meshes.scene, removed)
-                                      : WithMatches(given->second, out.matches);
+                                      : WithMatches(given->second, matched, truth, objects,
+                                                    config.voxel_m, config.match, out.remarks);
   }
   for (const auto& [removed, scene] : loaded.without) {
     if (removals.contains(removed) && out.meshes.labelled) continue;

@@ -196,16 +196,26 @@ MatchedScene MatchScene(const LoadedScene& scene, const SceneTruth& truth,
   return out;
 }
 
-TriangleMesh WithMatches(const LoadedScene& scene, const std::vector<PartMatch>& matches) {
-  std::vector<InstanceId> objects;
-  for (const ScenePart& part : scene.parts) {
-    const auto same = std::find_if(matches.begin(), matches.end(), [&](const PartMatch& match) {
-      return match.part.name == part.name && match.part.id == part.id;
-    });
-    objects.push_back(same == matches.end() ? kNoInstance : same->object);
+TriangleMesh WithMatches(const LoadedScene& scene, const MatchedScene& before,
+                         const SceneTruth& truth, const std::vector<ObjectInfo>& objects,
+                         double voxel_m, MatchMode mode, std::vector<std::string>& remarks) {
+  std::vector<InstanceId> labels;
+  for (std::size_t p = 0; p < scene.parts.size(); ++p) {
+    const ScenePart& part = scene.parts[p];
+    const auto same =
+        std::find_if(before.matches.begin(), before.matches.end(), [&](const PartMatch& match) {
+          return match.part.name == part.name && match.part.id == part.id;
+        });
+    if (same != before.matches.end()) {
+      labels.push_back(same->object);
+      continue;
+    }
+    const PartOverlap overlap =
+        Measure(FacesOf(scene.mesh, static_cast<InstanceId>(p)), truth, kReachVoxels * voxel_m);
+    labels.push_back(MatchOf(part, overlap, objects, mode, remarks).object);
   }
   TriangleMesh mesh = scene.mesh;
-  for (InstanceId& label : mesh.face_ids) label = objects[label];
+  for (InstanceId& label : mesh.face_ids) label = labels[label];
   return mesh;
 }
 

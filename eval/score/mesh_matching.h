@@ -48,8 +48,12 @@ struct MatchedScene {
 MatchedScene MatchScene(const LoadedScene& scene, const SceneTruth& truth,
                         const std::vector<ObjectInfo>& objects, double voxel_m, MatchMode mode);
 
-// The same scene after a removal: parts of equal names and labels are the same objects.
-TriangleMesh WithMatches(const LoadedScene& scene, const std::vector<PartMatch>& matches);
+// A scene after a removal, of which `before` is MatchScene()'s: parts of equal names and labels are
+// the same objects; others, which were hidden before, are matched as there. `remarks` gets what
+// looks wrong.
+TriangleMesh WithMatches(const LoadedScene& scene, const MatchedScene& before,
+                         const SceneTruth& truth, const std::vector<ObjectInfo>& objects,
+                         double voxel_m, MatchMode mode, std::vector<std::string>& remarks);
 
 nlohmann::json ToJson(const std::vector<PartMatch>& matches);
 

@@ -137,7 +137,8 @@ Expected<void> CheckComplete(const BenchResult& result, const BenchSet& set,
 // A result with what the leaderboard shows of it, by metric of the set.
 struct LeaderboardRow {
   BenchResult result;
-  std::vector<Measured> means;  // over the sequences
+  std::vector<Measured> means;       // over the sequences where it is defined
+  std::vector<std::size_t> defined;  // those
   std::vector<MeasuredInterval> intervals;
 };
 
@@ -148,6 +149,7 @@ LeaderboardRow RowOf(BenchResult result, const BenchSet& set) {
     for (const auto& [sequence, scores] : result.scores) {
       if (scores.at(metric).value) values.push_back(*scores.at(metric).value);
     }
+    row.defined.push_back(values.size());
     row.means.push_back(values.empty() ? Measured::Undefined("undefined in every sequence")
                                        : Measured::Of(MeanOf(values)));
     row.intervals.push_back(
@@ -157,13 +159,15 @@ LeaderboardRow RowOf(BenchResult result, const BenchSet& set) {
   return row;
 }
 
-// Best first by the set's first metric; those where it is undefined last.
+// Best first by the set's first metric; before that, those that have it of more sequences, since a
+// mean over the easier ones says nothing of the others.
 void Rank(std::vector<LeaderboardRow>& rows, const BenchSet& set) {
   const bool higher = FindMetric(set.metrics.front())->better == Better::kHigher;
   std::stable_sort(rows.begin(), rows.end(), [&](const LeaderboardRow& a, const LeaderboardRow& b) {
+    if (a.defined.front() != b.defined.front()) return a.defined.front() > b.defined.front();
     const Measured& x = a.means.front();
     const Measured& y = b.means.front();
-    if (!x.value || !y.value) return x.value.has_value() && !y.value;
+    if (!x.value || !y.value) return false;
     return higher ? *x.value > *y.value : *x.value < *y.value;
   });
 }
@@ -187,6 +191,9 @@ std::string MeansTable(const std::vector<LeaderboardRow>& rows, const BenchSet& 
       if (const auto& interval = row.intervals[m].value) {
         page +=
             fmt::format(" [{:.{}f}, {:.{}f}]", interval->low, decimals, interval->high, decimals);
+      }
+      if (row.defined[m] > 0 && row.defined[m] < row.result.scores.size()) {
+        page += fmt::format(" (of {} of {})", row.defined[m], row.result.scores.size());
       }
       page += " |";
     }

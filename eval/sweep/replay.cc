@@ -128,6 +128,7 @@ Expected<Recorded> Load(const ReplayOptions& options) {
     TSDFPP_ASSIGN(variant.scene, ParseSceneConfig(variant.scene_text, scene.string(),
                                                   {scene.parent_path(), SceneOrigin::kData}));
     ReadSequence(sequence, variant);
+    SetSabotage(recorded.settings, variant);
     recorded.program = fmt::format("{}, {}", results->at("program").get<std::string>(),
                                    results->at("renderer").get<std::string>());
     where = (folder / "cells" / (recorded.id + ".json")).string();

@@ -180,7 +180,7 @@ Expected<void> FrameSabotage::Prepare(FrameSource& source, int index) {
     TSDFPP_ASSIGN(const Frame first, source.Read(frames_.front()));
     first_T_WO_ = {first.T_WO.begin(), first.T_WO.end()};
   }
-  if (sabotage_ == Sabotage::kObjectLate && index > 0) {
+  if (sabotage_ == Sabotage::kObjectLate && index > source.info().first_index) {
     TSDFPP_ASSIGN(const Frame before, source.Read(index - 1));
     late_T_WO_ = {before.T_WO.begin(), before.T_WO.end()};
   }

@@ -154,6 +154,11 @@ std::string SequenceVariant::Key() const {
   return key + "\n" + scene_text;
 }
 
+void SetSabotage(const CellSettings& settings, SequenceVariant& variant) {
+  if (IsOfSequence(settings.sabotage)) variant.sabotage = settings.sabotage;
+  if (settings.sabotage == Sabotage::kTruthShifted) variant.voxel_m = settings.voxel_m;
+}
+
 Expected<SequenceVariant> VariantMaker::Make(const CellSettings& settings) {
   const auto key = std::pair(settings.scene, settings.seed);
   auto known = scenes_.find(key);
@@ -165,8 +170,7 @@ Expected<SequenceVariant> VariantMaker::Make(const CellSettings& settings) {
   variant.scene = known->second;
   variant.fuse_until = settings.fuse_until;
   variant.object_error = settings.object_error;
-  if (IsOfSequence(settings.sabotage)) variant.sabotage = settings.sabotage;
-  if (settings.sabotage == Sabotage::kTruthShifted) variant.voxel_m = settings.voxel_m;
+  SetSabotage(settings, variant);
   const auto fit = [&]() -> Expected<void> {
     TSDFPP_RETURN_IF_ERROR(KeepObjects(settings.objects, variant.scene));
     TSDFPP_RETURN_IF_ERROR(SetSensor(settings, variant.scene.sensor));

@@ -31,6 +31,9 @@ struct SequenceVariant {
   std::string Key() const;
 };
 
+// What is broken of the sequence, if anything is.
+void SetSabotage(const CellSettings& settings, SequenceVariant& variant);
+
 // Reads scenes once.
 class VariantMaker {
  public:

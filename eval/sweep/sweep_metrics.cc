@@ -10,9 +10,11 @@
 namespace tsdfpp {
 namespace {
 
-// Root mean square distance of the reconstruction to the truth, mean over the moving objects.
+// Root mean square distance of the reconstruction to the truth, mean over the moving objects that
+// have one. Without labels that would be whatever lies nearest to them, the table perhaps.
 Measured MoversAccuracy(const Evaluation& evaluation, const std::set<InstanceId>& movers,
                         const RunCosts&) {
+  if (!evaluation.labelled) return Measured::Undefined("the mesh has no labels");
   double sum = 0;
   int count = 0;
   for (const ObjectScores& object : evaluation.objects) {
@@ -57,10 +59,11 @@ const std::vector<RunMetric>& RunMetrics() {
       {{"movers_accuracy_rmse_mm", "", "distance error of the moving objects", "mm", Better::kLower,
         2,
         "root mean square distance of the reconstruction to the truth, mean over the moving "
-        "objects"},
+        "objects of which there is one: of those that are lost their completion speaks"},
        MoversAccuracy},
       {{"table_accuracy_rmse_mm", "", "distance error of the table", "mm", Better::kLower, 2,
-        "root mean square distance of the reconstruction to the truth, of the background"},
+        "root mean square distance to the truth of the background's reconstruction that is nearest "
+        "to the table"},
        TableAccuracy},
       {{kFrameTimeMetric, "", "time to map a frame", "ms", Better::kLower, 2,
         "median wall-clock time of a frame, all steps together"},

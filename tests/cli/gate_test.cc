@@ -1,4 +1,5 @@
 // `tsdfpp gate` as its users call it, on a few small frames.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -168,6 +169,41 @@ why = "not too slow"
   const auto explained = Gate({"--explain", "time"});
   EXPECT_NE(explained.out.find("time is inconclusive: worst at seed=1; frame "), std::string::npos)
       << explained.out << explained.err;
+}
+
+// Two gates have one peer: where one of them was run alone, all three are made again together.
+TEST_F(GateCommand, TimesThatShareAPeerAreOfOneRun) {
+  std::string experiment = File("tiny.toml");
+  const std::string methods = "[\"tsdf\", \"tsdf++\"]";
+  experiment.replace(experiment.find(methods), methods.size(),
+                     "[\"tsdf\", \"tsdf++\", \"volumes\"]");
+  Write("tiny.toml", experiment);
+  std::string gates = std::string(kGates).substr(0, std::string(kGates).find("[[control]]"));
+  const std::vector<std::pair<std::string, std::string>> timed{{"first", "tsdf++"},
+                                                               {"second", "volumes"}};
+  for (const auto& [name, method] : timed) {
+    gates += fmt::format(R"([[gate]]
+name = "{}"
+experiment = "tiny"
+metric = "frame_ms"
+where = {{ method = "{}" }}
+against = {{ method = "tsdf" }}
+ratio = true
+max = 1000
+confidence = 1
+why = "not too slow"
+)",
+                         name, method);
+  }
+  Write("gates.toml", gates);
+  Gate({"--explain", "first"});
+  for (int i = 0; i < 2; ++i) {
+    const auto all = Gate({"--json"});
+    const auto json = nlohmann::json::parse(all.out);
+    for (const auto& gate : json["gates"]) {
+      EXPECT_EQ(gate["why"], "5 frames were timed, 20 are needed") << gate["name"];
+    }
+  }
 }
 
 TEST_F(GateCommand, WrongFilesAndOptionsGetASentence) {

@@ -240,6 +240,7 @@ TEST_F(AdapterCompare, AFailureIsReportedAndTheOthersGoOn) {
     EXPECT_TRUE(run.failure->message.starts_with(run.config.name)) << run.failure->message;
     EXPECT_NE(table.find("failed: " + run.failure->message), std::string::npos) << table;
     EXPECT_EQ(json.at("failure"), run.failure->message);
+    EXPECT_TRUE(json.at("evaluations").empty()) << "of the frames before";
   }
   // All of it can be written down, also half a character.
   EXPECT_NO_THROW((void)summary.dump());

@@ -113,6 +113,16 @@ TEST_F(SmallSet, ALeaderboardIsBestFirst) {
   ASSERT_NE(best, std::string::npos) << *page;
   ASSERT_NE(good, std::string::npos) << *page;
   EXPECT_LT(best, good);
+  // The easier half says nothing of the other.
+  json half = Result("half", 1, 1);
+  half["entries"][1]["scores"]["visible_completion"] = {{"value", nullptr}, {"why", "it crashed"}};
+  ASSERT_TRUE(WriteFile(folder_ / "r/3.json", half.dump()).has_value());
+  const auto with_half = Leaderboard(set_, folder_ / "r");
+  ASSERT_TRUE(with_half.has_value()) << with_half.error().message;
+  const std::size_t last = with_half->find("| half | 1.000");
+  ASSERT_NE(last, std::string::npos) << *with_half;
+  EXPECT_LT(with_half->find("| good | 0.800"), last);
+  EXPECT_NE(with_half->find(" (of 1 of 2) |", last), std::string::npos) << *with_half;
   EXPECT_NE(page->find("| best | 1.000 | 0.800 |"), std::string::npos) << *page;
 }
 

@@ -203,6 +203,28 @@ TEST(EvaluateMeshes, RemovalDropsFacesUnlessTheMapperRemoved) {
   EXPECT_EQ(removed.frames[0].evaluation.visible_completion.value, 1.0);
 }
 
+// After a removal the wall comes to light under another label than it had.
+TEST(EvaluateMeshes, WhatARemovalBringsToLightIsMatchedToo) {
+  const TempFolder folder;
+  BoxSource source;
+  auto meshes = TruthMeshes(source);
+  Put(folder / "m/scene.ply", SceneOf(meshes, true));
+  constexpr InstanceId kNewLabel = 77;
+  meshes[kNewLabel] = meshes.at(kBackground);
+  meshes.erase(kBackground);
+  meshes.erase(kRight);
+  Put(folder / "m/scene-without-8.ply", SceneOf(meshes, true));
+  EvaluateConfig config = At(folder / "m");
+  config.removed = {kRight};
+  EXPECT_EQ(Of(Evaluated(config), kBackground).preserved.preservation_behind_other.value, 1.0);
+  // Without labels nobody knows what is left of whom.
+  Put(folder / "m/scene-without-8.ply", SceneOf(meshes, false));
+  EXPECT_NE(
+      ErrorOf(config).find("scene-without-8.ply: tells no objects apart, expected the labels"),
+      std::string::npos)
+      << ErrorOf(config);
+}
+
 TEST(EvaluateMeshes, WhatIsLeftAfterTheRemovalByWhatIsKnownOfItsPlace) {
   const TempFolder folder;
   BoxSource source;

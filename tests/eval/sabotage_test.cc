@@ -15,8 +15,8 @@ FrameChoice SmallFrames() {
   return choice;
 }
 
-Expected<SequenceVariant> Variant(Sabotage sabotage) {
-  VariantMaker maker(std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes", SmallFrames());
+Expected<SequenceVariant> Variant(Sabotage sabotage, const FrameChoice& choice = SmallFrames()) {
+  VariantMaker maker(std::filesystem::path(TSDFPP_SOURCE_DIR) / "scenes", choice);
   CellSettings settings;
   settings.scene = "mini.toml";
   settings.sabotage = sabotage;
@@ -116,6 +116,20 @@ TEST(Sabotage, ObjectLate) {
   }
   EXPECT_EQ(both.differences.front(), "");
   EXPECT_GE(moved, both.plain.size() / 2) << "the car drives for most of the sequence";
+}
+
+// Nothing was recorded before the first frame of all.
+TEST(Sabotage, ObjectLateBeginsWithTheFirstFrame) {
+  FrameChoice every = SmallFrames();
+  every.stride = 1;
+  const auto late = Variant(Sabotage::kObjectLate, every);
+  ASSERT_TRUE(late.has_value());
+  ASSERT_EQ(late->frames.front(), kFirstFrame);
+  auto source = VariantSource::Open(*late);
+  ASSERT_TRUE(source.has_value());
+  const auto first = source->Read(kFirstFrame);
+  ASSERT_TRUE(first.has_value()) << first.error().message;
+  EXPECT_TRUE(SamePoses(first->frame.T_WO, first->truth.T_WO));
 }
 
 TEST(Sabotage, StalePose) {

@@ -46,6 +46,22 @@ TEST(SweepMetrics, ADefinitionDoesNotPointAtAnother) {
   }
 }
 
+// What is lost has no distance; what nobody tells apart is not the moving object's.
+TEST(SweepMetrics, TheMoversDistanceIsOfThoseThatAreThere) {
+  Evaluation evaluation;
+  evaluation.objects.resize(3);
+  for (InstanceId id = 0; id < 3; ++id) evaluation.objects[id].info.id = id;
+  evaluation.objects[1].accuracy.distance.rmse_m = Measured::Of(0.001);
+  evaluation.objects[2].accuracy.distance.rmse_m = Measured::Undefined("it has no face");
+  const auto off_mm = [&] {
+    return MeasureAll(evaluation, {1, 2}, RunCosts{})[MetricIndex("movers_accuracy_rmse_mm")];
+  };
+  EXPECT_EQ(off_mm().value, 1.0);
+  evaluation.labelled = false;
+  EXPECT_EQ(off_mm().value, std::nullopt);
+  EXPECT_EQ(off_mm().why_not, "the mesh has no labels");
+}
+
 TEST(SweepMetrics, ThePageIsMadeOfIt) {
   const std::string page = ReadFile(TSDFPP_SOURCE_DIR "/docs/metrics.md").value();
   EXPECT_NE(page.find(MetricsMarkdown()), std::string::npos)

@@ -300,6 +300,14 @@ TEST_F(Sweep, AnyFrameCanBeMadeAgain) {
       EXPECT_EQ(first.at("image_digest"), noted.at("images").at(std::to_string(frame)));
     }
   }
+  // So can one of frames that were broken on purpose.
+  const json sabotaged = RunSweep(
+      Experiment("method = \"tsdf++\"\nvoxel_m = 0.02\nsabotage = \"depth-scale\""), "sabotaged");
+  const auto ran =
+      RunTsdfpp({"replay", folder_ / "sabotaged", "--cell", sabotaged.at("cells").begin().key(),
+                 "--frame", "3", "--out", folder_ / "sabotaged-3", "--json"},
+                folder_.path());
+  EXPECT_EQ(ran.exit_code, 0) << ran.err;
   const std::string id = swept.at("cells").begin().key();
   const auto wrong = [&](const std::string& cell, const char* frame) {
     const auto ran = RunTsdfpp(
