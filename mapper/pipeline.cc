@@ -68,11 +68,6 @@ std::unique_ptr<Associator> MakeAssociator(
   std::abort();
 }
 
-// Between the frames that a network looks at, labels may say nothing at all.
-bool SaysWhatIsWhere(const cv::Mat& labels) {
-  return cv::countNonZero(labels != static_cast<double>(kNoInstance)) > 0;
-}
-
 }  // namespace
 
 bool PipelineConfig::BleedingWaits() const {
@@ -202,7 +197,8 @@ Expected<Segments> Pipeline::Segment(const Frame& frame) {
   TSDFPP_ASSIGN(Segments segments, segmenter_->Segment(frame));
   TSDFPP_RETURN_IF_ERROR(CheckFrameForm(frame, segments.ids));
   if (repair_ != nullptr) {
-    segments.ids = repair_->SetOutlines(frame, segments.ids, config_.map.voxel_m);
+    segments.ids =
+        repair_->SetOutlines(frame, segments.ids, config_.map.voxel_m, config_.segmenter.depth);
   }
   if (config_.BleedingWaits()) {
     const double step_m = kBleedingStep_voxels * config_.map.voxel_m;

@@ -9,11 +9,11 @@ namespace {
 
 constexpr std::int64_t kOwnPart = 8;
 
+}  // namespace
+
 bool IsOfLowerCell(const Testimony& a, const Testimony& b) {
   return a.object == b.object ? a.cell < b.cell : a.object < b.object;
 }
-
-}  // namespace
 
 ContestedCells::Cells::const_iterator ContestedCells::PlaceIn(const Cells& cells,
                                                               const Index3& cell) {

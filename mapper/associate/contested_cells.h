@@ -18,6 +18,9 @@ struct Testimony {
   float observations = 0;  // of the surface there, before the frame
 };
 
+// By object and cell.
+bool IsOfLowerCell(const Testimony& a, const Testimony& b);
+
 class ContestedCells {
  public:
   // In how many of the frames that disputed a cell it was its object's, 0 to 1; 1 where none did.

@@ -123,11 +123,8 @@ struct Part {
 }  // namespace
 
 std::vector<int> FindFarPart(const Frame& frame, const cv::Mat& ids, std::span<const int> pixels,
-                             const ObjectLookup& lookup, std::size_t object,
-                             const FarPartConfig& config) {
-  if (pixels.empty()) return {};
-  const ObjectLookup::SurfaceBox known = lookup.BoxOfSurface(object);
-  if (known.box_L.isEmpty()) return {};
+                             const ObjectLookup::SurfaceBox& known, const FarPartConfig& config) {
+  if (pixels.empty() || known.box_L.isEmpty()) return {};
   const double grow_m = std::max(config.least_m, config.share * known.box_L.diagonal().norm());
   const Eigen::Vector3d rim = Eigen::Vector3d::Constant(grow_m);
   const Eigen::AlignedBox3d near_L(known.box_L.min() - rim, known.box_L.max() + rim);

@@ -21,14 +21,14 @@ struct FarPartConfig {
 };
 
 // Of a segment's pixels (by rows, with valid depth; `ids` has the frame's segments) those, by rows,
-// of the parts that are far from the object (one of lookup.ids()) that the segment joins; none
-// where the map has no surface of it. A part is what steps in depth leave connected. It is far
-// where nearly all of its points are outside of the box, grown by as much as `config` says.
+// of the parts that are far from the object that the segment joins, of which `known` is the box
+// around what the map has; none where that is empty. A part is what steps in depth leave connected.
+// It is far where nearly all of its points are outside of the box, grown by as much as `config`
+// says.
 //   A part of an object that was not seen before may be far from what was, if something else hides
 // what is between. So a part of least_pixels is not far if it comes to the picture's edge, or has a
 // tenth of its outline beside something nearer that is not of the segment.
 std::vector<int> FindFarPart(const Frame& frame, const cv::Mat& ids, std::span<const int> pixels,
-                             const ObjectLookup& lookup, std::size_t object,
-                             const FarPartConfig& config);
+                             const ObjectLookup::SurfaceBox& known, const FarPartConfig& config);
 
 }  // namespace tsdfpp

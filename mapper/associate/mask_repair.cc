@@ -103,16 +103,16 @@ std::optional<InstanceId> MaskRepair::LikeliestOf(const ObjectLookup& lookup,
 void MaskRepair::Testify(const ObjectLookup& lookup,
                          std::span<const ObjectLookup::Distance> distances,
                          const ObjectCells& cells, const std::set<InstanceId>& unplaced,
-                         const Eigen::Vector3d& p_W, InstanceId label,
-                         std::vector<Testimony>& said) const {
+                         const Eigen::Vector3d& p_W, InstanceId label, Testimonies& said) const {
   for (const auto& [object, voxels, weight] : distances) {
     const InstanceId id = lookup.ids()[object];
     if (unplaced.contains(id)) continue;
     const bool is_own = id == label;
-    if (voxels > config_.take_voxels || (is_own && !contested_.HasAny(id))) continue;
+    if (voxels > config_.take_voxels) continue;
     const auto cell = cells.CellOf(id, p_W);
-    if (!cell || (is_own && !contested_.IsContested(id, *cell))) continue;
-    said.push_back({id, *cell, is_own, weight});
+    if (!cell) continue;
+    const bool is_calm = is_own && !contested_.IsContested(id, *cell);
+    (is_calm ? said.of_calm : said.said).push_back({id, *cell, is_own, weight});
   }
 }
 
@@ -158,13 +158,24 @@ void MaskRepair::Explain(const ObjectLookup& lookup, const ObjectCells& cells, W
     const OfTile of_tile = ExplainTile(lookup, cells, tile & all, work);
     const std::lock_guard lock(mutex);
     for (const auto& [pair, count] : of_tile.explained) work.explained[pair] += count;
-    work.said.insert(work.said.end(), of_tile.said.begin(), of_tile.said.end());
+    const auto append = [](const std::vector<Testimony>& from, std::vector<Testimony>& to) {
+      to.insert(to.end(), from.begin(), from.end());
+    };
+    append(of_tile.said.said, work.said.said);
+    append(of_tile.said.of_calm, work.said.of_calm);
   });
-  contested_.Add(std::move(work.said));
+  std::vector<Testimony>& said = work.said.said;
+  std::vector<Testimony> disputed = said;
+  std::sort(disputed.begin(), disputed.end(), IsOfLowerCell);
+  std::ranges::copy_if(work.said.of_calm, std::back_inserter(said), [&](const Testimony& own) {
+    return std::binary_search(disputed.begin(), disputed.end(), own, IsOfLowerCell);
+  });
+  contested_.Add(std::move(said));
 }
 
-cv::Mat MaskRepair::SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m) {
-  const SurfaceMaps& maps = surfaces_.Compute(frame.depth, frame.intrinsics, {});
+cv::Mat MaskRepair::SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m,
+                                const DepthSegmentsConfig& depth) {
+  const SurfaceMaps& maps = surfaces_.Compute(frame.depth, frame.intrinsics, depth);
   OutlineLabels outlines =
       LabelsByOutline(maps, frame.depth, ids, static_cast<float>(kOutlineStep_voxels * voxel_m));
   is_doubtful_ = outlines.is_doubtful;

@@ -40,7 +40,9 @@ class MaskRepair {
   // The frame's segments (CV_16UC1) with outlines set right: a point that does not go on from its
   // own segment's surface, but does from that of another one beside it, gets that one's id
   // (mapper/associate/outline_surfaces.h). To be called first of each frame.
-  cv::Mat SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m);
+  // `depth` says how noisy the frame's depth is.
+  cv::Mat SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m,
+                      const DepthSegmentsConfig& depth = {});
 
   // The labels (CV_16UC1, ids of the map's objects) that are to be fused instead of `labels`, which
   // are the segments after SetOutlines() as associated, once the map's objects have the frame's
@@ -68,6 +70,13 @@ class MaskRepair {
   // Of a label and an object: points with that label which became the object's.
   using Explained = std::map<std::pair<InstanceId, InstanceId>, std::int64_t>;
 
+  // What a frame's points say. `of_calm` are those of objects' own points in cells that no frame
+  // has disputed before: they count where this one is the first.
+  struct Testimonies {
+    std::vector<Testimony> said;
+    std::vector<Testimony> of_calm;
+  };
+
   // A frame on its way. Of `labels` those are the map's own word where `is_open` is 0.
   struct Work {
     const Frame& frame;
@@ -75,13 +84,13 @@ class MaskRepair {
     cv::Mat labels;
     cv::Mat is_open;  // CV_8UC1
     Explained explained;
-    std::vector<Testimony> said;
+    Testimonies said;
   };
 
   // Of a tile of 32 pixels, into `work`'s images and what is returned.
   struct OfTile {
     Explained explained;
-    std::vector<Testimony> said;
+    Testimonies said;
   };
   OfTile ExplainTile(const ObjectLookup& lookup, const ObjectCells& cells, const cv::Rect& tile,
                      Work& work) const;
@@ -92,7 +101,7 @@ class MaskRepair {
                                         InstanceId label) const;
   void Testify(const ObjectLookup& lookup, std::span<const ObjectLookup::Distance> distances,
                const ObjectCells& cells, const std::set<InstanceId>& unplaced,
-               const Eigen::Vector3d& p_W, InstanceId label, std::vector<Testimony>& said) const;
+               const Eigen::Vector3d& p_W, InstanceId label, Testimonies& said) const;
 
   MaskRepairConfig config_;
   SurfaceMapper surfaces_;

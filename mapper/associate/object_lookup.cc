@@ -1,5 +1,7 @@
 #include "mapper/associate/object_lookup.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,12 +12,15 @@ namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::infinity();
 constexpr float kLeastKnown = 0.5F;  // of the coefficients
+// Of the truncation distance in front, which is all that is stored of what is farther; less than it
+// by more than a half's rounding.
+constexpr float kFree = 0.999F;
 // Further out no voxel is, and indices stay far from the ends of their 21 bits.
 constexpr double kFurthest = double{kBlockSide} * (kFurthestBlock + 1);
 
 // What a volume says at a point of its lattice.
 struct Answer {
-  float distance = kUnknown;  // in the unit of the stored ones; infinite where too little is known
+  float distance = kUnknown;  // signed, as stored; infinite where too little is known
   float weight = 0;
 };
 
@@ -39,7 +44,7 @@ Answer FromObserved(const VoxelReader& reader, const Eigen::Vector3d& q) {
     weights += coefficient * static_cast<float>(block->weight[place]);
   }
   if (!(known >= kLeastKnown)) return {};
-  return {std::abs(sum / known), weights / known};
+  return {sum / known, weights / known};
 }
 
 // Around the points whose eight voxels are not all outside of the blocks.
@@ -59,11 +64,32 @@ Eigen::AlignedBox3d BoxOf(const VoxelReader& reader, const Pose& T_WL, double vo
   return box;
 }
 
+// Of voxels, by axis.
+using Coordinates = std::array<std::vector<int>, 3>;
+
+// But for a share of ObjectLookup::kStray on each side; reorders them.
+Eigen::AlignedBox3d BoxAround(Coordinates& voxels, double voxel_m) {
+  if (voxels[0].empty()) return {};
+  const auto stray =
+      static_cast<std::ptrdiff_t>(ObjectLookup::kStray * static_cast<double>(voxels[0].size()));
+  Eigen::Vector3d low;
+  Eigen::Vector3d high;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<int>& values = voxels[static_cast<std::size_t>(axis)];
+    std::nth_element(values.begin(), values.begin() + stray, values.end());
+    low[axis] = voxel_m * values[static_cast<std::size_t>(stray)];
+    std::nth_element(values.begin(), values.end() - 1 - stray, values.end());
+    high[axis] = voxel_m * *(values.end() - 1 - stray);
+  }
+  return {low, high};
+}
+
 }  // namespace
 
 ObjectLookup::ObjectLookup(const MapRepresentation& map, Of of)
     : voxels_(map.inspection()),
       voxel_m_(map.config().voxel_m),
+      front_m_(static_cast<float>(map.config().trunc_front_voxels * map.config().voxel_m)),
       ids_(map.Objects()),
       one_field_(IsOneField(map.method())) {
   if (of == Of::kObjects) std::erase(ids_, kBackground);
@@ -100,10 +126,9 @@ std::vector<std::size_t> ObjectLookup::Around(const std::vector<Eigen::Vector3d>
   return objects;
 }
 
-ObjectLookup::SurfaceBox ObjectLookup::BoxOfSurface(std::size_t object) const {
-  const Place& place = one_field_ ? places_.front() : places_[object];
-  std::array<std::vector<int>, 3> along;
-  for (const TsdfGrid::Entry* entry : voxels_->GridOf(ids_[object])->Sorted()) {
+void ObjectLookup::VisitSurface(InstanceId of,
+                                const std::function<void(const Index3& voxel)>& visit) const {
+  for (const TsdfGrid::Entry* entry : voxels_->GridOf(of)->Sorted()) {
     const TsdfBlock& block = *entry->block;
     if (!block.AnyNegative()) continue;
     for (int i = 0; i < kBlockVoxels; ++i) {
@@ -112,27 +137,40 @@ ObjectLookup::SurfaceBox ObjectLookup::BoxOfSurface(std::size_t object) const {
           std::abs(float{block.distance[at]}) > static_cast<float>(voxel_m_)) {
         continue;
       }
-      const Index3 voxel = VoxelAt(entry->index, i);
-      if (one_field_ && !voxels_->ValueAt(ids_[object], {voxel.x, voxel.y, voxel.z})) continue;
-      along[0].push_back(voxel.x);
-      along[1].push_back(voxel.y);
-      along[2].push_back(voxel.z);
+      visit(VoxelAt(entry->index, i));
     }
   }
-  SurfaceBox result{place.T_LW, {}};
-  if (along[0].empty()) return result;
-  const auto stray = static_cast<std::ptrdiff_t>(kStray * static_cast<double>(along[0].size()));
-  Eigen::Vector3d low;
-  Eigen::Vector3d high;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<int>& values = along[static_cast<std::size_t>(axis)];
-    std::nth_element(values.begin(), values.begin() + stray, values.end());
-    low[axis] = voxel_m_ * values[static_cast<std::size_t>(stray)];
-    std::nth_element(values.begin(), values.end() - 1 - stray, values.end());
-    high[axis] = voxel_m_ * *(values.end() - 1 - stray);
+}
+
+std::vector<ObjectLookup::SurfaceBox> ObjectLookup::BoxesOfSurfaces(
+    std::span<const std::size_t> objects) const {
+  std::vector<Coordinates> of(objects.size());
+  const auto add = [&](std::size_t i, const Index3& voxel) {
+    of[i][0].push_back(voxel.x);
+    of[i][1].push_back(voxel.y);
+    of[i][2].push_back(voxel.z);
+  };
+  if (one_field_ && !objects.empty()) {
+    VisitSurface(ids_.front(), [&](const Index3& voxel) {
+      const std::vector<Listing> list = voxels_->ListAt({voxel.x, voxel.y, voxel.z});
+      const auto number = list.empty() ? std::nullopt : NumberOf(list.front().id);
+      if (!number) return;
+      const auto place = std::lower_bound(objects.begin(), objects.end(), *number);
+      if (place != objects.end() && *place == *number) {
+        add(static_cast<std::size_t>(place - objects.begin()), voxel);
+      }
+    });
+  } else {
+    tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t i) {
+      VisitSurface(ids_[objects[i]], [&](const Index3& voxel) { add(i, voxel); });
+    });
   }
-  result.box_L = Eigen::AlignedBox3d(low, high);
-  return result;
+  std::vector<SurfaceBox> boxes;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const Place& place = one_field_ ? places_.front() : places_[objects[i]];
+    boxes.push_back({place.T_LW, BoxAround(of[i], voxel_m_)});
+  }
+  return boxes;
 }
 
 bool ObjectLookup::HasSurfaceAround(std::size_t object, const Eigen::Vector3d& p_W) const {
@@ -158,7 +196,9 @@ void ObjectLookup::Distances(const Eigen::Vector3d& p_W, std::span<const std::si
   const auto at = [&](const Place& place) {
     const Eigen::Vector3d q = place.T_LW * p_W / voxel_m_;
     Answer answer = FromObserved(place.reader, q);
-    answer.distance /= static_cast<float>(voxel_m_);
+    // Free space, however far from the surface.
+    if (answer.distance >= kFree * front_m_) return Answer{};
+    answer.distance = std::abs(answer.distance) / static_cast<float>(voxel_m_);
     return answer;
   };
   if (!one_field_) {

@@ -1,6 +1,7 @@
 // How far points are from the surfaces of a map's objects: all that association asks of a map.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,9 +39,9 @@ class ObjectLookup {
   };
 
   // The distances of a point to the surfaces of those objects (some of ids(), increasing) that say
-  // something there, each at its last pose. They and the weights are interpolated between those of
-  // the eight voxels around the point that are observed, which must make up half of the
-  // coefficients.
+  // something there but that it is free, each at its last pose. They and the weights are
+  // interpolated between those of the eight voxels around the point that are observed, which must
+  // make up half of the coefficients.
   void Distances(const Eigen::Vector3d& p_W, std::span<const std::size_t> objects,
                  std::vector<Distance>& distances) const;
 
@@ -52,7 +53,9 @@ class ObjectLookup {
     Eigen::AlignedBox3d box_L;  // metres
   };
   static constexpr double kStray = 0.03;
-  SurfaceBox BoxOfSurface(std::size_t object) const;
+  // Of each of those objects (some of ids(), increasing), at the cost of their voxels, or of the
+  // one field's.
+  std::vector<SurfaceBox> BoxesOfSurfaces(std::span<const std::size_t> objects) const;
 
   // Whether the volume of an object (one of ids(); all of one field) has a surface in the block of
   // the point, which is of the world's frame, or in one beside it.
@@ -65,8 +68,12 @@ class ObjectLookup {
     Eigen::AlignedBox3d box_W;  // around all points that it can say something about
   };
 
+  // The voxels of an object's grid that are on its surface.
+  void VisitSurface(InstanceId of, const std::function<void(const Index3& voxel)>& visit) const;
+
   const VoxelInspection* voxels_;
   double voxel_m_;
+  float front_m_;  // the truncation distance
   std::vector<InstanceId> ids_;
   std::vector<Place> places_;  // of ids_, or of the one field
   bool one_field_;

@@ -21,7 +21,7 @@ Expected<void> VoteConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckVote("near_share", near_share, 0.01, 1));
   TSDFPP_RETURN_IF_ERROR(CheckVote("recent_frames", recent_frames, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("max_points", max_points, 1, 1'000'000));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("min_points", min_points, 1, 1'000'000));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("min_points", min_points, 1, max_points));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_window", confirm_window, confirm_frames, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("hold_frames", hold_frames, 0, 1000));

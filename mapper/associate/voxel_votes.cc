@@ -152,11 +152,20 @@ void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const Obj
                              .least_m = config_.near_voxels * voxel_m,
                              .step_m = std::max(FarPartConfig{}.step_m, kStep_voxels * voxel_m),
                              .least_pixels = config_.min_points};
+  std::vector<std::size_t> joined;
+  for (const Segment& segment : segments) {
+    if (segment.is_known && segment.object) joined.push_back(*segment.object);
+  }
+  std::ranges::sort(joined);
+  joined.erase(std::ranges::unique(joined).begin(), joined.end());
+  const std::vector<ObjectLookup::SurfaceBox> boxes = lookup.BoxesOfSurfaces(joined);
   std::vector<std::vector<int>> far(segments.size());
   tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t s) {
     const Segment& segment = segments[s];
     if (!segment.is_known || !segment.object) return;
-    far[s] = FindFarPart(frame, ids, segment.pixels, lookup, *segment.object, config);
+    const auto place = std::ranges::lower_bound(joined, *segment.object) - joined.begin();
+    far[s] =
+        FindFarPart(frame, ids, segment.pixels, boxes[static_cast<std::size_t>(place)], config);
   });
   const std::size_t wholes = segments.size();
   for (std::size_t s = 0; s < wholes; ++s) {
@@ -268,7 +277,8 @@ void VoxelVotes::GiveBirth(const ObjectLookup& lookup, std::vector<Segment>& seg
     unclaimed.push_back(&segment);
     points_W.push_back(segment.points_W);
     may_begin.push_back(segment.is_known && !segment.is_far_part);
-    is_held.push_back(may_be_missing_ && may_be_missing_(segment.pixels, unseen));
+    is_held.push_back(may_begin.back() && may_be_missing_ &&
+                      may_be_missing_(segment.pixels, unseen));
   }
   if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
   using enum Candidates::Candidacy;
@@ -321,6 +331,7 @@ void VoxelVotes::Cut(const Frame& frame, const ObjectLookup& lookup, const Segme
 AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segments,
                                         const MapRepresentation& map) {
   next_ = state_;
+  if (!SaysWhatIsWhere(segments.ids)) return {.labels = segments.ids.clone()};
   ++next_.frame;
   const ObjectLookup lookup(map, segments.unknown.empty()
                                      ? ObjectLookup::Of::kObjects
@@ -363,7 +374,7 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
     const bool is_born = segment.label != kNoInstance && segment.label != kBackground;
     if (is_born) continue;
     association.unclaimed.push_back(std::move(segment.pixels));
-    association.may_begin.push_back(segment.is_known);
+    association.may_begin.push_back(segment.is_known && !segment.is_far_part);
   }
   for (const Segment& segment : found) {
     if (!segment.object || (segment.is_known && segment.shared_with.empty())) continue;

@@ -51,7 +51,8 @@ class VoxelVotes : public Associator {
   //     Unknown segments and far parts may be the candidate that a known one was before, which
   //     waits on, but begin none. Else, if they are unknown, they are background, or held back
   //     where cut_share of their points vote for one object.
-  // The background (id 0 of the segments) stays the background. Ties go to the lower id.
+  // The background (id 0 of the segments) stays the background. Ties go to the lower id. A frame
+  // whose segments say nothing at all counts for nothing.
   AssociatedObjects Associate(const Frame& frame, const Segments& segments,
                               const MapRepresentation& map) override;
 

@@ -22,6 +22,10 @@ cv::Mat Segments::IdsOfObjects() const {
   return of_objects;
 }
 
+bool SaysWhatIsWhere(const cv::Mat& ids) {
+  return cv::countNonZero(ids != static_cast<double>(kNoInstance)) > 0;
+}
+
 std::unique_ptr<Segmenter> MakeSegmenter(Segmentation segmentation,
                                          const std::vector<ObjectInfo>& objects,
                                          const SegmenterParts& parts) {

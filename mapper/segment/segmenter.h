@@ -31,6 +31,10 @@ struct Segments {
   cv::Mat IdsOfObjects() const;
 };
 
+// Whether any pixel (CV_16UC1) is said to be of something, the background perhaps. Between the
+// frames that a network looks at, none is.
+bool SaysWhatIsWhere(const cv::Mat& ids);
+
 class Segmenter {
  public:
   virtual ~Segmenter() = default;

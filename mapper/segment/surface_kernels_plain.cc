@@ -104,7 +104,7 @@ void AddPairs(const float* before, const float* q, const float* behind, std::siz
     const float tolerance = scale.sigmas * (HeadOnInverse(q[u], scale.noise) + shift);
     const float both = before[u] + behind[u];
     const float off = std::abs(both - (q[u] + q[u]));
-    const bool taken = before[u] != 0 && behind[u] != 0 && off <= tolerance;
+    const bool taken = before[u] != 0 && q[u] != 0 && behind[u] != 0 && off <= tolerance;
     sum[u] += taken ? both : 0.0F;
     count[u] += taken ? 2.0F : 0.0F;
   }

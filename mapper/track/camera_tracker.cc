@@ -47,8 +47,10 @@ SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   return config;
 }
 
-// kRoom where the segments say kBackground, else kNoInstance.
+// kRoom where the segments say kBackground, else kNoInstance; where they say nothing at all, it is
+// the most of the picture.
 cv::Mat RoomOf(const cv::Mat& segments) {
+  if (!SaysWhatIsWhere(segments)) return {segments.size(), CV_16UC1, cv::Scalar(kRoom)};
   cv::Mat room(segments.size(), CV_16UC1, cv::Scalar(kNoInstance));
   room.setTo(kRoom, segments == static_cast<double>(kBackground));
   return room;

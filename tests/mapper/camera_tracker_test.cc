@@ -118,6 +118,18 @@ TEST(CameraTracker, FindsTheCameraFromItsFirstPoseAlone) {
   ExpectFound(pipeline, kFrames);
 }
 
+// Between the frames that a network looks at nobody knows what is of an object, and the room is
+// most of what is seen.
+TEST(CameraTracker, FindsTheCameraWhereMasksSayNothing) {
+  Pipeline pipeline(ConfigOf(CameraSource::kTrack), Toys());
+  for (int i = 1; i <= kFrames; ++i) {
+    Frame frame = Room(i);
+    if (i % 2 == 0) frame.mask.setTo(static_cast<double>(kNoInstance));
+    ASSERT_TRUE(pipeline.Process(frame));
+  }
+  ExpectFound(pipeline, kFrames);
+}
+
 TEST(CameraTracker, LeavesAFrameOutWhereTheCameraIsLost) {
   Pipeline pipeline(ConfigOf(CameraSource::kTrack), Toys());
   for (int i = 1; i <= 6; ++i) ASSERT_TRUE(pipeline.Process(Room(i)));

@@ -57,6 +57,10 @@ std::vector<int> PixelsOf(const Frame& frame, const cv::Mat& mask, InstanceId id
   return pixels;
 }
 
+ObjectLookup::SurfaceBox BoxOf(const ObjectLookup& lookup, std::size_t object) {
+  return lookup.BoxesOfSurfaces({&object, 1}).front();
+}
+
 class FarPartOfMethod : public EveryMethodTest {
  protected:
   FarPartOfMethod() : map_(MakeMap(GetParam(), ToyConfig())) {
@@ -65,8 +69,8 @@ class FarPartOfMethod : public EveryMethodTest {
   std::vector<int> Far(const Frame& frame, const cv::Mat& mask,
                        const FarPartConfig& config = kConfig) const {
     const ObjectLookup lookup(*map_);
-    return FindFarPart(frame, mask, PixelsOf(frame, mask, kBrick), lookup, *lookup.NumberOf(kBrick),
-                       config);
+    return FindFarPart(frame, mask, PixelsOf(frame, mask, kBrick),
+                       BoxOf(lookup, *lookup.NumberOf(kBrick)), config);
   }
   // Of the pixels that are far, those of the ball and others.
   static void ExpectTheBall(const Frame& frame, const std::vector<int>& far) {
@@ -155,7 +159,7 @@ TEST_P(FarPartOfMethod, IsNotWhatGoesOnOutsideOfThePicture) {
 // From the voxels, one by one.
 TEST_P(FarPartOfMethod, IsMeasuredFromTheBoxOfTheSurface) {
   const ObjectLookup lookup(*map_);
-  const auto found = lookup.BoxOfSurface(*lookup.NumberOf(kBrick));
+  const auto found = BoxOf(lookup, *lookup.NumberOf(kBrick));
   std::array<std::vector<int>, 3> along;
   for (const Eigen::Vector3i& voxel : VoxelsOf(*map_).ObservedVoxels(kBrick)) {
     const auto value = VoxelsOf(*map_).ValueAt(kBrick, voxel);
@@ -190,7 +194,7 @@ TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
                 {world.ids().Of(i < kAlone ? MergedMask(frame) : cv::Mat(frame.mask)), {}, {}});
     }
     const ObjectLookup lookup(world.map());
-    return std::pair(world.map().Objects(), lookup.BoxOfSurface(0).box_L.sizes().maxCoeff());
+    return std::pair(world.map().Objects(), BoxOf(lookup, 0).box_L.sizes().maxCoeff());
   };
   const double far_share = VoteConfig{}.far_share;
   const auto [objects, length_m] = map_all(kAlone, far_share);
@@ -200,6 +204,20 @@ TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
   const auto [without, long_m] = map_all(kAlone, 0);
   EXPECT_EQ(without, (std::vector<InstanceId>{0, 1}));
   EXPECT_GT(long_m, 0.3);
+}
+
+// Nor may a lost object's model begin on it.
+TEST(FarPart, BeginsNothing) {
+  ToyVotes world;
+  for (int i = 0; i < 5; ++i) world.Map(View(BrickAlone(), i));
+  reference::Scene scene = BrickAlone();
+  AddBall(scene, {-0.2, 0.05, kTableTop_m + 0.055});
+  const Frame frame = View(scene, 5);
+  const auto merged = world.ids().Of(MergedMask(frame));
+  const auto found = world.votes().Associate(frame, {merged, {}, {}}, world.map());
+  ASSERT_EQ(found.unclaimed.size(), 1U);
+  EXPECT_EQ(found.unclaimed[0], PixelsOf(frame, frame.mask, kBall));
+  EXPECT_EQ(found.may_begin, std::vector<bool>{false});
 }
 
 // That nearly all of the brick and of the ball has the label of its object.
@@ -272,8 +290,8 @@ TEST(FarPart, DoesNotKeepTheRestFromBeingCut) {
   const ObjectLookup lookup(world.map());
   std::map<InstanceId, InstanceId> id_of;
   for (const auto& [id, truth] : world.truth_of()) id_of[truth] = id;
-  const auto far = FindFarPart(frame, merged, PixelsOf(frame, merged, kBrick), lookup,
-                               *lookup.NumberOf(id_of.at(kBrick)), kConfig);
+  const auto far = FindFarPart(frame, merged, PixelsOf(frame, merged, kBrick),
+                               BoxOf(lookup, *lookup.NumberOf(id_of.at(kBrick))), kConfig);
   const auto ball = PixelsOf(frame, frame.mask, kBall);
   ASSERT_GT(far.size(), ball.size() / 5);
   ASSERT_LT(far.size(), ball.size() / 2);

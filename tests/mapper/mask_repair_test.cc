@@ -362,6 +362,39 @@ TEST_P(MaskRepairOfVolumes, NothingIsTakenOutOfWhatIsNotKnownToBeThere) {
   EXPECT_GE(VoxelsOf(world_.map()).ObservedVoxels(kBall).size(), at_first);
 }
 
+// A mask that is wrong at a few points of each cell is not a dispute: the others are heard as well.
+TEST(MaskRepair, AFewPointsDisputeNothing) {
+  const auto frames_until_lost = [](bool is_speckled) {
+    RepairedWorld world(Method::kTsdfppAnchored);
+    int index = 0;
+    for (; index < 6; ++index) world.Map(StillFrame(index));
+    if (is_speckled) {
+      const Frame frame = StillFrame(index);
+      cv::Mat mask = frame.mask.clone();
+      for (int v = 0; v + 1 < mask.rows; v += 7) {
+        for (int u = 0; u + 1 < mask.cols; u += 7) {
+          cv::Mat speckle = mask(cv::Rect(u, v, 2, 2));
+          speckle.setTo(static_cast<double>(kTray), speckle == static_cast<double>(kBrick));
+        }
+      }
+      EXPECT_GT(cv::countNonZero(mask != frame.mask), 20);
+      world.Map(frame, mask);
+    } else {
+      world.Map(StillFrame(index));
+    }
+    const auto at_first = VoxelsOf(world.map()).ObservedVoxels(kBrick).size();
+    for (int frames = 1; frames < 30; ++frames) {
+      const Frame frame = StillFrame(index + frames);
+      world.Map(frame, With(frame.mask, kBrick, kBackground));
+      if (VoxelsOf(world.map()).ObservedVoxels(kBrick).size() < at_first) return frames;
+    }
+    return 30;
+  };
+  const int without = frames_until_lost(false);
+  EXPECT_LT(without, 30);
+  EXPECT_EQ(frames_until_lost(true), without);
+}
+
 // --- Settings ----------------------------------------------------------------------------------
 
 TEST(MaskRepairConfig, ReadsWhatItWrites) {

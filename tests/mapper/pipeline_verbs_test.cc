@@ -148,17 +148,17 @@ TEST(PipelineVerbs, TheStartOfAMapAsksOnlyWhetherThereAreMasks) {
   EXPECT_FALSE(std::regex_search(text, mask));
 }
 
-// A mask over a brick and a ball far behind it: two objects where masks are repaired, else one.
-TEST(PipelineVerbs, AssociationPartsMasksWhereTheyAreRepaired) {
-  for (const MaskRepairMode mode : {MaskRepairMode::kOff, MaskRepairMode::kOn}) {
-    SCOPED_TRACE(MaskRepairModeName(mode));
+// A mask over a brick and a ball far behind it, of which the ball does not become the brick's.
+TEST(PipelineVerbs, AssociationPartsMasks) {
+  for (const double far_share : {0.0, VoteConfig{}.far_share}) {
+    SCOPED_TRACE(far_share);
     PipelineConfig config;
     config.method = Method::kTsdfppAnchored;
     config.map = ToyConfig();
     config.associate = AssociationMode::kVotes;
     config.poses = PoseSource::kTrack;
     config.tracked = TrackChoice::kAll;
-    config.mask_repair = mode;
+    config.votes.far_share = far_share;
     Pipeline pipeline(config, {});
     for (int i = 1; i < 10; ++i) {
       reference::Scene scene = TableOnly();
@@ -172,8 +172,9 @@ TEST(PipelineVerbs, AssociationPartsMasksWhereTheyAreRepaired) {
     EXPECT_EQ(pipeline.map().Objects(), (std::vector<InstanceId>{0, 1}));
     // The brick is 150 mm long, the ball 300 mm off.
     const ObjectLookup lookup(pipeline.map());
-    const double length_m = lookup.BoxOfSurface(0).box_L.sizes().maxCoeff();
-    EXPECT_EQ(length_m < 0.2, mode == MaskRepairMode::kOn) << length_m;
+    const auto boxes = lookup.BoxesOfSurfaces(std::array{std::size_t{0}});
+    const double length_m = boxes.front().box_L.sizes().maxCoeff();
+    EXPECT_EQ(length_m<0.2, far_share> 0) << length_m;
   }
 }
 

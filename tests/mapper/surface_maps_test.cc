@@ -88,6 +88,22 @@ TEST(SurfaceMaps, EqualTheSlowOnesAcrossGaps) {
   ExpectEqualToReference(WithGaps(test::WithNoise(ThreeThings(), 4)), Kinect());
 }
 
+// Where noise is so loud that nearly any two values agree, too.
+TEST(SurfaceMaps, NothingIsMadeUpInAHole) {
+  constexpr int kWide_px = 3;
+  Frame frame;
+  frame.intrinsics = {160, 120, 140, 140, 79.5, 59.5};
+  frame.depth = cv::Mat(120, 160, CV_32FC1, cv::Scalar(20));
+  const cv::Mat hole = frame.depth(cv::Rect(80, 0, kWide_px, 120));
+  hole.setTo(0);
+  DepthSegmentsConfig config;
+  config.noise_scale = 10;
+  ASSERT_GT(kWide_px, config.gap_px);
+  SurfaceMapper mapper;
+  const SurfaceMaps& maps = mapper.Compute(frame.depth, frame.intrinsics, config);
+  EXPECT_EQ(cv::countNonZero(maps.inverse_depth), 120 * (160 - kWide_px));
+}
+
 TEST(SurfaceMaps, NormalsOfATableAreItsOwn) {
   const Eigen::Vector3d eye(0.1, -0.8, 0.7);
   const Frame frame = Look({Table()}, eye);

@@ -337,6 +337,59 @@ TEST(VoxelVotes, ClassesGoToTheObjects) {
   }
 }
 
+// A network that looks at every third frame says nothing of those between.
+TEST(VoxelVotes, FramesThatSayNothingCountForNothing) {
+  ToyVotes world;
+  for (int i = 0; i < 12; ++i) {
+    const Frame frame = RenderToys(TableWithToys(), 0.2 + 0.05 * i, i);
+    if (i % 3 == 0) {
+      world.Map(frame);
+      continue;
+    }
+    const cv::Mat nothing(frame.mask.size(), CV_16UC1, cv::Scalar(kNoInstance));
+    const cv::Mat labels = world.Map(frame, {nothing, {}, {}});
+    EXPECT_EQ(CountOf(labels, kNoInstance), static_cast<int>(labels.total()));
+  }
+  EXPECT_EQ(world.map().Objects(), (std::vector<InstanceId>{0, 1, 2, 3}));
+}
+
+// To ask is slow, and a piece of a table begins nothing anyhow.
+TEST(VoxelVotes, AsksForWhatIsMissingOnlyWhereSomethingMayBegin) {
+  ToyVotes world;
+  const Frame frame = RenderToys(TableWithToys(), 0.2);
+  const auto asked = [&](const std::vector<InstanceId>& unknown) {
+    int count = 0;
+    world.votes().ExpectReturns([&](const auto&, const auto&) { return ++count > 0; });
+    world.votes().Associate(frame, {frame.mask, {}, unknown}, world.map());
+    world.votes().ExpectReturns({});
+    return count;
+  };
+  EXPECT_EQ(asked({}), 3);
+  EXPECT_EQ(asked({kBrick, kTray}), 1);
+}
+
+// All that is stored of free space is that the surface is not near.
+TEST(ObjectLookup, SaysNothingOfFreeSpace) {
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  for (int i = 0; i < 3; ++i) {
+    const Frame frame = RenderToys(TableWithToys(), 0.2 + 0.05 * i, i);
+    for (const auto& [id, pose] : frame.T_WO) map->SetObjectPose(id, pose);
+    map->Fuse(frame, frame.mask);
+  }
+  const ObjectLookup lookup(*map);
+  const std::vector<std::size_t> brick{*lookup.NumberOf(kBrick)};
+  const Eigen::Vector3d top_W(-0.14, 0.03, kTableTop_m + 0.09);
+  std::vector<ObjectLookup::Distance> distances;
+  const auto answers_at = [&](double voxels) {
+    lookup.Distances(top_W + voxels * kToyVoxel_m * Eigen::Vector3d::UnitZ(), brick, distances);
+    return distances.size();
+  };
+  EXPECT_EQ(answers_at(0), 1U);
+  EXPECT_EQ(answers_at(2), 1U);
+  // Distances are along rays, and these come from above at an angle.
+  EXPECT_EQ(answers_at(ToyConfig().trunc_front_voxels + 1), 0U);
+}
+
 TEST(VoteConfig, SurvivesToml) {
   const VoteConfig config{1.25, 0.25, 0.15, 4, 0.6, 2, 1000, 40, 2, 4, 30, 0.3};
   const auto read = VoteConfig::FromToml(config.ToToml(), "t.toml");
@@ -354,7 +407,9 @@ TEST(VoteConfig, NamesWhatIsWrong) {
       {"near_share = -1.0", "'near_share' is -1, expected 0.01 to 1"},
       {"recent_frames = -1", "'recent_frames' is -1, expected 0 to 1000"},
       {"max_points = 0", "'max_points' is 0, expected 1 to 1000000"},
-      {"min_points = 0", "'min_points' is 0, expected 1 to 1000000"},
+      {"min_points = 0", "'min_points' is 0, expected 1 to 2000"},
+      {"max_points = 40", "'min_points' is 50, expected 1 to 40"},
+      {"far_share = -0.1", "'far_share' is -0.1, expected 0 to 100"},
       {"confirm_frames = 0", "'confirm_frames' is 0, expected 1 to 1000"},
       {"confirm_window = 2", "'confirm_window' is 2, expected 3 to 1000"},
       {"votes = 2", "votes"}};
