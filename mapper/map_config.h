@@ -81,6 +81,12 @@ struct MapConfig {
   float front() const { return RoundToHalf(static_cast<float>(trunc_front_voxels * voxel_m)); }
   float back() const { return RoundToHalf(static_cast<float>(trunc_back_voxels * voxel_m)); }
 
+  // Whether an observed voxel of a map may hold these values, the distance in metres.
+  bool Stores(float distance, double weight, int colours) const {
+    return distance >= -back() && distance <= front() && weight >= 1 && weight <= weight_cap &&
+           colours <= weight_cap;
+  }
+
   float vote_band() const { return static_cast<float>(vote_band_voxels * voxel_m); }
   // Metres; infinite where the whole band is coloured.
   float colour_band() const { return ColourBandOf(kColourBand_voxels); }

@@ -2,6 +2,8 @@
 // map may have none of it (MapRepresentation::editing).
 #pragma once
 
+#include <optional>
+
 #include "core/error.h"
 #include "core/types.h"
 #include "mapper/volume/tsdf_block.h"
@@ -21,12 +23,14 @@ class MapEditing {
   virtual Expected<void> Rename(InstanceId from, InstanceId to) = 0;
 
   // Puts a volume into the map as a new object whose pose is T_WO, with the volume's lattice at
-  // T_WL; it arrives as if it had moved there (docs/map.md, "Renaming and adding an object"). The
-  // voxel size must be the map's, and every block must hold an observed voxel. Errors: kUsage where
-  // the id is in the map (a pose given is enough), the background or no id; kData where a part
-  // would lie beyond the map's range or a pose is not rigid; the map is then unchanged.
+  // T_WL; it arrives as if it had moved there (docs/map.md, "Renaming and adding an object").
+  // Without a pose it has none yet, and its lattice must be the world's. The voxel size must be the
+  // map's, and every block must hold an observed voxel. Errors: kUsage where the id is in the map
+  // (a pose given is enough), the background or no id, or the lattice is another than the world's
+  // and there is no pose; kData where a part would lie beyond the map's range, a pose is not rigid,
+  // or a voxel holds what the map's cannot (MapConfig::Stores()); the map is then unchanged.
   virtual Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                             const Pose& T_WO) = 0;
+                             const std::optional<Pose>& T_WO) = 0;
 };
 
 // The map's, for whoever knows that it has one: aborts where it has none.

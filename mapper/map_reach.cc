@@ -177,16 +177,46 @@ Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, cons
   return holds_all ? Expected<void>{} : CheckPixels(range, frame, labels, T_WL, config);
 }
 
+namespace {
+
+Expected<void> CheckValues(const MapConfig& config, const TsdfGrid& volume,
+                           const std::string& what) {
+  for (const TsdfGrid::Entry& entry : volume.entries()) {
+    const TsdfBlock& block = *entry.block;
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      if (block.weight[i] == 0) continue;
+      const float distance = block.distance[i];
+      if (config.Stores(distance, block.weight[i], block.ColourCount(i))) {
+        continue;
+      }
+      return DataError(
+          "{}'s volume has a voxel of distance {} m, weight {} and {} colours, expected {} m to {} "
+          "m and at most {}, as the map's have",
+          what, distance, int{block.weight[i]}, block.ColourCount(i), -config.back(),
+          config.front(), config.weight_cap);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 Expected<void> CheckAddition(const MapConfig& config, InstanceId id, const TsdfGrid& volume,
-                             const Pose& T_WL, const Pose& T_WO) {
+                             const Pose& T_WL, const std::optional<Pose>& T_WO) {
   const LatticeRange range(config.voxel_m);
   const std::string what = fmt::format("object {}", id);
-  TSDFPP_RETURN_IF_ERROR(CheckRigid(T_WO, what + "'s"));
+  if (T_WO) TSDFPP_RETURN_IF_ERROR(CheckRigid(*T_WO, what + "'s"));
   TSDFPP_RETURN_IF_ERROR(CheckRigid(T_WL, what + "'s lattice's"));
-  TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, T_WO, what + " is posed at"));
-  // The pose at birth is kept too, where the lattice stays the object's own.
-  TSDFPP_RETURN_IF_ERROR(
-      CheckTranslation(range, T_WL.inverse() * T_WO, what + "'s pose in its own lattice is at"));
+  if (!T_WO && T_WL.matrix() != Pose::Identity().matrix()) {
+    return UsageError("{} has no pose and a lattice of its own, expected that of the world", what);
+  }
+  if (T_WO) {
+    TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, *T_WO, what + " is posed at"));
+    // The pose at birth is kept too, where the lattice stays the object's own.
+    TSDFPP_RETURN_IF_ERROR(
+        CheckTranslation(range, T_WL.inverse() * *T_WO, what + "'s pose in its own lattice is at"));
+  }
+  TSDFPP_RETURN_IF_ERROR(CheckValues(config, volume, what));
   ObjectMove move;
   move.blocks = &volume;
   TSDFPP_RETURN_IF_ERROR(CheckMoved(range, move, 0, what + "'s volume has a part at"));

@@ -26,9 +26,10 @@ Expected<void> CheckFrameForm(const Frame& frame);
 Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,
                           const std::map<InstanceId, Pose>& T_WO);
 
-// For Add(): the volume, where it is to be and the pose. Errors: kData, a sentence.
+// For Add(): the volume, where it is to be and the pose. Errors: kData, a sentence; kUsage where
+// there is no pose, and the lattice is not the world's.
 Expected<void> CheckAddition(const MapConfig& config, InstanceId id, const TsdfGrid& volume,
-                             const Pose& T_WL, const Pose& T_WO);
+                             const Pose& T_WL, const std::optional<Pose>& T_WO);
 
 // Aborts with the sentence where a frame that is about to be fused is refused by CheckFrameForm or
 // CheckReach: who fuses into a map by himself asks first.

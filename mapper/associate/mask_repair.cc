@@ -190,7 +190,8 @@ cv::Mat MaskRepair::Repair(const Frame& frame, const cv::Mat& labels,
   const ObjectCells voxels(T_WO, voxel_m);
   for (const auto& [object, cells] : contested_.TakeLost()) {
     const auto pose = T_WO.find(object);
-    TakeOut(cells, voxel_m, object, pose == T_WO.end() ? Pose::Identity() : pose->second, map);
+    TakeOut(cells, voxel_m, object,
+            pose == T_WO.end() ? std::nullopt : std::optional<Pose>(pose->second), map);
   }
   const ObjectLookup lookup(map, ObjectLookup::Of::kObjectsAndBackground);
   Work work{frame, unplaced, labels.clone(), LabelledPixels(frame, labels), {}, {}};

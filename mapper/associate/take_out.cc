@@ -33,8 +33,8 @@ void ClearBox(const Eigen::Vector3d& centre, double reach, TsdfGrid& grid,
 
 }  // namespace
 
-void TakeOut(const std::vector<Index3>& cells, double cell_m, InstanceId object, const Pose& T_WO,
-             MapRepresentation& map) {
+void TakeOut(const std::vector<Index3>& cells, double cell_m, InstanceId object,
+             const std::optional<Pose>& T_WO, MapRepresentation& map) {
   const VoxelInspection* voxels = map.inspection();
   MapEditing* editing = map.editing();
   if (object == kBackground || voxels == nullptr || editing == nullptr) return;
@@ -44,7 +44,7 @@ void TakeOut(const std::vector<Index3>& cells, double cell_m, InstanceId object,
 
   TsdfGrid grid = *stored;
   const Pose T_WL = map.ObjectLattice(object);
-  const Pose T_LO = T_WL.inverse() * T_WO;
+  const Pose T_LO = T_WL.inverse() * T_WO.value_or(Pose::Identity());
   const double voxel_m = map.config().voxel_m;
   const double reach = cell_m / voxel_m / 2 + kBesideCell_voxels;
   std::vector<Index3> changed;
@@ -64,7 +64,11 @@ void TakeOut(const std::vector<Index3>& cells, double cell_m, InstanceId object,
   }
   grid.Erase(empty);
   map.Remove(object);
-  if (grid.empty()) return;
+  if (grid.empty()) {
+    // What the frame still brings of it is at that pose.
+    if (T_WO) map.SetObjectPose(object, *T_WO);
+    return;
+  }
   // Poses and place are those that the map had: nothing of it can be refused.
   if (!editing->Add(object, grid, T_WL, T_WO)) std::abort();
 }

@@ -175,7 +175,8 @@ void VotingIndex::Update(const std::vector<FusedBlock>& fused,
               ListWithRoom(lists, place).Append(changes[k].id, 1);
             });
           });
-          group.emptied = lost_any && IsEmpty(lists);
+          // Also where the frame was the first to look at covers that no list has room for.
+          group.emptied = IsEmpty(lists);
           if (lost_any && !group.emptied) FreeEmptyLayers(lists);
         }
       },

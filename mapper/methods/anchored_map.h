@@ -18,7 +18,7 @@ class AnchoredMap final : public ObjectVolumeMap {
   void Remove(InstanceId id) override;
   Expected<void> Rename(InstanceId from, InstanceId to) override;
   Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                     const Pose& T_WO) override;
+                     const std::optional<Pose>& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<Eigen::Vector3i> ListedVoxels() const override;
   MapMemory Memory() const override;

@@ -112,7 +112,7 @@ Expected<void> ObjectVolumeMap::Rename(InstanceId from, InstanceId to) {
 }
 
 Expected<void> ObjectVolumeMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                                    const Pose& T_WO) {
+                                    const std::optional<Pose>& T_WO) {
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, volumes_.contains(id)));
   TSDFPP_RETURN_IF_ERROR(CheckAddition(config_, id, volume, T_WL, T_WO));
   ObjectVolume& added = volumes_[id];
@@ -122,7 +122,7 @@ Expected<void> ObjectVolumeMap::Add(InstanceId id, const TsdfGrid& volume, const
     return {};
   }
   // T_WL = T_WO * T_WO(birth)^-1
-  added.T_WO_birth = SameNumbers(T_WL, Pose::Identity()) ? T_WO : T_WL.inverse() * T_WO;
+  if (T_WO) added.T_WO_birth = SameNumbers(T_WL, Pose::Identity()) ? *T_WO : T_WL.inverse() * *T_WO;
   PlaceLattice(added);
   added.grid = InWorldLattice(volume, Pose::Identity(), config_);
   return {};

@@ -26,7 +26,7 @@ class ObjectVolumeMap : public VoxelMap {
   // first part of it for one with an index.
   Expected<void> Rename(InstanceId from, InstanceId to) override;
   Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                     const Pose& T_WO) override;
+                     const std::optional<Pose>& T_WO) override;
   MapMemory Memory() const override;
   void Save(Sections& sections) const override;
   // Covers are not up to date.

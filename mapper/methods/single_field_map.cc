@@ -137,10 +137,10 @@ Expected<void> SingleFieldMap::Rename(InstanceId from, InstanceId to) {
 }
 
 Expected<void> SingleFieldMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                                   const Pose& T_WO) {
+                                   const std::optional<Pose>& T_WO) {
   TSDFPP_RETURN_IF_ERROR(CheckNewId(id, IsKnown(id)));
   TSDFPP_RETURN_IF_ERROR(CheckAddition(config_, id, volume, T_WL, T_WO));
-  T_WO_.insert_or_assign(id, T_WO);
+  if (T_WO) T_WO_.insert_or_assign(id, *T_WO);
   const TsdfGrid arrivals = InWorldLattice(volume, T_WL, config_);
   const auto confidence = [this](std::size_t) {
     return static_cast<std::uint16_t>(config_.moved_confidence);

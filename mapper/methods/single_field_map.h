@@ -28,7 +28,7 @@ class SingleFieldMap final : public VoxelMap {
   void Remove(InstanceId id) override;
   Expected<void> Rename(InstanceId from, InstanceId to) override;
   Expected<void> Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                     const Pose& T_WO) override;
+                     const std::optional<Pose>& T_WO) override;
   std::unique_ptr<MapRepresentation> Clone() const override;
   std::vector<InstanceId> Objects() const override;
   Pose ObjectLattice(InstanceId id) const override;

@@ -52,7 +52,7 @@ Expected<void> TsdfppMap::Rename(InstanceId from, InstanceId to) {
 }
 
 Expected<void> TsdfppMap::Add(InstanceId id, const TsdfGrid& volume, const Pose& T_WL,
-                              const Pose& T_WO) {
+                              const std::optional<Pose>& T_WO) {
   TSDFPP_RETURN_IF_ERROR(ObjectVolumeMap::Add(id, volume, T_WL, T_WO));
   index_.Activate(id, volumes_.at(id).grid);
   CheckInDebugBuilds(*this);

@@ -159,7 +159,9 @@ float TileCast::ThroughContested(std::uint32_t number, const TileValues& from, s
     for (const HiddenQuery& query : queries_) {
       const std::size_t i = query.pixel;
       if (query.hidden) {
-        trial_from_[i] = trial_.depth[i] + past;
+        // Far away a step of that length is none.
+        trial_from_[i] =
+            std::max(trial_.depth[i] + past, std::nextafter(trial_.depth[i], kInfinite));
         trial_.depth[i] = hits.depth[i];
       } else {
         Copy(trial_, hits, i);

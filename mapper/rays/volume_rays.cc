@@ -42,10 +42,10 @@ class Claims {
     const double size =
         (high_.x - low_.x + 1.0) * (high_.y - low_.y + 1.0) * (high_.z - low_.z + 1.0);
     if (size > kLargestTable) return;
-    table_.resize(static_cast<std::size_t>(size), kNoInstance);
+    table_.resize(static_cast<std::size_t>(size), kNobody);
     for (const auto& [index, id] : claims) {
-      InstanceId& owner = table_[PlaceOf(index)];
-      owner = owner == kNoInstance || owner == id ? id : kSeveral;
+      std::int32_t& owner = table_[PlaceOf(index)];
+      owner = owner == kNobody || owner == id ? id : kSeveral;
     }
   }
 
@@ -72,8 +72,8 @@ class Claims {
     for (int z = std::max(first.z, low_.z); z <= std::min(last.z, high_.z); ++z) {
       for (int y = std::max(first.y, low_.y); y <= std::min(last.y, high_.y); ++y) {
         for (int x = std::max(first.x, low_.x); x <= std::min(last.x, high_.x); ++x) {
-          const InstanceId owner = table_[PlaceOf({x, y, z})];
-          if (owner != kNoInstance && owner != volume.id) return true;
+          const std::int32_t owner = table_[PlaceOf({x, y, z})];
+          if (owner != kNobody && owner != volume.id) return true;
         }
       }
     }
@@ -81,7 +81,9 @@ class Claims {
   }
 
  private:
-  static constexpr InstanceId kSeveral = kNoInstance - 1;
+  // No ids.
+  static constexpr std::int32_t kNobody = -1;
+  static constexpr std::int32_t kSeveral = -2;
 
   std::size_t PlaceOf(const Index3& block) const {
     const auto along = [](int at, int low) { return static_cast<std::size_t>(at - low); };
@@ -94,7 +96,7 @@ class Claims {
   Index3 low_;
   Index3 high_;
   bool any_ = false;
-  std::vector<InstanceId> table_;  // empty where the box is too large
+  std::vector<std::int32_t> table_;  // the claimant's id; empty where the box is too large
 };
 
 // The first one that is not left out, or kNoInstance.

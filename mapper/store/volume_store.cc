@@ -121,13 +121,11 @@ Expected<LoadedBlocks> LoadGroup(ByteReader bytes, std::size_t count, const MapC
   for (auto& channel : values.colour) channel = GetPlanes<std::uint16_t>(voxels, bytes);
   values.colour_count = GetPlanes<std::uint16_t>(voxels, bytes);
   if (!bytes.AtEnd()) return DataError("a group of blocks has another length than it says");
-  const auto cap = static_cast<float>(config.weight_cap);
   for (std::size_t k = 0; k < voxels; ++k) {
     const float weight = values.weight[k];
     const float distance = RoundToHalf(values.distance[k]);
-    const bool good = distance >= -config.back() && distance <= config.front() && weight >= 1 &&
-                      weight <= cap && weight == std::floor(weight) &&
-                      values.colour_count[k] <= config.weight_cap;
+    const bool good =
+        config.Stores(distance, weight, values.colour_count[k]) && weight == std::floor(weight);
     if (!good) return DataError("a voxel's value is out of range");
   }
   std::size_t k = 0;

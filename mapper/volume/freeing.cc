@@ -25,6 +25,10 @@ void FrameFreeing::FreeEmpty(const std::vector<FusedBlock>& fused, ObjectVolumes
     of_object.erase(std::unique(of_object.begin(), of_object.end()), of_object.end());
     volume.grid.Erase(of_object);
   }
+  std::erase_if(volumes, [](const auto& entry) {
+    const ObjectVolume& volume = entry.second;
+    return volume.grid.empty() && !volume.T_WO && !volume.T_WO_birth;
+  });
 }
 
 }  // namespace tsdfpp

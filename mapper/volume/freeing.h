@@ -9,7 +9,8 @@
 namespace tsdfpp {
 
 // Frees what a frame leaves without an observed voxel: blocks that it allocated in vain, and those
-// that contradiction emptied. All other blocks hold what they held. Made before the frame is fused.
+// that contradiction emptied; and volumes of which nothing is left, nor a pose known. All other
+// blocks hold what they held. Made before the frame is fused.
 class FrameFreeing {
  public:
   explicit FrameFreeing(const ObjectVolumes& volumes);

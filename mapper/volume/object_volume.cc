@@ -12,9 +12,10 @@ namespace {
 
 constexpr std::size_t kLargestTable = 1U << 22U;  // block pointers, 32 MiB
 
-// Blocks of a box that are asked one by one: more only where an object was seen at places far from
-// each other, between which there is nothing.
-constexpr double kMostInBox = 1 << 22;
+// Blocks of a box that are asked one by one, for each block that is moved: as many as may be near
+// it. There are more only where an object was seen at places far from each other, between which
+// there is nothing.
+constexpr double kMostInBox = 7 * 7 * 7;
 
 std::size_t At(int i) { return static_cast<std::size_t>(i); }
 
@@ -182,7 +183,8 @@ std::vector<Index3> BlocksTouchedBy(const VoxelReader& reader, const Pose& T, do
       {block_of(box.max().x() + 1), block_of(box.max().y() + 1), block_of(box.max().z() + 1)});
   const auto& [first, last, is_empty] = candidates;
   const auto side = [](int from, int to) { return double{1} + to - from; };
-  if (side(first.x, last.x) * side(first.y, last.y) * side(first.z, last.z) > kMostInBox) {
+  if (side(first.x, last.x) * side(first.y, last.y) * side(first.z, last.z) >
+      kMostInBox * static_cast<double>(reader.grid().size())) {
     return TouchedFarApart(reader, T, voxel_m, candidates, touches);
   }
   for (int z = first.z; z <= last.z; ++z) {

@@ -4,6 +4,9 @@
 
 #include <set>
 
+#include "mapper/map_editing.h"
+#include "mapper/map_file.h"
+#include "mapper/methods/map_objects.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/mesh_checks.h"
@@ -59,6 +62,55 @@ TEST_P(Freeing, OnlyBlocksThatHoldSomethingAreKept) {
   // Free space that no observation in band ever labelled stays.
   if (IsOneField(GetParam())) return;
   EXPECT_EQ(map->Memory().blocks, 0U);
+}
+
+// A mask of a pixel that no voxel lies behind leaves nothing of its object, not even its id.
+TEST_P(Freeing, WhatWasFusedInVainIsNotThere) {
+  constexpr InstanceId kSpeck = 9;
+  const Frame frame = RenderToys(TableWithToys(), 0.2);
+  const auto without = MakeMap(GetParam(), ToyConfig());
+  Frame beside = frame;
+  int in_vain = 0;
+  for (int pixel = 5; pixel < frame.mask.cols / 2; pixel += 4) {
+    beside.mask = frame.mask.clone();
+    const cv::Point at(pixel, frame.mask.rows / 2);
+    beside.mask.at<InstanceId>(at) = kNoInstance;
+    const auto expected = without->Clone();
+    expected->Fuse(beside, beside.mask);
+    beside.mask.at<InstanceId>(at) = kSpeck;
+    const auto map = without->Clone();
+    map->Fuse(beside, beside.mask);
+    if (MapToBytes(*map).value() == MapToBytes(*expected).value()) {
+      ++in_vain;
+      EXPECT_TRUE(EditingOf(*map).Add(kSpeck, {}, Pose::Identity(), std::nullopt));
+    } else {
+      EXPECT_TRUE(IsOneField(GetParam()) || !VoxelsOf(*map).ObservedVoxels(kSpeck).empty());
+    }
+  }
+  EXPECT_GT(in_vain, 0);
+}
+
+// A list that has no room for what a block covers is none, and no block of lists is kept for it: a
+// map with one could not be read again.
+TEST(FreeingOfLists, ABlockThatListsNothingIsNotMade) {
+  MapConfig config = ToyConfig();
+  config.layers = 1;
+  const auto brick = DrivenMap(Method::kTsdfpp, ToyConfig(), 1);
+  const TsdfGrid volume = CopyVolume(*brick, kBrick);
+  for (const double by_m : {0.02, 0.04, 0.06}) {
+    const auto map = MakeMap(Method::kTsdfpp, config);
+    for (const InstanceId id : {kBrick, kTray}) {
+      ASSERT_TRUE(EditingOf(*map).Add(id, volume, Pose::Identity(), Pose::Identity()));
+    }
+    map->Remove(kTray);
+    Frame frame = DriveFrame(0);
+    frame.mask.setTo(static_cast<double>(kNoInstance), frame.mask != static_cast<double>(kBrick));
+    frame.depth += static_cast<float>(by_m);
+    map->Fuse(frame, frame.mask);
+    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt) << by_m;
+    const auto again = MapFromBytes(MapToBytes(*map).value(), "saved");
+    EXPECT_TRUE(again.has_value()) << again.error().message;
+  }
 }
 
 // Forty cameras around the table, again and again.

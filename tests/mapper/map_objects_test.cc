@@ -132,6 +132,69 @@ TEST_P(MapObjects, AnObjectThatIsAddedHasTheVolumeThatItWasGiven) {
   EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
 }
 
+// Before it is given its first pose an object is where it was fused, and so it is out and in again.
+TEST_P(MapObjects, AnObjectMayBeAddedWithoutAPose) {
+  const auto map = MakeMap(GetParam(), ToyConfig());
+  const Frame frame = DriveFrame(0);
+  map->Fuse(frame, frame.mask);
+  const TsdfGrid volume = CopyVolume(*map, kBrick);
+  map->Remove(kBrick);
+  const Pose aside = MakePose(0.4, {0.1, 0, 1}, {0.05, 0.03, 0.06});
+  const auto own = EditingOf(*map).Add(kNew, volume, aside, std::nullopt);
+  ASSERT_FALSE(own.has_value());
+  EXPECT_EQ(own.error().message,
+            "object 7 has no pose and a lattice of its own, expected that of the world");
+  ASSERT_TRUE(EditingOf(*map).Add(kNew, volume, Pose::Identity(), std::nullopt));
+  const TriangleMesh before = map->ObjectMesh(kNew);
+  ASSERT_FALSE(before.triangles.empty());
+  map->SetObjectPose(kNew, aside);
+  EXPECT_TRUE(map->ObjectMesh(kNew).vertices == before.vertices);
+  EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
+}
+
+// Another truncation distance, or more observations than this map counts: neither could be saved.
+TEST_P(MapObjects, WhatAMapCannotHoldIsNotAdded) {
+  constexpr int kFrames = 6;
+  const auto map = DrivenMap(GetParam(), ToyConfig(), 1);
+  const std::string before = SnapshotOf(*map, ToyIds());
+  MapConfig longer = ToyConfig();
+  longer.trunc_front_voxels = 8;
+  const auto other = DrivenMap(GetParam(), longer, kFrames);
+  const Pose T_WO = DriveFrame(kFrames - 1).T_WO.at(kBrick);
+  const auto added =
+      EditingOf(*map).Add(kNew, CopyVolume(*other, kBrick), other->ObjectLattice(kBrick), T_WO);
+  ASSERT_FALSE(added.has_value());
+  EXPECT_EQ(added.error().kind, ErrorKind::kData);
+  EXPECT_TRUE(added.error().message.starts_with("object 7's volume has a voxel of distance"))
+      << added.error().message;
+  EXPECT_TRUE(SnapshotOf(*map, ToyIds()) == before);
+}
+
+// Even the greatest id that there may be, where objects are inside of one another.
+TEST_P(MapObjects, RaysSeeTheSameWhateverTheIds) {
+  constexpr InstanceId kGreatest = kNoInstance - 1;
+  const auto map = DrivenMap(GetParam(), ToyConfig(), 3);
+  const Pose ball = TableWithToys().T_WO.at(kBall);
+  for (const double by_m : {0.0, 0.03}) {
+    Pose T_WO = ball;
+    T_WO.translation() += Eigen::Vector3d(by_m, 0.01, 0);
+    const auto overlapping = map->Clone();
+    overlapping->SetObjectPose(kBrick, T_WO);
+    const Frame view = RenderToys(TableWithToys(), 0.2);
+    const RaySurface expected = overlapping->CastRays(view.intrinsics, view.T_WC, {}).front();
+    for (const InstanceId id : {kBrick, kBall, kTray}) {
+      const auto renamed = overlapping->Clone();
+      ASSERT_TRUE(EditingOf(*renamed).Rename(id, kGreatest));
+      // Ties go by id.
+      if (id == kBrick && MovesLattices(GetParam())) continue;
+      RaySurface seen = renamed->CastRays(view.intrinsics, view.T_WC, {}).front();
+      seen.id.setTo(static_cast<double>(id), seen.id == static_cast<double>(kGreatest));
+      EXPECT_EQ(cv::countNonZero(seen.id != expected.id), 0) << id;
+      EXPECT_EQ(cv::countNonZero(seen.depth != expected.depth), 0) << id;
+    }
+  }
+}
+
 // Into an empty map of each method, from an anchored one that has turned the object.
 TEST_P(MapObjects, AnObjectComesFromAnotherMapAtItsPlace) {
   const auto other = DrivenMap(Method::kTsdfppAnchored, ToyConfig(), 4);

@@ -1,5 +1,6 @@
 // Masks that are wrong, made right by the map, and its parts: disputed places, new surface, taking
-// out. In the toys' analytic world (2 cm voxels), whose true masks are known.
+// out. In the toys' analytic world (2 cm voxels), whose true masks are known. Longer than most files:
+// the parts one by one, and the whole.
 #include "mapper/associate/mask_repair.h"
 
 #include <gtest/gtest.h>
@@ -186,6 +187,29 @@ TEST(TakeOut, ObjectsOfWhichNothingIsLeftGo) {
   TakeOut(cells, kToyVoxel_m, 77, Pose::Identity(), *map);
   EXPECT_EQ(map->Objects(), (std::vector<InstanceId>{kBackground, kBall, kTray}));
   EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
+  // What is fused of it next is where it is, and moves with it.
+  const Frame frame = DriveFrame(1);
+  map->Fuse(frame, frame.mask);
+  const TriangleMesh there = map->ObjectMesh(kBrick);
+  ASSERT_FALSE(there.vertices.empty());
+  Pose up = frame.T_WO.at(kBrick);
+  up.translation().z() += 0.1;
+  map->SetObjectPose(kBrick, up);
+  EXPECT_NEAR(map->ObjectMesh(kBrick).vertices.front().z() - there.vertices.front().z(), 0.1, 1e-6);
+}
+
+// Nor does it get a pose by it.
+TEST(TakeOut, AnObjectWithoutAPoseHasNoneAfterIt) {
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  const Frame frame = DriveFrame(1);
+  map->Fuse(frame, frame.mask);
+  const auto before = VoxelsOf(*map).ObservedVoxels(kBrick);
+  ASSERT_FALSE(before.empty());
+  const Eigen::Vector3i some = before[before.size() / 2];
+  TakeOut({{some.x(), some.y(), some.z()}}, kToyVoxel_m, kBrick, std::nullopt, *map);
+  EXPECT_LT(VoxelsOf(*map).ObservedVoxels(kBrick).size(), before.size());
+  map->SetObjectPose(kBrick, frame.T_WO.at(kBrick));
+  EXPECT_EQ(map->ObjectLattice(kBrick).matrix(), Pose::Identity().matrix());
 }
 
 // --- Whole masks -------------------------------------------------------------------------------

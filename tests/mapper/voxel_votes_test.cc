@@ -1,5 +1,6 @@
 // Association by votes (paper III-C) in analytic worlds: one id for each object whatever the masks
 // call it, merged and split masks, objects that leave and come back, and what is hardly there.
+// Longer than most files: each rule by itself, and all of them on whole sequences.
 #include "mapper/associate/voxel_votes.h"
 
 #include <gtest/gtest.h>
