@@ -256,12 +256,11 @@ class FrameWalk {
         const std::int64_t before = ResidentBytes();
         const int lost_before = run.pipeline.camera_log().lost;
         TSDFPP_ASSIGN(const StepTimes step, run.pipeline.Process(frame));
+        run.times.Add(step);
         // Where the camera was not found, nothing was mapped, and the labels are older.
-        if (run.pipeline.camera_log().lost == lost_before) {
-          run.times.Add(step);
-          if (run.config.associate == AssociationMode::kVotes) {
-            run.matching.Observe(run.pipeline.labels(), true_mask);
-          }
+        const bool is_mapped = run.pipeline.camera_log().lost == lost_before;
+        if (is_mapped && run.config.associate == AssociationMode::kVotes) {
+          run.matching.Observe(run.pipeline.labels(), true_mask);
         }
         run.process_growth_bytes += ResidentBytes() - before;
         if (recorder_) recorder_->SeeMap(run);

@@ -67,10 +67,10 @@ Expected<MaskRepairConfig> MaskRepairConfig::FromToml(const toml::table& table,
 }
 
 toml::table MaskRepairConfig::ToToml() const {
-  return toml::table{{"keep_voxels", keep_voxels},     {"take_voxels", take_voxels},
-                     {"sigma_voxels", sigma_voxels},   {"own_factor", own_factor},
-                     {"cell_voxels", cell_voxels},     {"confirm_frames", confirm_frames},
-                     {"forget_frames", forget_frames}, {"far_share", far_share}};
+  return toml::table{{"keep_voxels", keep_voxels},    {"take_voxels", take_voxels},
+                     {"sigma_voxels", sigma_voxels},  {"own_factor", own_factor},
+                     {"cell_voxels", cell_voxels},    {"confirm_frames", confirm_frames},
+                     {"forget_frames", forget_frames}};
 }
 
 }  // namespace tsdfpp
