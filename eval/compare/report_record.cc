@@ -302,7 +302,7 @@ void ReportRecorder::AddErrors(const CompareRun& run, nlohmann::json& json) cons
     }
     const PosePairs pairs = AnchoredAtFirst(PairByFrame(ours->second, truth->second));
     const std::vector<double> errors_m = TranslationErrors_m(pairs);
-    nlohmann::json& list = json["position_error_mm"][std::to_string(id)];
+    nlohmann::json& list = json["position_error_mm"][std::to_string(id)] = nlohmann::json::array();
     for (std::size_t k = 0; k < errors_m.size(); ++k) {
       list.push_back({pairs.frames[k], Rounded(1e3 * errors_m[k], 1000)});
     }
@@ -328,6 +328,7 @@ Expected<void> ReportRecorder::Write() {
   if (failure_) return tl::unexpected(*failure_);
   for (std::size_t r = 0; r < runs_.size(); ++r) {
     const CompareRun& run = *result_.runs[r];
+    runs_[r]["all_ms"] = Milliseconds(run.times.All_s());
     runs_[r]["track_ms"] = Milliseconds(run.times.track_s);
     runs_[r]["update_poses_ms"] = Milliseconds(run.times.update_poses_s);
     runs_[r]["fuse_ms"] = Milliseconds(run.times.fuse_s);

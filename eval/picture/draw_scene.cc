@@ -20,6 +20,7 @@ Colour ObjectColour(InstanceId id) {
                                             {213, 94, 0},
                                             {240, 228, 66}}};
   if (id == kBackground) return {205, 203, 198};
+  if (id == kNoInstance) return {128, 128, 128};  // of no true object
   return kPalette[(id - 1U) % kPalette.size()];
 }
 

@@ -43,6 +43,15 @@ void RunTimes::Add(const StepTimes& step) {
   fuse_s.push_back(step.fuse_s);
 }
 
+std::vector<double> RunTimes::All_s() const {
+  std::vector<double> all_s(fuse_s.size());
+  for (const std::vector<double>* step :
+       {&segment_s, &locate_s, &associate_s, &track_s, &update_poses_s, &repair_s, &fuse_s}) {
+    for (std::size_t i = 0; i < all_s.size(); ++i) all_s[i] += (*step)[i];
+  }
+  return all_s;
+}
+
 nlohmann::json RunTimes::ToJson() const {
   return {{"segment", Spread(segment_s)},
           {"locate", Spread(locate_s)},

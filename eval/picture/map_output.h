@@ -22,6 +22,8 @@ struct RunTimes {
   std::vector<double> mesh_s;  // of the visible scene, at the frames that were meshed
 
   void Add(const StepTimes& step);
+  // Of all steps together (StepTimes::Total_s()), a frame.
+  std::vector<double> All_s() const;
   // Median, p99 and worst of each step in milliseconds.
   nlohmann::json ToJson() const;
 };

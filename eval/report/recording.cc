@@ -105,18 +105,20 @@ std::vector<int> Recording::KeyFrames() const {
   return frames;
 }
 
-int Recording::LeastKeyFrame(std::optional<int> keep) const {
+int Recording::LeastKeyFrame(const std::set<int>& keep) const {
   const std::vector<int> frames = KeyFrames();
   std::size_t least = 0;
   int least_gap = std::numeric_limits<int>::max();
   for (std::size_t i = 1; i + 1 < frames.size(); ++i) {
     const int gap = frames[i + 1] - frames[i - 1];
-    if (frames[i] == keep || gap >= least_gap) continue;
+    if (keep.contains(frames[i]) || gap >= least_gap) continue;
     least = i;
     least_gap = gap;
   }
-  if (frames[least] == keep) least = frames.size() - 1;
-  return frames[least];
+  if (!keep.contains(frames[least])) return frames[least];
+  const auto last = std::find_if(frames.rbegin(), frames.rend(),
+                                 [&](int frame) { return !keep.contains(frame); });
+  return last == frames.rend() ? frames.back() : *last;
 }
 
 void Recording::DropKeyFrame(int frame) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,8 @@ struct Recording {
   std::vector<int> KeyFrames() const;
 
   // The key frame that would be missed least: the one whose neighbours are nearest to each other,
-  // but neither the last nor `keep` as long as there are others. There must be two at least.
-  int LeastKeyFrame(std::optional<int> keep) const;
+  // but neither the last nor one of `keep` as long as there are others. There must be two at least.
+  int LeastKeyFrame(const std::set<int>& keep) const;
 
   // Takes a key frame out, with its bytes; nothing happens where there is none of this number.
   void DropKeyFrame(int frame);

@@ -15,6 +15,7 @@
 #include "eval/sweep/sweep_metrics.h"
 #include "eval/tools/base64.h"
 #include "mapper/method_info.h"
+#include "mapper/track/tracker.h"
 #include "sequence/sequence_json.h"
 #include "viewer/report_template.h"
 
@@ -68,6 +69,17 @@ Expected<void> CheckSummary(const json& summary, const std::filesystem::path& pa
   return {};
 }
 
+// What "figure-close-gt.png" and "table-track.png" are of (eval/compare/pictures.cc).
+std::string SettingOf(std::string_view name) {
+  name.remove_suffix(std::string_view(".png").size());
+  name.remove_prefix(std::min(name.find('-') + 1, name.size()));
+  const std::size_t dash = name.rfind('-');
+  const auto poses = PoseSourceFromName(name.substr(dash == name.npos ? 0 : dash + 1));
+  if (!poses) return std::string(name);
+  const std::string profile(dash == name.npos ? "" : name.substr(0, dash));
+  return fmt::format("{}{}", profile.empty() ? "" : profile + ", ", PoseSourceTitle(*poses));
+}
+
 Expected<void> AddPictures(Comparison& comparison) {
   std::set<std::string> names;
   for (const std::filesystem::path& entry : EntriesOf(comparison.folder)) {
@@ -82,10 +94,12 @@ Expected<void> AddPictures(Comparison& comparison) {
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(comparison.folder / name));
     comparison.pictures.push_back(
         {{"file", name},
-         {"caption", name.starts_with("table-")
-                         ? "Hidden and kept (blue), hidden and missing (red), visible (light), "
-                           "visible and missing (orange), never seen (grey)"
-                         : "Reconstructions over time and after the removal"},
+         {"caption", fmt::format("{}; {}",
+                                 name.starts_with("table-")
+                                     ? "Hidden and kept (blue), hidden and missing (red), visible "
+                                       "(light), visible and missing (orange), never seen (grey)"
+                                     : "Reconstructions over time and after the removal",
+                                 SettingOf(name))},
          {"data", "data:image/png;base64," + Base64(bytes)}});
   }
   return {};
@@ -216,9 +230,12 @@ Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& fo
       return DataError("the report would have {} bytes, expected at most {}",
                        page.size() + data.size(), largest_bytes);
     }
-    const nlohmann::json& examined = longest->summary["reveal_frame"];
-    const int frame = longest->recording->LeastKeyFrame(
-        examined.is_number_integer() ? std::optional(examined.get<int>()) : std::nullopt);
+    std::set<int> examined;
+    for (const Comparison& comparison : comparisons) {
+      const nlohmann::json& frame = comparison.summary["reveal_frame"];
+      if (frame.is_number_integer()) examined.insert(frame.get<int>());
+    }
+    const int frame = longest->recording->LeastKeyFrame(examined);
     // The maps stand side by side at one frame, so it goes everywhere.
     for (Comparison& comparison : comparisons) {
       if (comparison.recording && comparison.recording->KeyFrames().size() > 1) {

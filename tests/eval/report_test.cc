@@ -194,8 +194,9 @@ TEST_F(Report, DroppingAKeyFrameKeepsTheBytesOfTheOthers) {
   const std::string colour = bytes_of(record.json["key_frames"][1]["colour"]);
   const std::string picture = bytes_of(record.json["runs"][0]["key_frames"][1]["picture"]);
   const std::size_t before = record.bytes.size();
-  EXPECT_EQ(record.LeastKeyFrame(std::nullopt), 8);
-  EXPECT_EQ(record.LeastKeyFrame(8), 16);
+  EXPECT_EQ(record.LeastKeyFrame({}), 8);
+  EXPECT_EQ(record.LeastKeyFrame({8}), 16);
+  EXPECT_EQ(record.LeastKeyFrame({8, 16}), 16);
   record.DropKeyFrame(9);  // which there is not
   EXPECT_EQ(record.bytes.size(), before);
   record.DropKeyFrame(8);

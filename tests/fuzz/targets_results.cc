@@ -23,7 +23,7 @@ bool ReadRecord(std::string_view input) {
   if (!Accepted(recording) || !*recording) return false;
   // As the report's page thins it out.
   for (std::vector<int> frames = (*recording)->KeyFrames(); frames.size() >= 2;) {
-    (*recording)->DropKeyFrame((*recording)->LeastKeyFrame(std::nullopt));
+    (*recording)->DropKeyFrame((*recording)->LeastKeyFrame({}));
     const std::vector<int> left = (*recording)->KeyFrames();
     Require(left.size() < frames.size(), "a key frame that cannot be dropped");
     frames = left;

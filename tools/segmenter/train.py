@@ -101,11 +101,12 @@ class Data:
         """What was read by now; waits where there are fewer scenes than `at_least`."""
         while True:
             try:
-                number, sequence = self.read.get(block=self.scenes < at_least)
+                number, sequence = self.read.get(block=self.scenes < at_least and not self.store.is_full())
             except queue.Empty:
                 return
             if number % HELD_OUT == 0:
-                self.held_out.append(sequence)
+                if len(self.held_out) < MOST_CHECKED:
+                    self.held_out.append(sequence)
             elif not self.store.is_full():
                 self.store.add(sequence)
                 self.scenes += 1

@@ -20,7 +20,7 @@ export function figurePart(data, state) {
       for (const picture of report.pictures) {
         if (!picture.file.startsWith('figure')) continue;
         part.append(el('figure', {}, el('img', { src: picture.data, alt: picture.caption }),
-          el('figcaption', {}, picture.caption)));
+          el('figcaption', {}, data.reports.length > 1 ? `${report.letter}: ` : '', picture.caption)));
       }
     }
     return part;

@@ -12,9 +12,9 @@ import { originPart, tablesPart } from './tables.js';
 function start(app) {
   const data = loadData();
   document.title = `${data.reports.map((report) => report.name).join(' and ')}: what the map keeps`;
-  const recorded = data.reports.find((report) => report.recording)?.recording;
-  const frames = recorded ? recorded.key_frames.map((key) => key.frame)
-    : [...new Set(data.runs.flatMap((run) => run.rows.map((row) => row.frame)))].sort((a, b) => a - b);
+  const keys = data.reports.flatMap((report) => report.recording?.key_frames ?? []);
+  const frames = [...new Set((keys.length ? keys : data.runs.flatMap((run) => run.rows)).map((each) => each.frame))]
+    .sort((a, b) => a - b);
   const examined = examinedFrame(data.reports[0]);
   const theme = matchMedia('(prefers-color-scheme: dark)');
   const state = new State({

@@ -43,8 +43,9 @@ function paint(out, mesh, chunk, recording, mode) {
   const vertices = mesh.error.length;
   const flat = chunk.layer === 'revealed' ? kRemembered : chunk.layer === 'hole' ? kLost
     : chunk.id === 0 ? kRoom : recording.colours.get(chunk.id) ?? [128, 128, 128];
-  // A hole is no surface of the map: it has neither error nor age.
-  const lookup = chunk.layer === 'hole' ? null : mode === 'error' || mode === 'age' ? table(recording, mode) : null;
+  // A hole is no surface of the map, and of an object that there is not nothing was measured.
+  const isMeasured = chunk.layer !== 'hole' && recording.names.has(chunk.id);
+  const lookup = !isMeasured ? null : mode === 'error' || mode === 'age' ? table(recording, mode) : null;
   for (let v = 0; v < vertices; ++v) {
     for (let c = 0; c < 3; ++c) {
       const value = lookup ? lookup[mode === 'error' ? mesh.error[v] : mesh.age[v]][c]

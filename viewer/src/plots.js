@@ -26,13 +26,14 @@ function perFrame(read) {
 function worstPositionError(run) {
   const worst = new Map();
   for (const list of Object.values(run.recorded?.position_error_mm ?? {})) {
-    for (const [frame, error] of list) worst.set(frame, Math.max(worst.get(frame) ?? 0, error));
+    for (const [frame, error] of list ?? []) worst.set(frame, Math.max(worst.get(frame) ?? 0, error));
   }
   return [...worst].sort((a, b) => a[0] - b[0]);
 }
 
 const kSteps = {
-  all: ['All steps', (r, i) => r.track_ms[i] + r.update_poses_ms[i] + r.fuse_ms[i]],
+  // Older recordings have three of the steps alone.
+  all: ['All steps', (r, i) => r.all_ms?.[i] ?? r.track_ms[i] + r.update_poses_ms[i] + r.fuse_ms[i]],
   fuse: ['Fuse', (r, i) => r.fuse_ms[i]],
   move: ['Move the objects', (r, i) => r.update_poses_ms[i]],
   track: ['Track', (r, i) => r.track_ms[i]],
@@ -158,21 +159,38 @@ function makeChart(chart, data, state, frames) {
   return part;
 }
 
+// Whether maps of the report were given the recorded masks.
+function takesMasks(report) {
+  return report.summary.runs.some((run) => (run.segmentation ?? 'gt') === 'gt');
+}
+
 function imagesPart(data, state) {
-  const recording = data.reports.find((report) => report.recording)?.recording;
-  if (!recording) return null;
-  const [near, far] = recording.depth_range_m;
-  const kinds = [['colour', 'Colour'], ['depth', `Depth, ${near.toFixed(1)} m (red) to ${far.toFixed(1)} m (blue)`],
-    ['mask', 'Mask, a colour an object']];
+  const recorded = data.reports.filter((report) => report.recording);
+  if (!recorded.length) return null;
   const title = el('h3', {});
-  const images = kinds.map(([kind, text]) => {
-    const image = el('img', { alt: text });
-    return { kind, image, part: el('figure', {}, image, el('figcaption', {}, text)) };
+  const images = ['colour', 'depth', 'mask'].map((kind) => {
+    const image = el('img', {});
+    const caption = el('figcaption', {});
+    return { kind, image, caption, part: el('figure', {}, image, caption) };
   });
-  state.watch(['frame'], () => {
-    const key = recording.key_frames.find((each) => each.frame === state.get('frame'));
-    title.textContent = `Frame ${state.get('frame')}, as the maps saw it`;
-    for (const { kind, image } of images) if (key) image.src = recording.image(key[kind]);
+  state.watch(['frame', 'shown'], () => {
+    const frame = state.get('frame');
+    const keyOf = (report) => report.recording.key_frames.find((each) => each.frame === frame);
+    const isShown = (report) => data.runs.some((run) => data.reports[run.report] === report && state.get('shown').has(run.key));
+    const report = recorded.find((each) => isShown(each) && keyOf(each)) ?? recorded.find(keyOf);
+    title.textContent = `Frame ${frame}, as the maps saw it`;
+    for (const { part } of images) part.hidden = !report;
+    if (!report) return;
+    const [near, far] = report.recording.depth_range_m;
+    const words = {
+      colour: 'Colour',
+      depth: `Depth, ${near.toFixed(1)} m (red) to ${far.toFixed(1)} m (blue)`,
+      mask: takesMasks(report) ? 'Mask, a colour an object' : 'The sequence’s mask, which these maps were not given',
+    };
+    for (const { kind, image, caption } of images) {
+      image.src = report.recording.image(keyOf(report)[kind]);
+      image.alt = caption.textContent = words[kind];
+    }
   });
   return el('aside', { class: 'images' }, title, images.map((each) => each.part));
 }

@@ -10,6 +10,13 @@ export function examinedFrame(report) {
   return report.summary.reveal_frame ?? report.summary.last_frame;
 }
 
+// "frame 96", or "frame 96 (A), 64 (B)" where comparisons are examined at different ones.
+export function examinedText(data) {
+  const frames = data.reports.map(examinedFrame);
+  if (frames.every((frame) => frame === frames[0])) return `frame ${frames[0]}`;
+  return `frame ${frames.map((frame, i) => `${frame} (${data.reports[i].letter})`).join(', ')}`;
+}
+
 export function examinedRow(data, run) {
   const frame = examinedFrame(data.reports[run.report]);
   return run.rows.find((row) => row.frame === frame) ?? run.rows[run.rows.length - 1];
@@ -72,6 +79,25 @@ export function gatesSummary({ controls, gates, sabotages, profile }) {
     sabotages.length ? `${caught} of ${sabotages.length} sabotages are caught` : null].filter(Boolean).join(', ');
 }
 
+// What keeps a comparison from being what it seems: maps that failed, an early end, a stand-in for the truth, what the
+// maps remark.
+function notesOf({ summary }) {
+  const adapters = (summary.adapters ?? []).filter((each) => each.failure);
+  return [
+    summary.stopped ? `It ended early: ${summary.stopped}` : null,
+    summary.truth ?? null,
+    ...(summary.failed ?? []).map((each) => `${each.title} failed at frame ${each.frame}, and is not shown: ${each.failure}`),
+    ...adapters.map((each) => `${each.name} failed, and is not shown: ${each.failure}`),
+    ...summary.runs.flatMap((run) => (run.remarks ?? []).map((remark) => `${run.title}: ${remark}`)),
+  ].filter(Boolean);
+}
+
+function notesPart(data) {
+  const notes = data.reports.flatMap((report) => notesOf(report)
+    .map((note) => el('li', {}, data.reports.length > 1 ? `${report.letter}: ` : '', note)));
+  return notes.length ? el('ul', { class: 'message notes' }, notes) : null;
+}
+
 export function headerPart(data) {
   const report = data.reports[0];
   const { summary } = report;
@@ -80,6 +106,7 @@ export function headerPart(data) {
       ` · sequence ${summary.sequence} · frames ${summary.first_frame} to ${summary.last_frame}`),
     el('h1', {}, 'What does a map keep of what it can no longer see?'),
     el('div', { class: 'verdict' }, settingsOf(data.runs).map((runs) => verdictLine(data, runs))),
+    notesPart(data),
     data.gates ? el('p', { class: 'quiet' }, el('a', { href: '#gates' }, `${gatesSummary(data.gates)}.`)) : null);
 }
 

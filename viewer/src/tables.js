@@ -2,7 +2,7 @@
 import { download, el } from './dom.js';
 import { measureOf, metricColumns, shortLabel, textOf, valueOf } from './measures.js';
 import { measured } from './data.js';
-import { examinedFrame, examinedRow } from './summary.js';
+import { examinedRow, examinedText } from './summary.js';
 
 function csvCell(value) {
   const text = value === null || value === undefined ? '' : String(value);
@@ -127,10 +127,10 @@ function comparedTable(data) {
 }
 
 export function tablesPart(data) {
-  const frame = examinedFrame(data.reports[0]);
+  const frame = examinedText(data);
   return el('section', { id: 'tables' }, el('h2', {}, 'Figures'),
-    el('h3', {}, `All maps at frame ${frame}`), figuresTable(data), comparedTable(data),
-    el('h3', {}, `Object by object at frame ${frame}`), objectsTable(data), tracksTable(data));
+    el('h3', {}, `All maps at ${frame}`), figuresTable(data), comparedTable(data),
+    el('h3', {}, `Object by object at ${frame}`), objectsTable(data), tracksTable(data));
 }
 
 function settingsTable(data) {

@@ -361,12 +361,12 @@ export class View3d {
     const distance = (v) => new THREE.Vector3().fromBufferAttribute(position, v).distanceTo(local);
     const v = corners.reduce((best, each) => (distance(each) < distance(best) ? each : best));
     return {
-      name: recording.names.get(chunk.id) ?? `object ${chunk.id}`,
+      name: recording.names.get(chunk.id) ?? null,  // of none of the true objects
       id: chunk.id,
       layer: chunk.layer,
       error_mm: mesh.error[v] === 255 ? null : 1e3 * mesh.error[v] * recording.error_step_m,
       age_frames: mesh.age[v] === 255 ? null : Math.round(mesh.age[v] * recording.age_step_frames),
-      at: hit.point.toArray(),
+      at: local.toArray(),  // what moves is lifted
     };
   }
 }

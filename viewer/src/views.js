@@ -9,6 +9,9 @@ const kLayerWords = {
   common: '', hole: 'hidden, and lost', gone: 'goes with the moving objects', revealed: 'hidden, and remembered', mover: 'taken out by the slider',
 };
 
+const kHint = 'Drag to turn, wheel or pinch to come nearer, click to ask what is there. Keys: arrows turn, + and − come nearer, ' +
+  'Enter asks at the middle of the first map.';
+
 function legend(state, recording) {
   const part = el('div', { class: 'legend' });
   state.watch(['colour'], () => {
@@ -94,15 +97,25 @@ function cameraButtons(recording, state, view) {
 // What was asked for in a panel, in words.
 function describe(run, hit) {
   if (!hit) return `${run.label}: nothing there.`;
+  const place = hit.at.map((x) => x.toFixed(3)).join(', ');
   if (hit.layer === 'hole') {
-    return `${run.label}: table that was seen, is hidden, and is lost; at ${hit.at.map((x) => x.toFixed(3)).join(', ')} m.`;
+    return `${run.label}: table that was seen, is hidden, and is lost; at ${place} m.`;
   }
+  if (hit.name === null) return `${run.label}: surface that is none of the true objects'; at ${place} m.`;
   const words = kLayerWords[hit.layer];
   const error = hit.error_mm === null ? 'more than 51 mm' : `${fixed(hit.error_mm, 1)} mm`;
   const age = hit.age_frames === null ? 'never seen by the camera'
     : hit.age_frames === 0 ? 'in sight now' : `last in sight ${hit.age_frames} frames ago`;
-  return `${run.label}: ${hit.name} (id ${hit.id})${words ? `, ${words}` : ''}; ${error} from the true surface; ${age}; at ${
-    hit.at.map((x) => x.toFixed(3)).join(', ')} m.`;
+  return `${run.label}: ${hit.name} (id ${hit.id})${words ? `, ${words}` : ''}; ${error} from the true surface; ${age}; at ${place} m.`;
+}
+
+// Comparisons may have been recorded at different frames.
+function nameWhatIsThere(panels, runs, frame) {
+  runs.forEach((run, i) => {
+    const is_there = run.recorded.key_frames.some((key) => key.frame === frame);
+    panels.children[i].querySelector('.panel-title').textContent =
+      `${shortLabel(run, runs)}${is_there ? '' : ', not recorded at this frame'}`;
+  });
 }
 
 // The view shows what the state says.
@@ -111,6 +124,7 @@ function follow(view, panels, runs, recording, state) {
     for (const old of view.panels()) old.remove();
     panels.prepend(...runs().map((run) => panelOf(run, runs())));
     panels.dataset.count = String(runs().length);
+    nameWhatIsThere(panels, runs(), state.get('frame'));
     view.setRuns(runs());
   });
   state.watch(['colour', 'pull', 'hidden', 'truth', 'path'], () => view.setOptions({
@@ -120,6 +134,7 @@ function follow(view, panels, runs, recording, state) {
   let first = true;
   state.watch(['frame'], () => {
     view.setFrame(state.get('frame'));
+    nameWhatIsThere(panels, runs(), state.get('frame'));
     if (first) view.lookAsCamera(recording, state.get('frame'), 1.12);
     first = false;
   });
@@ -157,7 +172,9 @@ export function viewPart(data, state) {
   const part = el('section', { id: 'view' }, el('h2', {}, 'Look for yourself'));
   if (!recording) {
     part.append(el('p', { class: 'message' },
-      'This comparison was made without --record, so there are no meshes to show here.'));
+      data.reports.some((report) => report.summary.stopped)
+        ? 'This comparison ended early, so there are no meshes to show here.'
+        : 'This comparison was made without --record, so there are no meshes to show here.'));
     return part;
   }
   const runs = () => data.runs.filter((run) => run.recorded && state.get('shown').has(run.key));
@@ -169,8 +186,9 @@ export function viewPart(data, state) {
     return part;
   }
 
-  const picked = el('output', { class: 'picked', 'aria-live': 'polite' },
-    'Drag to turn, wheel or pinch to come nearer, click to ask what is there. Keys: arrows turn, + and − come nearer, Enter asks at the middle of the first map.');
+  const picked = el('output', { class: 'picked', 'aria-live': 'polite' });
+  // What was asked for is of one frame, and of what is shown.
+  state.watch(['frame', 'shown', 'pull'], () => { picked.textContent = kHint; });
   const panels = el('div', { class: 'panels', tabindex: 0, role: 'application', 'aria-label': '3-D view of the maps' });
   part.append(
     el('div', { class: 'controls' }, pull, colourControl(state),

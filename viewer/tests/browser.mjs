@@ -85,6 +85,32 @@ function makeRuns() {
   command('report', bad);
   command('report', run, '--compare', plain, '--out', join(folder, 'both.html'));
   makeMore(run);
+  makeOther(run);
+}
+
+// A run of other key frames beside the run; it has an object that is nobody's, and much to be said of it.
+function makeOther(run) {
+  const other = join(folder, 'denser');
+  command('compare', join(scenes, 'mini.toml'), '--out', other, '--until', '16', '--every', '4', '--profiles', 'paper',
+          '--methods', 'tsdf++/anchored', '--record');
+  const edit = (name, change) => {
+    const value = JSON.parse(readFileSync(join(other, name), 'utf8'));
+    change(value);
+    writeFileSync(join(other, name), JSON.stringify(value));
+  };
+  edit('summary.json', (summary) => {
+    summary.failed = [{ title: 'tsdf, paper', folder: 'tsdf-paper-gt', frame: 5, failure: 'out of memory' }];
+    summary.truth = 'A reconstruction stands in for the true surface.';
+    summary.runs[0].remarks = ['something odd'];
+    summary.runs[0].segmentation = 'depth';
+  });
+  edit('record/record.json', (record) => {
+    record.runs[0].position_error_mm[2] = null;
+    record.runs[0].key_frames.forEach((key) => key.chunks.filter((chunk) => chunk.layer === 'mover').forEach((chunk) => { chunk.id = 65535; }));
+  });
+  edit('run.json', (note) => note.files.forEach((file) => { file.bytes = null; }));
+  command('report', run, '--compare', other, '--out', join(folder, 'denser.html'));
+  command('report', other);
 }
 
 // A run with more of everything in its frames.csv, compared with the run.
@@ -390,6 +416,57 @@ test('a metric has the unit, the digits and the direction of its row', async (br
     }
   }
   assert.ok(compared > 10, `${compared} of ${rows.length} rows`);
+  return page;
+});
+
+test('two comparisons with other key frames share the slider, and say what is not recorded', async (browser) => {
+  const page = await open(browser, join(folder, 'denser.html'));
+  assert.deepEqual(await page.evaluate(() => window.report.frames), [4, 8, 12, 16]);
+  await showView(page);
+  const keys = await page.evaluate(() => window.report.data.runs.map((run) => run.key));
+  await page.evaluate((all) => window.report.state.set({ shown: new Set(all), frame: 12 }), keys);
+  await settled(page);
+  assert.equal(await page.locator('#frame').inputValue(), '2');
+  const titles = await page.locator('.panel-title').allTextContents();
+  assert.equal(titles.filter((title) => title.endsWith(', not recorded at this frame')).length, 2, titles.join(' | '));
+  const at12 = await page.locator('.images img').first().getAttribute('src');
+  await set(page, { frame: 8 });
+  assert.notEqual(await page.locator('.images img').first().getAttribute('src'), at12);
+  return page;
+});
+
+test('what went wrong is said, and what nobody measured is not', async (browser) => {
+  const page = await open(browser, report('denser'));
+  const notes = await page.locator('.notes').textContent();
+  for (const words of ['tsdf, paper failed at frame 5, and is not shown: out of memory', 'stands in for', 'something odd']) {
+    assert.ok(notes.includes(words), notes);
+  }
+  assert.match(await page.locator('.images').textContent(), /which these maps were not given/);
+  await showView(page);
+  await page.evaluate(() => {
+    const { view } = document.getElementById('view');
+    view.lookAsCamera(window.report.data.reports[0].recording, window.report.state.get('frame'));
+  });
+  await settled(page);
+  const pick = () => page.evaluate(() => {
+    const { view } = document.getElementById('view');
+    const run = view.runs[0];
+    const car = view.frames.get(run.key).get(view.frame).userData.chunks.find((o) => o.userData.chunk.layer === 'mover');
+    car.geometry.computeBoundingSphere();
+    car.updateWorldMatrix(true, false);
+    const at = car.geometry.boundingSphere.center.clone().applyMatrix4(car.matrixWorld).project(view.camera);
+    const box = view.panels()[0].querySelector('.stage').getBoundingClientRect();
+    view.pick(box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height);
+    return document.querySelector('.picked').textContent;
+  });
+  const said = await pick();
+  assert.match(said, /none of the true objects'; at/);
+  const height = (text) => Number(text.match(/, (-?[\d.]+) m\.$/)[1]);
+  // Lifted by 20 cm, it is at the place that the map has it at.
+  await set(page, { pull: 0.5 });
+  await settled(page);
+  assert.match(await page.locator('.picked').textContent(), /^Drag to turn/);
+  assert.ok(Math.abs(height(await pick()) - height(said)) < 0.03, said);
   return page;
 });
 
