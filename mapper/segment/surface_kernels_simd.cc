@@ -76,7 +76,8 @@ void Pairs(const float* before, const float* q, const float* behind, std::size_t
         hn::Mul(hn::Set(d, scale.sigmas), hn::Add(HeadOnInverse(d, middle, scale.noise), shift));
     const auto both = hn::Add(first, last);
     const auto off = hn::Abs(hn::Sub(both, hn::Add(middle, middle)));
-    const auto unknown = hn::Or3(hn::Eq(first, zero), hn::Eq(middle, zero), hn::Eq(last, zero));
+    const auto unknown =
+        hn::Or(hn::Or(hn::Eq(first, zero), hn::Eq(middle, zero)), hn::Eq(last, zero));
     const auto taken = hn::AndNot(unknown, hn::Le(off, tolerance));
     hn::StoreU(hn::Add(hn::LoadU(d, sum + u), hn::IfThenElseZero(taken, both)), d, sum + u);
     hn::StoreU(hn::Add(hn::LoadU(d, count + u), hn::IfThenElseZero(taken, hn::Set(d, 2.0F))), d,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mapper/segment/segmenter.h"
+
 namespace tsdfpp {
 namespace {
 

@@ -94,7 +94,7 @@ TEST(SurfaceMaps, NothingIsMadeUpInAHole) {
   Frame frame;
   frame.intrinsics = {160, 120, 140, 140, 79.5, 59.5};
   frame.depth = cv::Mat(120, 160, CV_32FC1, cv::Scalar(20));
-  const cv::Mat hole = frame.depth(cv::Rect(80, 0, kWide_px, 120));
+  cv::Mat hole = frame.depth(cv::Rect(80, 0, kWide_px, 120));
   hole.setTo(0);
   DepthSegmentsConfig config;
   config.noise_scale = 10;
