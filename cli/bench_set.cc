@@ -78,6 +78,9 @@ Expected<CommandResult> RunBenchSet(const BenchSetArguments& options) {
     TSDFPP_RETURN_IF_ERROR(WriteFile(options.out, page));
     return CommandResult{{{"page", options.out}}, fmt::format("{}\n", options.out)};
   }
+  if (!options.out.empty()) {
+    return UsageError("--out needs --run or --leaderboard: there is nothing to write");
+  }
   return Describe(set);
 }
 
@@ -91,9 +94,11 @@ Run AddBenchSet(CLI::App& app, const CommonOptions&) {
       app.add_option("--run", options->run, "Run these methods of ours on it, by commas")
           ->check(NotEmpty("names of methods"));
   app.add_option("--commit", options->commit, "The methods' commit, noted in the results")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(run);
   app.add_option("--jobs", options->jobs, "Processes; one a core by default")
-      ->check(WholeBetween(1, 256));
+      ->check(WholeBetween(1, 256))
+      ->needs(run);
   app.add_option("--leaderboard", options->leaderboard,
                  "Print the page of all results (*.json) in this folder")
       ->check(NotEmpty("a folder"))

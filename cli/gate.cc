@@ -60,6 +60,9 @@ Expected<void> Check(const GateArguments& options) {
   const int ways = static_cast<int>(options.update) + static_cast<int>(options.audit) +
                    static_cast<int>(!options.explain.empty());
   if (ways > 1) return UsageError("--update, --audit and --explain exclude each other");
+  if (options.sabotages && ways > 0) {
+    return UsageError("--sabotages does not go with --update, --audit or --explain");
+  }
   return {};
 }
 
@@ -89,11 +92,14 @@ Expected<CommandResult> Audit(const GatesConfig& config, const References& refer
   return CommandResult{AuditJson(audits), text};
 }
 
+// Not beside those of a report, which may be of another run.
+constexpr const char* kExplainedPictures = "explained";
+
 Expected<CommandResult> Explain(const GateRun& run, const References& references,
                                 const std::filesystem::path& out) {
   const GateOutcome& outcome = run.gates.front();
   TSDFPP_ASSIGN(const GateExplanation explanation,
-                ExplainGate(run, outcome, references, out / kGatePictures));
+                ExplainGate(run, outcome, references, out / kExplainedPictures));
   // Where nothing could be judged the sentence has it.
   const std::string why = outcome.judgement.why.empty() || outcome.judgement.values.empty()
                               ? ""

@@ -43,7 +43,8 @@ CocoFolder CocoFolderOf(const std::string& folder, const std::string& json) {
   return {folder, path.parent_path().string() + ".json"};
 }
 
-Expected<PanopticEvaluation> EvaluateFolders(const MetricPanopticArguments& options) {
+Expected<PanopticEvaluation> EvaluateFolders(const MetricPanopticArguments& options,
+                                             std::vector<std::string>& remarks) {
   TSDFPP_ASSIGN(const std::set<int> things, ThingsOf(options));
   if (options.encoding == "coco") {
     if (!things.empty()) {
@@ -59,7 +60,6 @@ Expected<PanopticEvaluation> EvaluateFolders(const MetricPanopticArguments& opti
   if (objects && !things.empty()) {
     return UsageError("--things goes with --encoding class-instance only");
   }
-  std::vector<std::string> remarks;
   auto evaluation = EvaluateLabels(options.truth, options.prediction,
                                    {objects, options.divisor, things}, &remarks);
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
@@ -134,12 +134,14 @@ struct PanopticLines {
 };
 
 Expected<CommandResult> RunPanoptic(const MetricPanopticArguments& options) {
-  TSDFPP_ASSIGN(const PanopticEvaluation evaluation, EvaluateFolders(options));
+  std::vector<std::string> remarks;
+  TSDFPP_ASSIGN(const PanopticEvaluation evaluation, EvaluateFolders(options, remarks));
   PanopticLines lines;
   lines.json = {{"truth", options.truth},
                 {"prediction", options.prediction},
                 {"encoding", options.encoding},
-                {"images", evaluation.images}};
+                {"images", evaluation.images},
+                {"remarks", remarks}};
   lines.text = fmt::format("{} images\n{:<10} {:>8} {:>8} {:>8} {:>6}\n", evaluation.images, "",
                            "PQ", "SQ", "RQ", "N");
   lines.AddMeans(evaluation);

@@ -1,10 +1,12 @@
 #include "sequence/export.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "core/files.h"
 #include "sequence/dataset_writers.h"
+#include "sequence/file_source.h"
 #include "sequence/image_files.h"
 #include "sequence/staging_folder.h"
 
@@ -53,12 +55,17 @@ Expected<void> CheckFrame(const Frame& frame, const SequenceInfo& info, DatasetF
 }
 
 void SayWhatIsLost(const SequenceInfo& info, DatasetFormat format, bool has_models, bool has_poses,
-                   const DepthLoss& loss, double units_per_m, ExportReport& report) {
+                   bool with_mask, double off_s, const DepthLoss& loss, double units_per_m,
+                   ExportReport& report) {
   auto& left_out = report.left_out;
   if (format != DatasetFormat::kBop) {
     if (info.objects.size() > 1) left_out.emplace_back("names and classes of objects");
     if (has_poses) left_out.emplace_back("poses of objects");
     if (has_models) left_out.emplace_back("true surfaces");
+    if (with_mask && !info.mask_ids_are_objects) {
+      left_out.emplace_back(
+          "that the masks' ids are of one frame alone: it is to be mapped with --associate votes");
+    }
   }
   if (info.reveal) left_out.emplace_back("the reveal plan");
   const bool timed = format == DatasetFormat::kTum || format == DatasetFormat::kKlg;
@@ -66,6 +73,9 @@ void SayWhatIsLost(const SequenceInfo& info, DatasetFormat format, bool has_mode
   constexpr double kRateTolerance_hz = 1e-6;
   if (!timed && std::abs(info.rate_hz - kRate_hz) > kRateTolerance_hz) {
     left_out.push_back(fmt::format("times: {:g} frames a second, 30 are taken", info.rate_hz));
+  } else if (constexpr double kMost_s = 1e-3; !timed && off_s > kMost_s) {
+    left_out.push_back(
+        fmt::format("times: 30 frames a second are taken, up to {:.3g} s off", off_s));
   }
   if (timed && info.first_index != 0) {
     left_out.push_back(fmt::format("frame numbers: the first is 0, not {}", info.first_index));
@@ -95,6 +105,7 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   // A source without true surfaces is exported without.
   auto truth = source.Truth();
   const bool has_models = truth.has_value() && !truth->empty();
+  const std::string no_truth = truth ? "" : truth.error().message;
   TSDFPP_RETURN_IF_ERROR(CheckReplaceable(out, false));
   StagingFolder staging(out);
   TSDFPP_ASSIGN(const auto writer,
@@ -103,6 +114,8 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   TSDFPP_RETURN_IF_ERROR(staging.Make());
   bool with_mask = false;
   bool has_poses = false;
+  double first_s = 0;
+  double off_s = 0;  // from thirty frames a second
   for (int i = 0; i < info.frame_count; ++i) {
     TSDFPP_ASSIGN(Frame frame, source.Read(info.first_index + i));
     if (source.IsSensed() && format == DatasetFormat::kBop) {
@@ -116,7 +129,9 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
                               info.frame_count);
     }
     if (i == 0) with_mask = !frame.mask.empty();
+    if (i == 0) first_s = frame.time_s;
     has_poses |= !frame.T_WO.empty();
+    off_s = std::max(off_s, std::abs(frame.time_s - first_s - i / kUsualRate_hz));
     TSDFPP_RETURN_IF_ERROR(CheckFrame(frame, info, format, with_mask));
     TSDFPP_RETURN_IF_ERROR(writer->Add(frame));
     if (progress) progress(i + 1, info.frame_count);
@@ -125,8 +140,11 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   report.frames = info.frame_count;
   report.depth_bound_m = 0.5 / writer->depth_units_per_m();
   TSDFPP_RETURN_IF_ERROR(writer->Finish(report));
-  SayWhatIsLost(info, format, has_models, has_poses, writer->loss(), writer->depth_units_per_m(),
-                report);
+  SayWhatIsLost(info, format, has_models, has_poses, with_mask, off_s, writer->loss(),
+                writer->depth_units_per_m(), report);
+  if (format == DatasetFormat::kBop && !no_truth.empty()) {
+    report.left_out.push_back("true surfaces, which cannot be read: " + no_truth);
+  }
   if (source.IsSensed()) {
     report.left_out.emplace_back(
         format == DatasetFormat::kBop

@@ -68,6 +68,7 @@ class FileSource : public DatasetSource {
       Intrinsics colour = *camera;
       colour.width = frame.colour.cols;
       colour.height = frame.colour.rows;
+      TSDFPP_RETURN_IF_ERROR(CheckCamera(colour, files.colour.string()));
       frame.colour = SampleColour(frame.colour, colour, files.camera);
       if (!frame.mask.empty()) frame.mask = SampleIds(frame.mask, colour, files.camera);
     }

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "core/data_folder.h"
@@ -102,6 +103,8 @@ class KlgSource : public DatasetSource {
       std::memcpy(frame.colour.data, colour.data(), colour.size());
     } else {
       TSDFPP_ASSIGN(frame.colour, DecodeColour(colour, name + ": the colour"));
+      // Logger2 gives red for blue to its encoder, and whoever reads its recordings turns them.
+      cv::cvtColor(frame.colour, frame.colour, cv::COLOR_RGB2BGR);
       TSDFPP_RETURN_IF_ERROR(
           CheckImageSize(frame.colour, size, size_source_, name + ": the colour"));
     }
@@ -144,6 +147,11 @@ class KlgSource : public DatasetSource {
     } else if (fs::exists(folder / "calibration.txt", code)) {
       TSDFPP_ASSIGN(camera, ReadCalibration(folder / "calibration.txt"));
       size_source_ = "calibration.txt";
+      if (camera.width == 0) {
+        size_source_ = "klg's default size";
+        notes.push_back(fmt::format("{}: calibration.txt has no width and height, {}x{} is taken",
+                                    file_.string(), kKlgDefault.width, kKlgDefault.height));
+      }
     } else {
       notes.push_back(fmt::format(
           "{}: no calibration.txt beside it, 528 528 320 240 at 640x480 is taken", file_.string()));

@@ -19,6 +19,8 @@ void Fill(const std::array<Eigen::Vector2d, 3>& p, cv::Mat& image) {
   const double right = std::max({p[0].x(), p[1].x(), p[2].x()});
   const double top = std::min({p[0].y(), p[1].y(), p[2].y()});
   const double bottom = std::max({p[0].y(), p[1].y(), p[2].y()});
+  // As numbers of pixels the others may be beyond what an int holds.
+  if (!(left <= image.cols - 1.0 && right >= 0 && top <= image.rows - 1.0 && bottom >= 0)) return;
   const int x0 = static_cast<int>(std::ceil(std::max(left, 0.0)));
   const int x1 = static_cast<int>(std::floor(std::min(right, image.cols - 1.0)));
   const int y0 = static_cast<int>(std::ceil(std::max(top, 0.0)));

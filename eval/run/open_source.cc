@@ -16,10 +16,11 @@ Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& s
   std::error_code code;
   if (scene_or_sequence.extension() == ".toml") {
     if (options.format || options.intrinsics || options.depth_units_per_m || options.fixed_camera ||
-        options.pose_offset_s != 0) {
+        options.pose_offset_s != 0 || !options.check) {
       return UsageError(
-          "{}: is a scene; a format, a calibration, depth units, a fixed camera or an offset of "
-          "poses are for sequences on disk",
+          "{}: is a scene; a format, a calibration, depth units, a fixed camera, an offset of "
+          "poses "
+          "or --unchecked are for sequences on disk",
           scene_or_sequence.string());
     }
     TSDFPP_ASSIGN(SceneConfig config, LoadSceneConfig(scene_or_sequence, scene.seed));

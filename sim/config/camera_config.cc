@@ -95,7 +95,10 @@ Expected<HandJitter> ReadJitter(const toml::table& table, const TomlReader& came
   };
   check("position_mm", jitter.position_mm, kMostPosition_mm);
   check("rotation_deg", jitter.rotation_deg, kMostRotation_deg);
-  CheckPositive(reader, "lowest_hz", jitter.lowest_hz);
+  constexpr double kLeast_hz = 1e-3;
+  constexpr double kMost_hz = 1000;
+  CheckRange(reader, "lowest_hz", jitter.lowest_hz, kLeast_hz, kMost_hz);
+  CheckRange(reader, "highest_hz", jitter.highest_hz, kLeast_hz, kMost_hz);
   if (!(jitter.highest_hz > jitter.lowest_hz)) {
     reader.Fault("highest_hz", fmt::format("is {}, expected more than lowest_hz ({})",
                                            jitter.highest_hz, jitter.lowest_hz));

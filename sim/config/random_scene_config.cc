@@ -92,7 +92,8 @@ Expected<RandomSceneConfig> ReadRandomScene(const toml::table& root, const std::
   reader.Get("frames", config.frames, true).Get("rate_hz", config.rate_hz, true);
   GetSeed(reader, root, "seed", config.seed);
   CheckPlainName(reader, config.name);
-  CheckRange(reader, "frames", config.frames, 2, 100000);
+  // A thing that is carried has four keys.
+  CheckRange(reader, "frames", config.frames, 4, 100000);
   CheckRange(reader, "rate_hz", config.rate_hz, 0.1, 1000.0);
   const toml::table* camera = reader.Table("camera", true);
   const toml::table* random = reader.Table("random", true);

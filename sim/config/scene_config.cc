@@ -23,8 +23,9 @@ Expected<void> CheckInRoom(TomlReader& reader, const SceneConfig& config) {
   for (int frame = kFirstFrame; frame < kFirstFrame + config.frames; ++frame) {
     const Eigen::Vector3d at = motion.T_WC(frame).translation();
     const double kept = kWallDistance_m;
-    if (std::abs(at.x()) > room.half_x - kept || std::abs(at.y()) > room.half_y - kept ||
-        at.z() > room.height - kept || at.z() < kept) {
+    // Whatever is no number is not in it, either.
+    if (!(std::abs(at.x()) <= room.half_x - kept && std::abs(at.y()) <= room.half_y - kept &&
+          at.z() <= room.height - kept && at.z() >= kept)) {
       reader.Fault(key, fmt::format("and the other keys put the camera at ({:.2f}, {:.2f}, "
                                     "{:.2f}) m in frame {}, which is outside the room",
                                     at.x(), at.y(), at.z(), frame));
@@ -141,6 +142,17 @@ Expected<SceneConfig> ReadSceneConfig(const toml::table& root, const std::string
   }
   if (sensor != nullptr) {
     TSDFPP_ASSIGN(config.sensor, ReadSensorConfig(*sensor, where));
+    // All of a frame's are in memory at a time.
+    constexpr std::int64_t kMostSamples = std::int64_t{1} << 28;
+    const std::int64_t samples = std::int64_t{config.intrinsics.width} * config.intrinsics.height *
+                                 config.sensor.shutter.sub_frames;
+    if (samples > kMostSamples) {
+      return UsageError(
+          "{}: 'sensor.shutter.sub_frames' is {}, with which a frame of {} x {} pixels "
+          "has {} samples, expected {} at most",
+          where, config.sensor.shutter.sub_frames, config.intrinsics.width,
+          config.intrinsics.height, samples, kMostSamples);
+    }
   }
   for (std::size_t i = 0; i < objects.size(); ++i) {
     TSDFPP_ASSIGN(

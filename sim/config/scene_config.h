@@ -25,7 +25,7 @@ namespace tsdfpp {
 // An object that physics moves (physics_bake.h).
 struct ObjectPhysics {
   double mass_kg = 0.2;
-  double friction = 0.5;             // Coulomb's, on all but objects that have a larger one
+  double friction = 0.5;             // Coulomb's; the larger one where two such objects meet
   double rolling_friction_m = 3e-4;  // torque that brakes rolling, a newton of load
   int start_frame = 1;               // held at its place until then
   Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();  // metres a second, of its middle, then
@@ -54,7 +54,9 @@ struct SceneObject {
 
 struct PhysicsSettings {
   double timestep_s = 0.001;  // rounded down so that a frame has a whole number of steps
-  double friction = 0.3;      // of the room and of objects that physics does not move
+  // Of the room and of objects that physics does not move: no contact's, since those of objects
+  // that it moves go before.
+  double friction = 0.3;
 };
 
 struct SceneExperiment {

@@ -37,7 +37,7 @@ Expected<DrivePath> ReadDrive(const toml::table& table, const std::string& where
     reader.Fault("end_frame", fmt::format("is {}, expected more than start_frame ({})",
                                           drive.end_frame, drive.start_frame));
   }
-  const double duration_s = (drive.end_frame - drive.start_frame) / config.rate_hz;
+  const double duration_s = (double{1} * drive.end_frame - drive.start_frame) / config.rate_hz;
   CheckRange(reader, "ramp_s", drive.ramp_s, 0.0, duration_s / 2);
   if (drive.x.empty()) reader.Fault("x", "needs one waypoint at least");
   if (drive.x.size() != drive.y.size()) {
@@ -74,6 +74,16 @@ Expected<std::vector<Keyframe>> ReadKeyframes(const std::vector<const toml::tabl
     Keyframe key = last;
     reader.Get("frame", key.frame, true).Get("position", key.position_W);
     CheckRange(reader, "frame", key.frame, kFirstFrame, config.frames);
+    const RoomSpec& room = config.room;
+    const Eigen::Vector3d& at = key.position_W;
+    if (!(std::abs(at.x()) <= room.half_x && std::abs(at.y()) <= room.half_y &&
+          at.z() >= -room.height && at.z() <= room.height)) {
+      reader.Fault(
+          "position",
+          fmt::format("is ({}, {}, {}), which is outside the room of {} x {} x "
+                      "{} m",
+                      at.x(), at.y(), at.z(), 2 * room.half_x, 2 * room.half_y, room.height));
+    }
     if (!keys.empty() && key.frame <= last.frame) {
       reader.Fault("frame", fmt::format("is {}, expected more than the key before it ({})",
                                         key.frame, last.frame));

@@ -197,7 +197,8 @@ PixelComparison ComparePixel(const RayImage& rays, const cv::Mat& depth, const c
     return {shown && empty_around ? RayVerdict::kMissed : RayVerdict::kExcluded, 0};
   }
   const double least_cosine = std::cos(config.max_incidence_deg * std::numbers::pi / 180);
-  const double cosine = -rays.normal_C[i].dot(PixelRay(k, u, v).normalized());
+  // Whichever way a face is wound: a renderer that shows nothing of its back is to be found out.
+  const double cosine = std::abs(rays.normal_C[i].dot(PixelRay(k, u, v).normalized()));
   if (cosine < least_cosine || IsOnEdge(rays, u, v, config)) return {};
   if (!shown) return {RayVerdict::kMissed, 0};
   if (mask.at<InstanceId>(v, u) != rays.id[i]) return {RayVerdict::kWrongId, 0};

@@ -24,18 +24,21 @@ UserMesh MakeUserMesh(const ModelPart& part, double texture_size_m) {
         (shape.vertices[b] - shape.vertices[a]).cross(shape.vertices[c] - shape.vertices[a]);
     for (const std::uint32_t v : {a, b, c}) faces_at[v].push_back(f);
   }
+  std::vector<Eigen::Vector3d> face_direction(face_normal.size());
+  std::transform(face_normal.begin(), face_normal.end(), face_direction.begin(),
+                 [](const Eigen::Vector3d& normal) { return normal.normalized(); });
   const double least_cosine = std::cos(kCreaseAngle_deg * std::numbers::pi / 180);
   // Corners of one vertex whose faces are the same set have the same sum, bit for bit.
   std::map<std::pair<std::uint32_t, std::array<double, 3>>, int> split;
   UserMesh mesh;
   for (std::size_t f = 0; f < shape.triangles.size(); ++f) {
-    const Eigen::Vector3d own = face_normal[f].normalized();
+    const Eigen::Vector3d& own = face_direction[f];
     int axis = 0;
     own.cwiseAbs().maxCoeff(&axis);
     for (const std::uint32_t v : shape.triangles[f]) {
       Eigen::Vector3d normal = Eigen::Vector3d::Zero();
       for (const std::size_t other : faces_at[v]) {
-        if (face_normal[other].normalized().dot(own) > least_cosine) normal += face_normal[other];
+        if (face_direction[other].dot(own) > least_cosine) normal += face_normal[other];
       }
       normal.normalize();
       const auto [entry, is_new] = split.try_emplace({v, {normal.x(), normal.y(), normal.z()}},

@@ -179,7 +179,7 @@ class MaskFaults {
     std::map<InstanceId, InstanceId> group;
     for (const InstanceId id : present_) group[id] = id;
     for (const InstanceId id : With(config_.merged.timing, kStreamMaskMerged)) {
-      const InstanceId other = TouchingObject(mask_, id, config_.merged.pixels);
+      const InstanceId other = TouchingObject(mask_, id, config_.merged.pixels, present_);
       if (other == kNoInstance) continue;
       const InstanceId a = group[id];
       const InstanceId b = group[other];
@@ -304,13 +304,14 @@ cv::Mat SplitMask(const cv::Mat& mask, InstanceId object, double angle, Instance
   return moved == pixels.size() ? mask.clone() : result;
 }
 
-InstanceId TouchingObject(const cv::Mat& mask, InstanceId object, int pixels) {
+InstanceId TouchingObject(const cv::Mat& mask, InstanceId object, int pixels,
+                          std::span<const InstanceId> others) {
   const std::vector<Offset> disc = Disc(pixels);
   std::map<InstanceId, int> contact;
   for (int v = 0; v < mask.rows; ++v) {
     for (int u = 0; u < mask.cols; ++u) {
       const InstanceId id = IdAt(mask, u, v);
-      if (id == kBackground || id == object || id >= kFirstInventedId) continue;
+      if (id == object || !std::binary_search(others.begin(), others.end(), id)) continue;
       if (std::any_of(disc.begin(), disc.end(), [&](const Offset& offset) {
             return Inside(mask, u + offset.du, v + offset.dv) &&
                    IdAt(mask, u + offset.du, v + offset.dv) == object;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -54,9 +55,10 @@ cv::Mat GrowMasks(const cv::Mat& mask, const std::vector<InstanceId>& objects, i
 // Pixels of `object` on one side of the line through their centroid at `angle` radians (from +u
 // towards +v) take `part`. Nothing where one side would be empty.
 cv::Mat SplitMask(const cv::Mat& mask, InstanceId object, double angle, InstanceId part);
-// The object below kFirstInventedId, not background, most pixels of which lie within `pixels` of
-// `object` (the lowest id of several); kNoInstance where there is none.
-InstanceId TouchingObject(const cv::Mat& mask, InstanceId object, int pixels);
+// The one of `others` (sorted) most pixels of which lie within `pixels` of `object` (the lowest id
+// of several); kNoInstance where none does.
+InstanceId TouchingObject(const cv::Mat& mask, InstanceId object, int pixels,
+                          std::span<const InstanceId> others);
 
 // `mask` is CV_16UC1; `objects` gives the classes. Where ids are invented, those of the mask are
 // below kFirstInventedId and so few that kInventedIds are enough; aborts where these are used up.

@@ -219,10 +219,10 @@ TEST(EvaluateMeshes, WhatARemovalBringsToLightIsMatchedToo) {
   EXPECT_EQ(Of(Evaluated(config), kBackground).preserved.preservation_behind_other.value, 1.0);
   // Without labels nobody knows what is left of whom.
   Put(folder / "m/scene-without-8.ply", SceneOf(meshes, false));
-  EXPECT_NE(
-      ErrorOf(config).find("scene-without-8.ply: tells no objects apart, expected the labels"),
-      std::string::npos)
-      << ErrorOf(config);
+  EXPECT_NE(ErrorOf(config).message.find(
+                "scene-without-8.ply: tells no objects apart, expected the labels"),
+            std::string::npos)
+      << ErrorOf(config).message;
 }
 
 TEST(EvaluateMeshes, WhatIsLeftAfterTheRemovalByWhatIsKnownOfItsPlace) {

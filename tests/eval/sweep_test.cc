@@ -307,7 +307,7 @@ TEST_F(Sweep, AnyFrameCanBeMadeAgain) {
       RunTsdfpp({"replay", folder_ / "sabotaged", "--cell", sabotaged.at("cells").begin().key(),
                  "--frame", "3", "--out", folder_ / "sabotaged-3", "--json"},
                 folder_.path());
-  EXPECT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
   const std::string id = swept.at("cells").begin().key();
   const auto wrong = [&](const std::string& cell, const char* frame) {
     const auto ran = RunTsdfpp(

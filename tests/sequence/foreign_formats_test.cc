@@ -244,11 +244,9 @@ TEST(ForeignFormats, KlgTakesRawDepthAndJpegColour) {
     const Frame frame = source.Read(i).value();
     cv::Mat mm;
     frame.depth.convertTo(mm, CV_16U, 1000);
-    cv::Mat bgr(frame.colour.size(), CV_8UC3);
-    const int swap[] = {0, 2, 1, 1, 2, 0};
-    cv::mixChannels(&frame.colour, 1, &bgr, 1, swap, 3);
+    // As Logger2 does it: red is first, where the encoder takes the first for blue.
     std::vector<unsigned char> jpeg;
-    cv::imencode(".jpg", bgr, jpeg);
+    cv::imencode(".jpg", frame.colour, jpeg);
     put(std::int64_t{1000000000 + 33333 * i});
     put(static_cast<std::int32_t>(mm.total() * 2));
     put(static_cast<std::int32_t>(jpeg.size()));

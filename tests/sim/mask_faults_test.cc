@@ -221,7 +221,9 @@ TEST(MaskFaults, TouchingIsTheLongestContact) {
         if (count > most) expected = id;
         most = std::max(most, count);
       }
-      EXPECT_EQ(TouchingObject(mask, 2, pixels), expected) << seed << " " << pixels;
+      std::vector<InstanceId> others;
+      for (const auto& [id, count] : contact) others.push_back(id);
+      EXPECT_EQ(TouchingObject(mask, 2, pixels, others), expected) << seed << " " << pixels;
     }
   }
 }

@@ -99,7 +99,7 @@ void ExpectFrameEqualsRays(SimulatedSource& source, int index) {
     for (int u = 0; u < k.width; ++u) {
       const auto i = static_cast<std::size_t>(v * k.width + u);
       ASSERT_NE(rays.id[i], kNoInstance) << "the room is not closed at pixel " << u << ", " << v;
-      const double cosine = -rays.normal_C[i].dot(RayOf(k, u, v).normalized());
+      const double cosine = std::abs(rays.normal_C[i].dot(RayOf(k, u, v).normalized()));
       if (cosine < least_cosine || IsOnEdge(rays, k, u, v)) continue;
       ++compared;
       const double error = std::abs(frame->depth.at<float>(v, u) - rays.depth[i]);
