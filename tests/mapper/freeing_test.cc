@@ -74,18 +74,12 @@ TEST_P(Freeing, WhatWasFusedInVainIsNotThere) {
   for (int pixel = 5; pixel < frame.mask.cols / 2; pixel += 4) {
     beside.mask = frame.mask.clone();
     const cv::Point at(pixel, frame.mask.rows / 2);
-    beside.mask.at<InstanceId>(at) = kNoInstance;
-    const auto expected = without->Clone();
-    expected->Fuse(beside, beside.mask);
     beside.mask.at<InstanceId>(at) = kSpeck;
     const auto map = without->Clone();
     map->Fuse(beside, beside.mask);
-    if (MapToBytes(*map).value() == MapToBytes(*expected).value()) {
-      ++in_vain;
-      EXPECT_TRUE(EditingOf(*map).Add(kSpeck, {}, Pose::Identity(), std::nullopt));
-    } else {
-      EXPECT_TRUE(IsOneField(GetParam()) || !VoxelsOf(*map).ObservedVoxels(kSpeck).empty());
-    }
+    if (!VoxelsOf(*map).ObservedVoxels(kSpeck).empty()) continue;
+    ++in_vain;
+    EXPECT_TRUE(EditingOf(*map).Add(kSpeck, {}, Pose::Identity(), std::nullopt));
   }
   EXPECT_GT(in_vain, 0);
 }

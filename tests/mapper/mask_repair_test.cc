@@ -12,6 +12,7 @@
 #include "mapper/associate/take_out.h"
 #include "mapper/map_file.h"
 #include "tests/mapper/every_method.h"
+#include "tests/mapper/noisy_toys.h"
 
 namespace tsdfpp {
 namespace {
@@ -388,15 +389,18 @@ TEST_P(MaskRepairOfVolumes, NothingIsTakenOutOfWhatIsNotKnownToBeThere) {
 
 // A mask that is wrong at a few points of each cell is not a dispute: the others are heard as well.
 TEST(MaskRepair, AFewPointsDisputeNothing) {
-  const auto frames_until_lost = [](bool is_speckled) {
+  const auto frame_of = [](int i) {
+    return reference::Render(TableWithToys(), CircleCamera(0.2 + 0.1 * i), i, FineCamera());
+  };
+  const auto frames_until_lost = [&](bool is_speckled) {
     RepairedWorld world(Method::kTsdfppAnchored);
     int index = 0;
-    for (; index < 6; ++index) world.Map(StillFrame(index));
+    for (; index < 6; ++index) world.Map(frame_of(index));
     if (is_speckled) {
-      const Frame frame = StillFrame(index);
+      const Frame frame = frame_of(index);
       cv::Mat mask = frame.mask.clone();
-      for (int v = 0; v + 1 < mask.rows; v += 7) {
-        for (int u = 0; u + 1 < mask.cols; u += 7) {
+      for (int v = 0; v + 1 < mask.rows; v += 15) {
+        for (int u = 0; u + 1 < mask.cols; u += 15) {
           cv::Mat speckle = mask(cv::Rect(u, v, 2, 2));
           speckle.setTo(static_cast<double>(kTray), speckle == static_cast<double>(kBrick));
         }
@@ -404,11 +408,11 @@ TEST(MaskRepair, AFewPointsDisputeNothing) {
       EXPECT_GT(cv::countNonZero(mask != frame.mask), 20);
       world.Map(frame, mask);
     } else {
-      world.Map(StillFrame(index));
+      world.Map(frame_of(index));
     }
     const auto at_first = VoxelsOf(world.map()).ObservedVoxels(kBrick).size();
     for (int frames = 1; frames < 30; ++frames) {
-      const Frame frame = StillFrame(index + frames);
+      const Frame frame = frame_of(index + frames);
       world.Map(frame, With(frame.mask, kBrick, kBackground));
       if (VoxelsOf(world.map()).ObservedVoxels(kBrick).size() < at_first) return frames;
     }

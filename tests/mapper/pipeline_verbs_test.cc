@@ -106,6 +106,7 @@ const std::map<std::string, std::string>& AllowedReaders() {
       {"mapper/methods/surfel_map.cc object.T_WO", "the map's own pose of an object"},
       {"mapper/store/volume_store.cc volume.T_WO", "the map's own pose of an object"},
       {"mapper/volume/object_volume.h volume.T_WO", "the map's own pose of an object"},
+      {"mapper/volume/freeing.cc volume.T_WO", "whether the map has a pose of an object"},
       {"mapper/pipeline.cc tracked.T_WO", "what the tracker answered"},
       {"mapper/track/lost_objects.cc found.T_WO", "where a lost object was found"},
       {"mapper/track/lost_objects.cc kept.T_WO", "where the map had a lost object"},

@@ -386,9 +386,9 @@ TEST(ObjectLookup, SaysNothingOfFreeSpace) {
     return distances.size();
   };
   EXPECT_EQ(answers_at(0), 1U);
-  EXPECT_EQ(answers_at(2), 1U);
-  // Distances are along rays, and these come from above at an angle.
-  EXPECT_EQ(answers_at(ToyConfig().trunc_front_voxels + 1), 0U);
+  // Distances are along rays, and these come at some 60 degrees.
+  EXPECT_EQ(answers_at(1), 1U);
+  EXPECT_EQ(answers_at(ToyConfig().trunc_front_voxels), 0U);
 }
 
 TEST(VoteConfig, SurvivesToml) {
