@@ -303,7 +303,7 @@ TEST_F(Sweep, AnyFrameCanBeMadeAgain) {
   // So can one of frames that were broken on purpose.
   const json sabotaged = RunSweep(
       Experiment("method = \"tsdf++\"\nvoxel_m = 0.02\nsabotage = \"depth-scale\""), "sabotaged");
-  const auto ran =
+  const auto replayed =
       RunTsdfpp({"replay", folder_ / "sabotaged", "--cell", sabotaged.at("cells").begin().key(),
                  "--frame", "3", "--out", folder_ / "sabotaged-3", "--json"},
                 folder_.path());

@@ -12,7 +12,6 @@
 #include "mapper/associate/take_out.h"
 #include "mapper/map_file.h"
 #include "tests/mapper/every_method.h"
-#include "tests/mapper/noisy_toys.h"
 
 namespace tsdfpp {
 namespace {
@@ -390,7 +389,8 @@ TEST_P(MaskRepairOfVolumes, NothingIsTakenOutOfWhatIsNotKnownToBeThere) {
 // A mask that is wrong at a few points of each cell is not a dispute: the others are heard as well.
 TEST(MaskRepair, AFewPointsDisputeNothing) {
   const auto frame_of = [](int i) {
-    return reference::Render(TableWithToys(), CircleCamera(0.2 + 0.1 * i), i, FineCamera());
+    return reference::Render(TableWithToys(), CircleCamera(0.2 + 0.1 * i), i,
+                             {384, 288, 320.0, 320.0, 191.5, 143.5});
   };
   const auto frames_until_lost = [&](bool is_speckled) {
     RepairedWorld world(Method::kTsdfppAnchored);
