@@ -1,8 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "core/data_folder.h"
@@ -104,7 +104,9 @@ class KlgSource : public DatasetSource {
     } else {
       TSDFPP_ASSIGN(frame.colour, DecodeColour(colour, name + ": the colour"));
       // Logger2 gives red for blue to its encoder, and whoever reads its recordings turns them.
-      cv::cvtColor(frame.colour, frame.colour, cv::COLOR_RGB2BGR);
+      const cv::Mat turned = frame.colour.clone();
+      const std::array<int, 6> from_to{0, 2, 1, 1, 2, 0};
+      cv::mixChannels(&turned, 1, &frame.colour, 1, from_to.data(), 3);
       TSDFPP_RETURN_IF_ERROR(
           CheckImageSize(frame.colour, size, size_source_, name + ": the colour"));
     }
