@@ -231,7 +231,8 @@ std::vector<InstanceId> Pipeline::FindAgain(const Frame& frame, AssociatedObject
   if (lost_->empty()) return found;
   std::vector<LostObjects::Segment> segments;
   for (std::size_t s = 0; s < association.unclaimed.size(); ++s) {
-    segments.push_back({association.unclaimed[s], kNoInstance, association.may_begin[s]});
+    segments.push_back(
+        {association.unclaimed[s], kNoInstance, association.may_begin[s], association.is_known[s]});
   }
   cv::Mat labels = association.labels.clone();
   for (auto& [id, pixels] : pixels_of) {

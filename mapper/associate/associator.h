@@ -22,8 +22,10 @@ struct AssociatedObjects {
   std::map<InstanceId, std::string> classes{};
   // The pixels, with valid depth, of each segment that is none of the map's objects.
   std::vector<std::vector<int>> unclaimed{};
-  // Of each of those: whether an object may begin with it.
+  // Of each of those: whether an object may begin with it, and whether it is more than a piece of
+  // what is seen (Segments::unknown).
   std::vector<bool> may_begin{};
+  std::vector<bool> is_known{};
 };
 
 class Associator {

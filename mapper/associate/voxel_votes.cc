@@ -375,6 +375,7 @@ AssociatedObjects VoxelVotes::Associate(const Frame& frame, const Segments& segm
     if (is_born) continue;
     association.unclaimed.push_back(std::move(segment.pixels));
     association.may_begin.push_back(segment.is_known && !segment.is_far_part);
+    association.is_known.push_back(segment.is_known);
   }
   for (const Segment& segment : found) {
     if (!segment.object || (segment.is_known && segment.shared_with.empty())) continue;

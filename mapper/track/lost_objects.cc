@@ -28,7 +28,8 @@ constexpr double kLeastAlike = 0.3;
 constexpr double kLeastLikeness = 0.5;
 constexpr double kLeastLead = 0.1;
 constexpr int kEvery_frames = 3;
-// Searches in one frame, of the pairs of segments and objects that are the most alike.
+// Searches in one frame, of the pairs of segments and objects that are the most alike, known
+// segments first: of a room there may be dozens of pieces with an object's colours.
 constexpr int kMostSearches = 8;
 
 // 255 at the pixels, else 0.
@@ -190,7 +191,10 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
           {is_given ? 2 : ColoursInCommon(looks[s].appearance, kept.appearance), id, s});
     }
   }
-  std::ranges::stable_sort(pairs, [](const Pair& a, const Pair& b) { return a.alike > b.alike; });
+  std::ranges::stable_sort(pairs, [&](const Pair& a, const Pair& b) {
+    const bool a_is_known = segments[a.segment].is_known;
+    return a_is_known == segments[b.segment].is_known ? a.alike > b.alike : a_is_known;
+  });
   std::set<InstanceId> taken_ids;
   std::set<std::size_t> taken_segments;
   const auto take = [&](const Return& found) {

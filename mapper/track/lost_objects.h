@@ -76,6 +76,7 @@ class LostObjects {
     LoosePixels pixels;
     InstanceId id = kNoInstance;  // the kept object that it is, or it is to be found
     bool may_begin = true;        // a model may begin with it
+    bool is_known = true;         // it is no piece of what nobody knows
   };
   // A segment that is a kept object's.
   struct Return {

@@ -353,6 +353,31 @@ TEST(LostObjects, AreLookedForInEveryThirdFrame) {
   EXPECT_TRUE(found(40));
 }
 
+// Among many pieces of the room that have its colours, too, it is looked for in what is known
+// first.
+TEST(LostObjects, AreLookedForInKnownSegmentsFirst) {
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
+  map->SetObjectPose(kBrick, Pose::Identity());
+  for (int i = 1; i < kLeaves; ++i) {
+    const Frame before = Coming(i, 0);
+    map->Fuse(before, before.mask);
+  }
+  LostObjects lost(SdfTrackConfig{});
+  lost.Keep(kBrick, *map, T_WO.at(kBrick));
+  lost.TakeOut({}, *map, T_WO);
+  // Nothing says how it stands in these, and it is as alike.
+  const Frame frame = Coming(kReturns, 40 * kDegree);
+  const LoosePixels brick = PixelsWhere(frame.mask == kBrick);
+  const LoosePixels part(brick.begin(),
+                         brick.begin() + static_cast<std::ptrdiff_t>(brick.size() / 3));
+  std::vector<LostObjects::Segment> segments(20, {part, kNoInstance, false, false});
+  segments.push_back({brick, kNoInstance, true, true});
+  const auto returns = lost.FindAgain(frame, segments);
+  ASSERT_EQ(returns.size(), 1U);
+  EXPECT_EQ(returns[0].segment, segments.size() - 1);
+}
+
 // A gate that says no in every frame does so in the pipeline.
 TEST(LostObjects, AreBegunAnewInThePipeline) {
   PipelineConfig config = TrackConfig(AssociationMode::kGiven);
