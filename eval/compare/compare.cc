@@ -356,9 +356,10 @@ Expected<CompareResult> RunCompare(FrameSource& source, const CompareConfig& con
                                    const std::string& command, const CompareProgress& progress) {
   const auto start = Clock::now();
   TSDFPP_ASSIGN(CompareResult result, Planned(source, config, out_folder));
+  // Maps that cannot be made leave no folder.
+  TSDFPP_RETURN_IF_ERROR(SetUp(source, result));
   TSDFPP_ASSIGN(RunFolder folder, RunFolder::Begin(out_folder, command));
   result.run = folder.id();
-  TSDFPP_RETURN_IF_ERROR(SetUp(source, result));
   TSDFPP_RETURN_IF_ERROR(CheckPlaces(result, folder));
 
   TSDFPP_ASSIGN(const AdapterTask task, TaskForAdapters(result));
