@@ -62,8 +62,14 @@ std::unique_ptr<Associator> MakeAssociator(
   switch (config.associate) {
     case AssociationMode::kGiven:
       return std::make_unique<GivenIds>();
-    case AssociationMode::kVotes:
-      return std::make_unique<VoxelVotes>(config.votes, NextId(born, trajectories));
+    case AssociationMode::kVotes: {
+      VoteConfig votes = config.votes;
+      if (votes.far_share < 0) {
+        const bool repairs = config.mask_repair == MaskRepairMode::kOn;
+        votes.far_share = repairs ? VoteConfig::kUsualFarShare : 0;
+      }
+      return std::make_unique<VoxelVotes>(votes, NextId(born, trajectories));
+    }
   }
   std::abort();
 }

@@ -25,7 +25,7 @@ Expected<void> VoteConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_window", confirm_window, confirm_frames, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("hold_frames", hold_frames, 0, 1000));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("far_share", far_share, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("far_share", far_share, -1, 100));
   return {};
 }
 

@@ -23,7 +23,9 @@ struct VoteConfig {
   // A part of a segment is not of the object that it joins if it is farther outside of the box
   // around all that is known of the object than so much of the box's diagonal (and than
   // near_voxels), and nothing hides what is between (far_part.h); 0: the segment is taken as it is.
-  double far_share = 0.15;
+  // Below 0: kUsualFarShare where masks are repaired (MaskRepairMode), else 0.
+  double far_share = -1;
+  static constexpr double kUsualFarShare = 0.15;
 
   // Errors: kUsage, naming the field, what was found and what was expected.
   Expected<void> Validate() const;

@@ -147,7 +147,7 @@ void VoxelVotes::Claim(const ObjectLookup& lookup, std::span<Segment> segments) 
 
 void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const ObjectLookup& lookup,
                                double voxel_m, std::vector<Segment>& segments) const {
-  if (config_.far_share == 0) return;
+  if (config_.far_share <= 0) return;
   const FarPartConfig config{.share = config_.far_share,
                              .least_m = config_.near_voxels * voxel_m,
                              .step_m = std::max(FarPartConfig{}.step_m, kStep_voxels * voxel_m),

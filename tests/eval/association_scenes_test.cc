@@ -2,6 +2,7 @@
 // true poses. Each object has to have one id, its own, throughout.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "core/intrinsics.h"
@@ -58,7 +59,13 @@ Expected<Tally> Associate(const std::string& scene, int last_frame) {
   TSDFPP_ASSIGN(const auto source, SimulatedSource::Open(config, options));
   MapConfig map;
   TSDFPP_RETURN_IF_ERROR(map.SetProfile("close"));
-  VoteWorld world(Method::kTsdfppAnchored, map);
+  // By default as the pipeline has it where masks are not repaired: of true masks parts would be
+  // left out.
+  VoteConfig votes;
+  if (const char* far_share = std::getenv("TSDFPP_FAR_SHARE")) {
+    votes.far_share = std::atof(far_share);
+  }
+  VoteWorld world(Method::kTsdfppAnchored, map, votes);
   Tally tally;
   const int last = std::min(last_frame, source->info().frame_count);
   for (int index = 1; index <= last; ++index) {

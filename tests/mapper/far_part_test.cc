@@ -57,6 +57,12 @@ std::vector<int> PixelsOf(const Frame& frame, const cv::Mat& mask, InstanceId id
   return pixels;
 }
 
+VoteConfig Parting() {
+  VoteConfig votes;
+  votes.far_share = VoteConfig::kUsualFarShare;
+  return votes;
+}
+
 ObjectLookup::SurfaceBox BoxOf(const ObjectLookup& lookup, std::size_t object) {
   return lookup.BoxesOfSurfaces({&object, 1}).front();
 }
@@ -196,7 +202,7 @@ TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
     const ObjectLookup lookup(world.map());
     return std::pair(world.map().Objects(), BoxOf(lookup, 0).box_L.sizes().maxCoeff());
   };
-  const double far_share = VoteConfig{}.far_share;
+  const double far_share = VoteConfig::kUsualFarShare;
   const auto [objects, length_m] = map_all(kAlone, far_share);
   EXPECT_EQ(objects, (std::vector<InstanceId>{0, 1}));
   EXPECT_LT(length_m, 0.15 + 3 * kToyVoxel_m);
@@ -208,7 +214,7 @@ TEST(FarPart, IsNobodysUntilAMaskShowsItAlone) {
 
 // Nor may a lost object's model begin on it.
 TEST(FarPart, BeginsNothing) {
-  ToyVotes world;
+  ToyVotes world(Method::kTsdfppAnchored, Parting());
   for (int i = 0; i < 5; ++i) world.Map(View(BrickAlone(), i));
   reference::Scene scene = BrickAlone();
   AddBall(scene, {-0.2, 0.05, kTableTop_m + 0.055});
@@ -234,7 +240,7 @@ void ExpectBothHaveTheirs(const Frame& frame, const cv::Mat& labels,
 
 // Nor is it nobody's where the map has the object that it is of.
 TEST(FarPart, IsGivenToAnObjectOfTheMap) {
-  ToyVotes world;
+  ToyVotes world(Method::kTsdfppAnchored, Parting());
   const auto frame_of = [](int index) {
     reference::Scene scene = BrickAlone();
     AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});
@@ -254,7 +260,7 @@ TEST(FarPart, DoesNotComeBackThroughWhatOfItIsInTheObject) {
   // So fine that what gets in is a small share of the brick's surface, and more than a voxel.
   MapConfig config = ToyConfig();
   config.voxel_m = kToyVoxel_m / 2;
-  VoteWorld world(Method::kTsdfppAnchored, config);
+  VoteWorld world(Method::kTsdfppAnchored, config, Parting());
   reference::Scene scene = BrickAlone();
   AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});
   for (int i = 0; i < 3 * kConfirmed; ++i) {
@@ -275,7 +281,7 @@ TEST(FarPart, DoesNotComeBackThroughWhatOfItIsInTheObject) {
 // Of another object that the map knows one part is far, the other near: a mask over all is cut
 // between the two objects.
 TEST(FarPart, DoesNotKeepTheRestFromBeingCut) {
-  ToyVotes world;
+  ToyVotes world(Method::kTsdfppAnchored, Parting());
   const auto frame_of = [](int index) {
     reference::Scene scene = BrickAlone();
     AddBall(scene, {-0.2, 0.2, kTableTop_m + 0.055});

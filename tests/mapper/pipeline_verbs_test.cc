@@ -1,12 +1,15 @@
 // What the verbs of the pipeline make of a frame where the answer came with it (paper III-B to
 // III-D); that nobody else reads the frame's masks and poses.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <regex>
 #include <set>
 #include <string>
+#include <tuple>
 
 #include "core/files.h"
 #include "mapper/associate/given_ids.h"
@@ -149,16 +152,22 @@ TEST(PipelineVerbs, TheStartOfAMapAsksOnlyWhetherThereAreMasks) {
   EXPECT_FALSE(std::regex_search(text, mask));
 }
 
-// A mask over a brick and a ball far behind it, of which the ball does not become the brick's.
+// A mask over a brick and a ball far behind it, of which the ball does not become the brick's where
+// masks are repaired, or it is asked for.
 TEST(PipelineVerbs, AssociationPartsMasks) {
-  for (const double far_share : {0.0, VoteConfig{}.far_share}) {
-    SCOPED_TRACE(far_share);
+  constexpr double kUsual = VoteConfig::kUsualFarShare;
+  for (const auto& [mode, far_share, is_parted] : {std::tuple{MaskRepairMode::kOff, -1.0, false},
+                                                   {MaskRepairMode::kOn, -1.0, true},
+                                                   {MaskRepairMode::kOff, kUsual, true},
+                                                   {MaskRepairMode::kOn, 0.0, false}}) {
+    SCOPED_TRACE(fmt::format("{} {}", MaskRepairModeName(mode), far_share));
     PipelineConfig config;
     config.method = Method::kTsdfppAnchored;
     config.map = ToyConfig();
     config.associate = AssociationMode::kVotes;
     config.poses = PoseSource::kTrack;
     config.tracked = TrackChoice::kAll;
+    config.mask_repair = mode;
     config.votes.far_share = far_share;
     Pipeline pipeline(config, {});
     for (int i = 1; i < 10; ++i) {

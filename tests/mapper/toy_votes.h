@@ -11,7 +11,8 @@ inline constexpr int kConfirmed = 3;
 
 class ToyVotes : public VoteWorld {
  public:
-  explicit ToyVotes(Method method = Method::kTsdfppAnchored) : VoteWorld(method, ToyConfig()) {}
+  explicit ToyVotes(Method method = Method::kTsdfppAnchored, const VoteConfig& votes = {})
+      : VoteWorld(method, ToyConfig(), votes) {}
 };
 
 inline int CountOf(const cv::Mat& labels, InstanceId id) {

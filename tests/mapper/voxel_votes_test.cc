@@ -410,7 +410,7 @@ TEST(VoteConfig, NamesWhatIsWrong) {
       {"max_points = 0", "'max_points' is 0, expected 1 to 1000000"},
       {"min_points = 0", "'min_points' is 0, expected 1 to 2000"},
       {"max_points = 40", "'min_points' is 50, expected 1 to 40"},
-      {"far_share = -0.1", "'far_share' is -0.1, expected 0 to 100"},
+      {"far_share = -1.1", "'far_share' is -1.1, expected -1 to 100"},
       {"confirm_frames = 0", "'confirm_frames' is 0, expected 1 to 1000"},
       {"confirm_window = 2", "'confirm_window' is 2, expected 3 to 1000"},
       {"votes = 2", "votes"}};
