@@ -181,14 +181,9 @@ class NetworkFinder : public InstanceFinder {
     const cv::Size input(config_.width > 0 ? config_.width : kYoloSide_px,
                          config_.height > 0 ? config_.height : kYoloSide_px);
     const Letterbox letterbox = LetterboxOf(image, input);
-    const cv::Rect place(
-        static_cast<int>(std::lround(letterbox.offset.x)),
-        static_cast<int>(std::lround(letterbox.offset.y)),
-        std::max(1, static_cast<int>(std::lround(letterbox.scale * image.width))),
-        std::max(1, static_cast<int>(std::lround(letterbox.scale * image.height))));
     cv::Mat picture(input, CV_8UC3, cv::Scalar::all(kYoloGrey));
-    const cv::Rect within = place & cv::Rect(cv::Point(), input);
-    cv::resize(frame.colour, picture(within), within.size(), 0, 0, cv::INTER_LINEAR);
+    cv::resize(frame.colour, picture(letterbox.place), letterbox.place.size(), 0, 0,
+               cv::INTER_LINEAR);
     const cv::Mat blob = cv::dnn::blobFromImage(picture, 1.0 / 255);
     TSDFPP_ASSIGN(std::vector<cv::Mat> outputs, Run(frame, blob, loaded_.outputs));
     // Boxes have three sides, prototypes four, in whatever order.

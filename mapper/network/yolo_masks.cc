@@ -119,29 +119,33 @@ cv::Mat LogitsOf(std::span<const float> weights, const NetworkOutput& prototypes
 
 // Pixels whose middles lie within a box of the input, of the image.
 cv::Rect PixelsOf(const cv::Rect2d& box, const Letterbox& letterbox, cv::Size image) {
-  const auto first = [&](double at, double offset) {
-    return std::ceil((at - offset) / letterbox.scale - 0.5);
+  const auto first = [](double edge, int offset, double scale) {
+    return std::ceil((edge - offset) / scale - 0.5);
   };
-  const auto clamped = [](double at, int most) {
-    return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(most)));
+  const auto clamped = [](double edge, int most) {
+    return static_cast<int>(std::clamp(edge, 0.0, static_cast<double>(most)));
   };
-  const int left = clamped(first(box.x, letterbox.offset.x), image.width);
-  const int top = clamped(first(box.y, letterbox.offset.y), image.height);
-  const int right = clamped(first(box.x + box.width, letterbox.offset.x), image.width);
-  const int bottom = clamped(first(box.y + box.height, letterbox.offset.y), image.height);
+  const cv::Point at = letterbox.place.tl();
+  const double across = letterbox.scale_x();
+  const double down = letterbox.scale_y();
+  const int left = clamped(first(box.x, at.x, across), image.width);
+  const int top = clamped(first(box.y, at.y, down), image.height);
+  const int right = clamped(first(box.x + box.width, at.x, across), image.width);
+  const int bottom = clamped(first(box.y + box.height, at.y, down), image.height);
   return {left, top, right - left, bottom - top};
 }
 
 }  // namespace
 
 Letterbox LetterboxOf(cv::Size image, cv::Size input) {
-  Letterbox box;
-  box.input = input;
-  box.scale = std::min(static_cast<double>(input.width) / image.width,
-                       static_cast<double>(input.height) / image.height);
-  box.offset = {(input.width - box.scale * image.width) / 2,
-                (input.height - box.scale * image.height) / 2};
-  return box;
+  const double scale = std::min(static_cast<double>(input.width) / image.width,
+                                static_cast<double>(input.height) / image.height);
+  const auto rounded = [](double at) { return static_cast<int>(std::lround(at)); };
+  const cv::Rect place(rounded((input.width - scale * image.width) / 2),
+                       rounded((input.height - scale * image.height) / 2),
+                       std::max(1, rounded(scale * image.width)),
+                       std::max(1, rounded(scale * image.height)));
+  return {place & cv::Rect(cv::Point(), input), image, input};
 }
 
 Expected<std::vector<Instance>> InstancesOfYolo(const NetworkOutput& boxes,
@@ -175,9 +179,9 @@ Expected<std::vector<Instance>> InstancesOfYolo(const NetworkOutput& boxes,
     const cv::Mat logits = LogitsOf(box.weights, prototypes);
     cv::Mat mask(pixels.size(), CV_8UC1);
     for (int v = 0; v < mask.rows; ++v) {
-      const double y = (pixels.y + v + 0.5) * letterbox.scale + letterbox.offset.y;
+      const double y = (pixels.y + v + 0.5) * letterbox.scale_y() + letterbox.place.y;
       for (int u = 0; u < mask.cols; ++u) {
-        const double x = (pixels.x + u + 0.5) * letterbox.scale + letterbox.offset.x;
+        const double x = (pixels.x + u + 0.5) * letterbox.scale_x() + letterbox.place.x;
         const float logit = LinearAt(logits, x * across - 0.5, y * down - 0.5);
         mask.at<std::uint8_t>(v, u) = logit > least_logit ? 255 : 0;
       }

@@ -11,11 +11,15 @@
 
 namespace tsdfpp {
 
-// How a frame lies in a network's input: scaled, then from `offset` on; the rest is filled up.
+// How a frame lies in a network's input: scaled to whole pixels of it, in its middle; the rest is
+// filled up.
 struct Letterbox {
-  double scale = 1;
-  cv::Point2d offset;
+  cv::Rect place;
+  cv::Size image;
   cv::Size input;
+
+  double scale_x() const { return static_cast<double>(place.width) / image.width; }
+  double scale_y() const { return static_cast<double>(place.height) / image.height; }
 };
 Letterbox LetterboxOf(cv::Size image, cv::Size input);
 

@@ -44,6 +44,17 @@ cv::Mat WholeMask(const Instance& instance, cv::Size size) {
   return whole;
 }
 
+// Where it is drawn is where it is read: half a pixel beside, a mask is half a pixel off.
+TEST(Letterbox, LiesOnWholePixels) {
+  const Letterbox exact = LetterboxOf({640, 427}, {640, 640});
+  EXPECT_EQ(exact.place, cv::Rect(0, 107, 640, 427));
+  EXPECT_EQ(exact.scale_y(), 1.0);
+  const Letterbox rounded = LetterboxOf({64, 31}, {32, 32});
+  EXPECT_EQ(rounded.place, cv::Rect(0, 8, 32, 16));
+  EXPECT_EQ(rounded.scale_x(), 0.5);
+  EXPECT_EQ(rounded.scale_y(), 16.0 / 31);
+}
+
 // Red is a thing, green its centre, blue and depth the way there.
 TEST(InstanceNetwork, CentresAreFoundWhereTheColoursSay) {
   NetworkConfig config;
