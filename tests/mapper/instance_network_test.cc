@@ -10,6 +10,7 @@
 #include <string>
 
 #include "mapper/network/coco_classes.h"
+#include "mapper/network/yolo_masks.h"
 
 namespace tsdfpp {
 namespace {
