@@ -165,6 +165,8 @@ export class View3d {
   }
 
   setOptions(options) {
+    // What moves is elsewhere then.
+    if (options.pull !== this.options.pull) this.hasMarker = false;
     Object.assign(this.options, options);
     this.apply();
   }
