@@ -327,13 +327,6 @@ std::string WithShownFolder(const AdapterRun& run, std::string text) {
   return text;
 }
 
-void AdapterRun::Fail(Error error) {
-  failure = std::move(error);
-  evaluations.clear();
-  matches.clear();
-  trajectories.reset();
-}
-
 void EvaluateAdapter(AdapterRun& run, const SceneTruth& truth, const std::vector<ObjectInfo>& names,
                      const AdapterTask& task) {
   if (run.failure) return;

@@ -64,7 +64,12 @@ struct AdapterRun {
   explicit AdapterRun(AdapterConfig adapter) : config(std::move(adapter)) {}
 
   // It has no scores then, those of earlier frames neither: they would be the easier ones.
-  void Fail(Error error);
+  void Fail(Error error) {
+    failure = std::move(error);
+    evaluations.clear();
+    matches.clear();
+    trajectories.reset();
+  }
 
   AdapterConfig config;
   std::filesystem::path folder;  // what it wrote: meshes/, trajectories/, timing.json; log.txt

@@ -1,6 +1,6 @@
 // Masks that are wrong, made right by the map, and its parts: disputed places, new surface, taking
-// out. In the toys' analytic world (2 cm voxels), whose true masks are known. Longer than most
-// files: the parts one by one, and the whole.
+// out. In the toys' analytic world (2 cm voxels), whose true masks are known.
+// Longer than most files: the parts one by one, and the whole.
 #include "mapper/associate/mask_repair.h"
 
 #include <gtest/gtest.h>

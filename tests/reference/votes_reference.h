@@ -12,8 +12,9 @@
 namespace tsdfpp::reference {
 
 // The distance of a point to an object's surface in voxels, without sign, or -1 where the object's
-// volume says nothing there: the mean over the observed ones of the eight voxels around the point,
-// weighted by their trilinear coefficients, if those make up half.
+// volume says nothing there, or that all is free as far as it is truncated: the mean over the
+// observed ones of the eight voxels around the point, weighted by their trilinear coefficients, if
+// those make up half.
 inline double DistanceTo(const MapRepresentation& map, InstanceId id, const Eigen::Vector3d& p_W) {
   const double h = map.config().voxel_m;
   const Eigen::Vector3d q = map.ObjectLattice(id).inverse() * p_W / h;
@@ -34,7 +35,9 @@ inline double DistanceTo(const MapRepresentation& map, InstanceId id, const Eige
       }
     }
   }
-  return known >= 0.5 ? std::abs(sum / known) : -1;
+  constexpr double kHalfsRounding = 0.001;
+  const double free = (1 - kHalfsRounding) * map.config().trunc_front_voxels;
+  return known >= 0.5 && sum / known < free ? std::abs(sum / known) : -1;
 }
 
 struct Votes {
