@@ -163,7 +163,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.config.bleeding = wishes.bleeding;
   start.config.mask_repair = wishes.repair.mode;
   start.config.repair = wishes.repair.config;
-  TSDFPP_RETURN_IF_ERROR(ChooseVotes(start, wishes));
+  if (!source.path.empty()) TSDFPP_RETURN_IF_ERROR(ChooseVotes(start, wishes));
   TSDFPP_RETURN_IF_ERROR(CheckCamera(start.config.method, wishes.camera));
   TSDFPP_RETURN_IF_ERROR(ChooseTracking(start, wishes.track));
   const bool votes = start.by_votes();

@@ -21,7 +21,7 @@ Expected<std::optional<VoteConfig>> ReadVotes(const std::string& file) {
 
 Expected<void> CheckVotes(const std::optional<VoteConfig>& votes, AssociationMode mode) {
   if (!votes || mode == AssociationMode::kVotes) return {};
-  return UsageError("--vote-config needs --associate votes: the masks' ids are the objects'");
+  return UsageError("--vote-config needs votes, and the objects' ids are given");
 }
 
 std::string TrackingOptions::Text() const {

@@ -105,7 +105,6 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   // A source without true surfaces is exported without.
   auto truth = source.Truth();
   const bool has_models = truth.has_value() && !truth->empty();
-  const std::string no_truth = truth ? "" : truth.error().message;
   TSDFPP_RETURN_IF_ERROR(CheckReplaceable(out, false));
   StagingFolder staging(out);
   TSDFPP_ASSIGN(const auto writer,
@@ -142,9 +141,6 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
   TSDFPP_RETURN_IF_ERROR(writer->Finish(report));
   SayWhatIsLost(info, format, has_models, has_poses, with_mask, off_s, writer->loss(),
                 writer->depth_units_per_m(), report);
-  if (format == DatasetFormat::kBop && !no_truth.empty()) {
-    report.left_out.push_back("true surfaces, which cannot be read: " + no_truth);
-  }
   if (source.IsSensed()) {
     report.left_out.emplace_back(
         format == DatasetFormat::kBop

@@ -310,8 +310,7 @@ Expected<void> RunAdapter(AdapterRun& run, const AdapterTask& task, const fs::pa
   if (timing) {
     run.timing = std::move(*timing);
   } else {
-    run.failure =
-        Error{timing.error().kind, fmt::format("{}: {}", run.config.name, timing.error().message)};
+    run.Fail({timing.error().kind, fmt::format("{}: {}", run.config.name, timing.error().message)});
   }
   return {};
 }

@@ -66,7 +66,8 @@ Expected<PreparedMeshes> PrepareMeshes(const SceneTruth& truth,
     if (removed.empty()) continue;
     const auto given = loaded.without.find(removed);
     if (!out.meshes.labelled) continue;
-    if (given != loaded.without.end() && given->second.parts.empty()) {
+    const bool is_given = given != loaded.without.end();
+    if (is_given && given->second.parts.empty() && !given->second.mesh.triangles.empty()) {
       return DataError("{}: tells no objects apart, expected the labels of {}",
                        given->second.source, loaded.scene.source);
     }

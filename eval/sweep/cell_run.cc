@@ -126,12 +126,10 @@ CellResult Finished(CellRun& run, const RunCosts& costs,
 
 }  // namespace
 
-bool HaveOneMap(const CellSettings& a, const CellSettings& b) {
-  const auto mapped = [](CellSettings settings) {
-    if (IsOfScoring(settings.sabotage)) settings.sabotage = Sabotage::kNone;
-    return SettingsJson(settings);
-  };
-  return mapped(a) == mapped(b);
+std::string MapKey(const CellSettings& settings) {
+  CellSettings mapped = settings;
+  if (IsOfScoring(mapped.sabotage)) mapped.sabotage = Sabotage::kNone;
+  return SettingsJson(mapped).dump();
 }
 
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
@@ -147,19 +145,14 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
   }
   std::vector<CellMapper> mappers;
   std::vector<CellRun> runs;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const CellSettings& settings = cells[i]->settings;
-    const auto same =
-        std::find_if(cells.begin(), cells.begin() + static_cast<std::ptrdiff_t>(i),
-                     [&](const Cell* c) { return HaveOneMap(c->settings, settings); });
-    std::size_t mapper = mappers.size();
-    if (const auto before = static_cast<std::size_t>(same - cells.begin()); before < i) {
-      mapper = runs[before].mapper;
-    } else {
-      TSDFPP_ASSIGN(CellMapper made, CellMapper::Make(settings, source.info().objects));
+  std::map<std::string, std::size_t> mapper_of;
+  for (const Cell* cell : cells) {
+    const auto [mapper, is_new] = mapper_of.try_emplace(MapKey(cell->settings), mappers.size());
+    if (is_new) {
+      TSDFPP_ASSIGN(CellMapper made, CellMapper::Make(cell->settings, source.info().objects));
       mappers.push_back(std::move(made));
     }
-    runs.push_back({settings.sabotage, mapper, MakeLastSeenStores(truth), {}});
+    runs.push_back({cell->settings.sabotage, mapper->second, MakeLastSeenStores(truth), {}});
   }
   std::map<int, std::string> digests;
   for (const int index : variant.frames) {

@@ -47,11 +47,11 @@ class CellMapper {
   std::vector<double> frame_s_;  // of each frame
 };
 
-// Of two cells of the same frames: whether they are the same map, looked at in two ways.
-bool HaveOneMap(const CellSettings& a, const CellSettings& b);
+// The same of cells of the same frames that are the same map, looked at in other ways.
+std::string MapKey(const CellSettings& settings);
 
 // The results of `cells`, which all have the frames of `variant`, in their order. Those that
-// have one map (HaveOneMap()) are mapped once. `progress` is called after each frame. Errors: those
+// have one map (MapKey()) are mapped once. `progress` is called after each frame. Errors: those
 // of the source; kData where a frame does not fit the truth.
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,

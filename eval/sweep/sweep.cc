@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <opencv2/core.hpp>
 #include <set>
 #include <thread>
@@ -52,20 +53,20 @@ std::vector<Task> TasksOf(const SweepPlan& plan, const CellStore& store) {
   std::vector<Task> tasks;
   std::set<std::string> planned;
   for (const auto& [id, variant] : plan.sequences) {
-    Task task{&variant, {}};
-    std::vector<const Cell*> cells;
+    // Those of one map stay together.
+    std::vector<std::vector<const Cell*>> maps;
+    std::map<std::string, std::size_t> map_of;
     for (const SweepPlan::Entry& entry : plan.entries) {
       if (entry.cell.sequence != id || !planned.insert(entry.cell.id).second) continue;
       if (store.Has(entry.cell)) continue;
-      // Beside that of which it has the map.
-      const auto same = std::find_if(cells.begin(), cells.end(), [&](const Cell* cell) {
-        return HaveOneMap(cell->settings, entry.cell.settings);
-      });
-      cells.insert(same, &entry.cell);
+      const auto [map, is_new] = map_of.try_emplace(MapKey(entry.cell.settings), maps.size());
+      if (is_new) maps.emplace_back();
+      maps[map->second].push_back(&entry.cell);
     }
-    for (const Cell* cell : cells) {
-      task.cells.push_back(cell);
-      if (task.cells.size() == kMapsAtOnce) {
+    Task task{&variant, {}};
+    for (std::size_t m = 0; m < maps.size(); ++m) {
+      task.cells.insert(task.cells.end(), maps[m].begin(), maps[m].end());
+      if ((m + 1) % kMapsAtOnce == 0) {
         tasks.push_back(task);
         task.cells.clear();
       }

@@ -116,7 +116,9 @@ void DistanceIndex::MakeAgain(const ObjectVolumes& volumes) const {
   std::sort(moved_.begin(), moved_.end());
   moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
   for (const InstanceId id : moved_) {
-    const ObjectVolume& volume = volumes.at(id);
+    const auto found = volumes.find(id);
+    if (found == volumes.end()) continue;  // nothing was left of it
+    const ObjectVolume& volume = found->second;
     if (volume.lattice_is_world) {
       // Back at its birth: its cover masks have not been kept.
       RenewCovers(volume.grid);

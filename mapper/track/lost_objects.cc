@@ -348,7 +348,9 @@ std::vector<InstanceId> LostObjects::TakeBack(const std::map<InstanceId, TrackSt
 void LostObjects::Undo(const std::vector<InstanceId>& found, MapRepresentation& map,
                        ObjectPoses& T_WO) {
   for (const InstanceId id : found) {
-    const Kept& kept = kept_.at(id);
+    Kept& kept = kept_.at(id);
+    // The tracker may have seen another one, in the frame that is undone.
+    kept.model = PlacedModel::kOther;
     map.Remove(id);
     T_WO.erase(id);
     if (!kept.is_in_map) continue;

@@ -105,6 +105,7 @@ Expected<RandomSceneConfig> ReadRandomScene(const toml::table& root, const std::
   TSDFPP_RETURN_IF_ERROR(camera_reader.Finish());
   if (sensor != nullptr) {
     TSDFPP_ASSIGN(config.sensor, ReadSensorConfig(*sensor, where));
+    TSDFPP_RETURN_IF_ERROR(CheckSamples(config.sensor, config.intrinsics, where));
   }
 
   TomlReader ranges(*random, where, "random");

@@ -142,17 +142,7 @@ Expected<SceneConfig> ReadSceneConfig(const toml::table& root, const std::string
   }
   if (sensor != nullptr) {
     TSDFPP_ASSIGN(config.sensor, ReadSensorConfig(*sensor, where));
-    // All of a frame's are in memory at a time.
-    constexpr std::int64_t kMostSamples = std::int64_t{1} << 28;
-    const std::int64_t samples = std::int64_t{config.intrinsics.width} * config.intrinsics.height *
-                                 config.sensor.shutter.sub_frames;
-    if (samples > kMostSamples) {
-      return UsageError(
-          "{}: 'sensor.shutter.sub_frames' is {}, with which a frame of {} x {} pixels "
-          "has {} samples, expected {} at most",
-          where, config.sensor.shutter.sub_frames, config.intrinsics.width,
-          config.intrinsics.height, samples, kMostSamples);
-    }
+    TSDFPP_RETURN_IF_ERROR(CheckSamples(config.sensor, config.intrinsics, where));
   }
   for (std::size_t i = 0; i < objects.size(); ++i) {
     TSDFPP_ASSIGN(

@@ -1,6 +1,7 @@
 #include "sim/config/sensor_config.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -270,6 +271,18 @@ Expected<void> ValidateSensorConfig(const SensorConfig& config) {
     return UsageError("'sensor.{}.{}' {}", fault->section, fault->key, fault->sentence);
   }
   return {};
+}
+
+Expected<void> CheckSamples(const SensorConfig& sensor, const Intrinsics& camera,
+                            const std::string& where) {
+  constexpr std::int64_t kMostSamples = std::int64_t{1} << 28;
+  const std::int64_t samples =
+      std::int64_t{camera.width} * camera.height * sensor.shutter.sub_frames;
+  if (samples <= kMostSamples) return {};
+  return UsageError(
+      "{}: 'sensor.shutter.sub_frames' is {}, with which a frame of {} x {} pixels has {} samples, "
+      "expected {} at most",
+      where, sensor.shutter.sub_frames, camera.width, camera.height, samples, kMostSamples);
 }
 
 Expected<SensorConfig> ReadSensorConfig(const toml::table& table, const std::string& where,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/types.h"
 
 namespace tsdfpp {
 
@@ -132,6 +133,11 @@ Expected<SensorConfig> SensorPresetNamed(std::string_view name);
 
 // Error: kUsage, naming the key ("sensor.depth.unit_m") and what it expects.
 Expected<void> ValidateSensorConfig(const SensorConfig& config);
+
+// All sub-frames of a frame are in memory at a time. Errors: kUsage where they have more pixels
+// than that allows.
+Expected<void> CheckSamples(const SensorConfig& sensor, const Intrinsics& camera,
+                            const std::string& where);
 
 // Reads the table [sensor] of a scene. `preset` is the start, by default "exact", the other keys
 // replace its values. `where` is the file's name, `path` the table's dotted path, for messages.

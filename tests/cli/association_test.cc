@@ -124,7 +124,7 @@ TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
     EXPECT_NE(sentence(RunTsdfpp({command, TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out",
                                   *folder_ / "no", "--vote-config", Settings("")},
                                  folder_->path()))
-                  .find("--vote-config needs --associate votes: the masks' ids are the objects'"),
+                  .find("--vote-config needs votes, and the objects' ids are given"),
               std::string::npos);
   }
   EXPECT_NE(sentence(RunTsdfpp({"map", "--load", *folder_ / "half.map", "--out", *folder_ / "no",

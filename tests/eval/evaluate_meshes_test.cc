@@ -217,6 +217,9 @@ TEST(EvaluateMeshes, WhatARemovalBringsToLightIsMatchedToo) {
   EvaluateConfig config = At(folder / "m");
   config.removed = {kRight};
   EXPECT_EQ(Of(Evaluated(config), kBackground).preserved.preservation_behind_other.value, 1.0);
+  // Nothing at all may be left.
+  Put(folder / "m/scene-without-8.ply", TriangleMesh{});
+  EXPECT_EQ(Of(Evaluated(config), kBackground).preserved.preservation_behind_other.value, 0.0);
   // Without labels nobody knows what is left of whom.
   Put(folder / "m/scene-without-8.ply", SceneOf(meshes, false));
   EXPECT_NE(ErrorOf(config).message.find(

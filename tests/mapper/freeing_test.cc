@@ -80,6 +80,10 @@ TEST_P(Freeing, WhatWasFusedInVainIsNotThere) {
     if (!VoxelsOf(*map).ObservedVoxels(kSpeck).empty()) continue;
     ++in_vain;
     EXPECT_TRUE(EditingOf(*map).Add(kSpeck, {}, Pose::Identity(), std::nullopt));
+    // Nor does it stay where it was put so.
+    map->Fuse(frame, frame.mask);
+    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
+    EXPECT_TRUE(EditingOf(*map).Add(kSpeck, {}, Pose::Identity(), std::nullopt));
   }
   EXPECT_GT(in_vain, 0);
 }
