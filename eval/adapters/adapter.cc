@@ -261,6 +261,7 @@ Expected<std::vector<std::string>> CommandOf(const AdapterConfig& config, const 
       const auto found = words.find(key);
       if (close == std::string::npos || found == words.end()) {
         std::vector<std::string> known;
+        known.reserve(words.size());
         for (const auto& [name, value] : words) known.push_back("{" + name + "}");
         return UsageError("{}: command: '{}' has the unknown word '{{{}', expected one of {}",
                           config.name, given, key, fmt::join(known, " "));

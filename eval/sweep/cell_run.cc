@@ -126,10 +126,10 @@ CellResult Finished(CellRun& run, const RunCosts& costs,
 
 }  // namespace
 
-std::string MapKey(const CellSettings& settings) {
+std::string SharedMapKey(const CellSettings& settings) {
   CellSettings mapped = settings;
   if (IsOfScoring(mapped.sabotage)) mapped.sabotage = Sabotage::kNone;
-  return SettingsJson(mapped).dump();
+  return MapKey(mapped);
 }
 
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
@@ -147,7 +147,8 @@ Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
   std::vector<CellRun> runs;
   std::map<std::string, std::size_t> mapper_of;
   for (const Cell* cell : cells) {
-    const auto [mapper, is_new] = mapper_of.try_emplace(MapKey(cell->settings), mappers.size());
+    const auto [mapper, is_new] =
+        mapper_of.try_emplace(SharedMapKey(cell->settings), mappers.size());
     if (is_new) {
       TSDFPP_ASSIGN(CellMapper made, CellMapper::Make(cell->settings, source.info().objects));
       mappers.push_back(std::move(made));

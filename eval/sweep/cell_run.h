@@ -47,12 +47,13 @@ class CellMapper {
   std::vector<double> frame_s_;  // of each frame
 };
 
-// The same of cells of the same frames that are the same map, looked at in other ways.
-std::string MapKey(const CellSettings& settings);
+// MapKey() without what is broken of the scoring: the same of cells of the same frames that are one
+// map, looked at in other ways.
+std::string SharedMapKey(const CellSettings& settings);
 
 // The results of `cells`, which all have the frames of `variant`, in their order. Those that
-// have one map (MapKey()) are mapped once. `progress` is called after each frame. Errors: those
-// of the source; kData where a frame does not fit the truth.
+// have one map (SharedMapKey()) are mapped once. `progress` is called after each frame. Errors:
+// those of the source; kData where a frame does not fit the truth.
 Expected<std::vector<CellResult>> RunCells(const SequenceVariant& variant,
                                            const std::vector<const Cell*>& cells,
                                            const std::function<void()>& progress);

@@ -59,7 +59,7 @@ std::vector<Task> TasksOf(const SweepPlan& plan, const CellStore& store) {
     for (const SweepPlan::Entry& entry : plan.entries) {
       if (entry.cell.sequence != id || !planned.insert(entry.cell.id).second) continue;
       if (store.Has(entry.cell)) continue;
-      const auto [map, is_new] = map_of.try_emplace(MapKey(entry.cell.settings), maps.size());
+      const auto [map, is_new] = map_of.try_emplace(SharedMapKey(entry.cell.settings), maps.size());
       if (is_new) maps.emplace_back();
       maps[map->second].push_back(&entry.cell);
     }
