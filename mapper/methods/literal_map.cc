@@ -28,6 +28,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   // A frame empties no list; it may have made blocks in vain.
   index_.blocks().Erase(EmptyFrom(index_.blocks(), blocks_before,
                                   [](const PairIndex::Block& b) { return b.IsEmpty(); }));
+  FreeUnknown(volumes_);
   CheckInDebugBuilds(*this);
 }
 

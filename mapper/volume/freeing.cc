@@ -4,6 +4,13 @@
 
 namespace tsdfpp {
 
+void FreeUnknown(ObjectVolumes& volumes) {
+  std::erase_if(volumes, [](const auto& entry) {
+    const ObjectVolume& volume = entry.second;
+    return volume.grid.empty() && !volume.T_WO && !volume.T_WO_birth;
+  });
+}
+
 FrameFreeing::FrameFreeing(const ObjectVolumes& volumes) {
   for (const auto& [id, volume] : volumes) blocks_before_[id] = volume.grid.size();
 }
@@ -25,10 +32,7 @@ void FrameFreeing::FreeEmpty(const std::vector<FusedBlock>& fused, ObjectVolumes
     of_object.erase(std::unique(of_object.begin(), of_object.end()), of_object.end());
     volume.grid.Erase(of_object);
   }
-  std::erase_if(volumes, [](const auto& entry) {
-    const ObjectVolume& volume = entry.second;
-    return volume.grid.empty() && !volume.T_WO && !volume.T_WO_birth;
-  });
+  FreeUnknown(volumes);
 }
 
 }  // namespace tsdfpp

@@ -8,9 +8,12 @@
 
 namespace tsdfpp {
 
+// Frees the volumes that hold nothing, and of which no pose is known.
+void FreeUnknown(ObjectVolumes& volumes);
+
 // Frees what a frame leaves without an observed voxel: blocks that it allocated in vain, and those
-// that contradiction emptied; and volumes of which nothing is left, nor a pose known. All other
-// blocks hold what they held. Made before the frame is fused.
+// that contradiction emptied; and FreeUnknown(). All other blocks hold what they held. Made before
+// the frame is fused.
 class FrameFreeing {
  public:
   explicit FrameFreeing(const ObjectVolumes& volumes);
