@@ -157,7 +157,7 @@ void VoxelVotes::SplitFarParts(const Frame& frame, const cv::Mat& ids, const Obj
     if (segment.is_known && segment.object) joined.push_back(*segment.object);
   }
   std::ranges::sort(joined);
-  joined.erase(std::ranges::unique(joined).begin(), joined.end());
+  joined.erase(std::unique(joined.begin(), joined.end()), joined.end());
   const std::vector<ObjectLookup::SurfaceBox> boxes = lookup.BoxesOfSurfaces(joined);
   std::vector<std::vector<int>> far(segments.size());
   tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t s) {

@@ -284,7 +284,9 @@ std::size_t DistanceIndex::Bytes() const {
 
 std::optional<std::string> DistanceIndex::FindFault(const ObjectVolumes& volumes) const {
   if (Fault fault = FindHashFault("the index", blocks_)) return fault;
-  const ObjectVolumes copies = volumes;  // whose covers are made again, too
+  // Whose covers are made again, too: what a grid's blocks hold beside values changes in a const
+  // one.
+  const ObjectVolumes copies = volumes;  // NOLINT(performance-unnecessary-copy-initialization)
   DistanceIndex rebuilt(config_, layers_);
   rebuilt.Reset(copies);
   rebuilt.Refresh(copies);

@@ -42,7 +42,7 @@ void AnchoredMap::Remove(InstanceId id) {
 Expected<void> AnchoredMap::Rename(InstanceId from, InstanceId to) {
   Index();
   index_.Deactivate(from, volumes_);
-  const Expected<void> status = ObjectVolumeMap::Rename(from, to);
+  Expected<void> status = ObjectVolumeMap::Rename(from, to);
   // Where that is refused the old one's lists are made again in vain.
   if (volumes_.contains(status ? to : from)) index_.Activate(status ? to : from);
   CheckInDebugBuilds(*this);

@@ -33,22 +33,22 @@ struct RandomSceneConfig {
   SensorConfig sensor;
 
   Eigen::Vector2d objects{3, 8};
-  std::vector<std::string> models;  // of ModelCatalogue(), each as likely as it is listed
+  std::vector<std::string> models;    // of ModelCatalogue(), each as likely as it is listed
+  std::vector<RandomMotion> motions;  // each as likely as it is listed
   Eigen::Vector2d scale{0.7, 1.1};
   Eigen::Vector2d size_m{0.05, 0.15};  // each side of a solid (ModelInfo::solid)
   double texture_share = 0.4;          // of objects with a pattern; the others have plain paint
   double room_texture_share = 0.5;     // of table, floor and walls that are not the usual ones
-  std::vector<RandomMotion> motions;   // each as likely as it is listed
   Eigen::Vector2d speed{0.05, 0.25};   // metres a second, the mean of a drive
   double gap_m = 0.02;   // between the circles around the footprints of scripted objects, always
   double in_view = 0.9;  // share of the frames in which an object is in view, at least
 
   std::vector<std::string> camera_paths{"arc", "orbit", "spline"};  // each as likely
+  double handheld_share = 0.3;
   Eigen::Vector2d camera_radius_m{1.1, 1.5};
   Eigen::Vector2d camera_height_m{0.5, 0.9};   // above the table
   Eigen::Vector2d camera_azimuth_deg{0, 360};  // where it starts
   Eigen::Vector2d camera_sweep_deg{20, 70};    // how far it goes, to either side
-  double handheld_share = 0.3;
   Eigen::Vector2d jitter_mm{1, 5};
   Eigen::Vector2d jitter_deg{0.1, 0.6};
   LightRanges lights;
