@@ -118,11 +118,12 @@ TEST_F(Associate, RefusesWhatDoesNotGoTogether) {
   EXPECT_NE(
       sentence(Run("compare", "no", {"--poses", "gt"})).find("given poses are those of given"),
       std::string::npos);
+  const std::string scene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
   for (const std::string command : {"map", "compare"}) {
     EXPECT_NE(sentence(Run(command, "no", {"--vote-config", Settings("far = 1")})).find("far"),
               std::string::npos);
-    EXPECT_NE(sentence(RunTsdfpp({command, TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out",
-                                  *folder_ / "no", "--vote-config", Settings("")},
+    EXPECT_NE(sentence(RunTsdfpp({command, scene, "--out", *folder_ / "no", "--vote-config",
+                                  Settings("")},
                                  folder_->path()))
                   .find("--vote-config needs votes, and the objects' ids are given"),
               std::string::npos);

@@ -317,10 +317,11 @@ TEST_F(AdapterCompare, WhatIsLeftBesideItsFolderIsRemovedAndSaid) {
 }
 
 nlohmann::json CompareMini(const TempFolder& folder, const std::string& methods) {
-  const auto command = test::RunTsdfpp(
-      {"compare", TSDFPP_SOURCE_DIR "/scenes/mini.toml", "--out", folder / "out", "--methods",
-       methods, "--profiles", "close", "--until", "6", "--every", "6", "--json"},
-      folder.path());
+  const std::string scene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
+  const auto command =
+      test::RunTsdfpp({"compare", scene, "--out", folder / "out", "--methods", methods,
+                       "--profiles", "close", "--until", "6", "--every", "6", "--json"},
+                      folder.path());
   EXPECT_EQ(command.exit_code, 0) << command.err;
   return nlohmann::json::parse(command.out, nullptr, false);
 }

@@ -205,7 +205,7 @@ TEST(TakeOut, AnObjectWithoutAPoseHasNoneAfterIt) {
   map->Fuse(frame, frame.mask);
   const auto before = VoxelsOf(*map).ObservedVoxels(kBrick);
   ASSERT_FALSE(before.empty());
-  const Eigen::Vector3i some = before[before.size() / 2];
+  const Eigen::Vector3i& some = before[before.size() / 2];
   TakeOut({{some.x(), some.y(), some.z()}}, kToyVoxel_m, kBrick, std::nullopt, *map);
   EXPECT_LT(VoxelsOf(*map).ObservedVoxels(kBrick).size(), before.size());
   map->SetObjectPose(kBrick, frame.T_WO.at(kBrick));
