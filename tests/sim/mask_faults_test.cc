@@ -222,6 +222,7 @@ TEST(MaskFaults, TouchingIsTheLongestContact) {
         most = std::max(most, count);
       }
       std::vector<InstanceId> others;
+      others.reserve(contact.size());
       for (const auto& [id, count] : contact) others.push_back(id);
       EXPECT_EQ(TouchingObject(mask, 2, pixels, others), expected) << seed << " " << pixels;
     }
