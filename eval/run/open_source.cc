@@ -19,8 +19,7 @@ Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& s
         options.pose_offset_s != 0 || !options.check) {
       return UsageError(
           "{}: is a scene; a format, a calibration, depth units, a fixed camera, an offset of "
-          "poses "
-          "or --unchecked are for sequences on disk",
+          "poses or --unchecked are for sequences on disk",
           scene_or_sequence.string());
     }
     TSDFPP_ASSIGN(SceneConfig config, LoadSceneConfig(scene_or_sequence, scene.seed));

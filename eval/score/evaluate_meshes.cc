@@ -59,7 +59,7 @@ Expected<PreparedMeshes> PrepareMeshes(const SceneTruth& truth,
   out.remarks = std::move(loaded.remarks);
   out.remarks.insert(out.remarks.end(), matched.remarks.begin(), matched.remarks.end());
   out.meshes.scene = std::move(matched.mesh);
-  out.matches = matched.matches;
+  out.matches = std::move(matched.matches);
   out.meshes.labelled = !out.meshes.scene.face_ids.empty();
   const std::set<std::set<InstanceId>> removals = RemovalsOf(config.removed);
   for (const std::set<InstanceId>& removed : removals) {
@@ -71,10 +71,9 @@ Expected<PreparedMeshes> PrepareMeshes(const SceneTruth& truth,
       return DataError("{}: tells no objects apart, expected the labels of {}",
                        given->second.source, loaded.scene.source);
     }
-    out.meshes.without[removed] = given == loaded.without.end()
-                                      ? FacesWithout(out.meshes.scene, removed)
-                                      : WithMatches(given->second, matched, truth, objects,
-                                                    config.voxel_m, config.match, out.remarks);
+    out.meshes.without[removed] = is_given ? WithMatches(given->second, out.matches, truth, objects,
+                                                         config.voxel_m, config.match, out.remarks)
+                                           : FacesWithout(out.meshes.scene, removed);
   }
   for (const auto& [removed, scene] : loaded.without) {
     if (removals.contains(removed) && out.meshes.labelled) continue;

@@ -196,17 +196,16 @@ MatchedScene MatchScene(const LoadedScene& scene, const SceneTruth& truth,
   return out;
 }
 
-TriangleMesh WithMatches(const LoadedScene& scene, const MatchedScene& before,
+TriangleMesh WithMatches(const LoadedScene& scene, const std::vector<PartMatch>& matches,
                          const SceneTruth& truth, const std::vector<ObjectInfo>& objects,
                          double voxel_m, MatchMode mode, std::vector<std::string>& remarks) {
   std::vector<InstanceId> labels;
   for (std::size_t p = 0; p < scene.parts.size(); ++p) {
     const ScenePart& part = scene.parts[p];
-    const auto same =
-        std::find_if(before.matches.begin(), before.matches.end(), [&](const PartMatch& match) {
-          return match.part.name == part.name && match.part.id == part.id;
-        });
-    if (same != before.matches.end()) {
+    const auto same = std::find_if(matches.begin(), matches.end(), [&](const PartMatch& match) {
+      return match.part.name == part.name && match.part.id == part.id;
+    });
+    if (same != matches.end()) {
       labels.push_back(same->object);
       continue;
     }

@@ -48,10 +48,10 @@ struct MatchedScene {
 MatchedScene MatchScene(const LoadedScene& scene, const SceneTruth& truth,
                         const std::vector<ObjectInfo>& objects, double voxel_m, MatchMode mode);
 
-// A scene after a removal, of which `before` is MatchScene()'s: parts of equal names and labels are
-// the same objects; others, which were hidden before, are matched as there. `remarks` gets what
-// looks wrong.
-TriangleMesh WithMatches(const LoadedScene& scene, const MatchedScene& before,
+// A scene after a removal. `matches` are those of the scene before it: parts of equal names and
+// labels are the same objects; others, which were hidden before, are matched as by MatchScene().
+// `remarks` gets what looks wrong.
+TriangleMesh WithMatches(const LoadedScene& scene, const std::vector<PartMatch>& matches,
                          const SceneTruth& truth, const std::vector<ObjectInfo>& objects,
                          double voxel_m, MatchMode mode, std::vector<std::string>& remarks);
 

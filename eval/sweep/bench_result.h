@@ -35,9 +35,9 @@ struct BenchResult {
 Expected<BenchResult> ReadBenchResult(const BenchSet& set, const std::filesystem::path& file);
 
 // A page in Markdown: the set, a row a result with the mean over the sequences and its bootstrap
-// interval, best first by the set's first metric, those before that have it of more sequences, and
-// every figure. Errors: those of
-// ReadBenchResult for any *.json of `folder`; kUsage where there is none.
+// interval, best first by the set's first metric, and every figure. Those come first that have that
+// metric of more sequences. Errors: those of ReadBenchResult for any *.json of `folder`; kUsage
+// where there is none.
 Expected<std::string> Leaderboard(const BenchSet& set, const std::filesystem::path& folder);
 
 }  // namespace tsdfpp

@@ -39,8 +39,8 @@ class MaskRepair {
 
   // The frame's segments (CV_16UC1) with outlines set right: a point that does not go on from its
   // own segment's surface, but does from that of another one beside it, gets that one's id
-  // (mapper/associate/outline_surfaces.h). To be called first of each frame.
-  // `depth` says how noisy the frame's depth is.
+  // (mapper/associate/outline_surfaces.h). `depth` says how noisy the frame's depth is. To be
+  // called first of each frame.
   cv::Mat SetOutlines(const Frame& frame, const cv::Mat& ids, double voxel_m,
                       const DepthSegmentsConfig& depth = {});
 

@@ -89,7 +89,7 @@ Eigen::AlignedBox3d BoxAround(Coordinates& voxels, double voxel_m) {
 ObjectLookup::ObjectLookup(const MapRepresentation& map, Of of)
     : voxels_(map.inspection()),
       voxel_m_(map.config().voxel_m),
-      front_m_(static_cast<float>(map.config().trunc_front_voxels * map.config().voxel_m)),
+      front_m_(map.config().front()),
       ids_(map.Objects()),
       one_field_(IsOneField(map.method())) {
   if (of == Of::kObjects) std::erase(ids_, kBackground);

@@ -16,8 +16,8 @@ namespace tsdfpp {
 
 class VoxelVotes : public Associator {
  public:
-  // New objects get ids from `first_id` on, above all that the map has had. The config
-  // must be valid.
+  // New objects get ids from `first_id` on, above all that the map has had. The config must be
+  // valid.
   explicit VoxelVotes(const VoteConfig& config, InstanceId first_id = 1);
 
   // In this order:

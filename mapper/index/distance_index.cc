@@ -284,8 +284,7 @@ std::size_t DistanceIndex::Bytes() const {
 
 std::optional<std::string> DistanceIndex::FindFault(const ObjectVolumes& volumes) const {
   if (Fault fault = FindHashFault("the index", blocks_)) return fault;
-  // Whose covers are made again, too: what a grid's blocks hold beside values changes in a const
-  // one.
+  // Reset() makes the covers anew, in const grids as well: those of `volumes` stay as they are.
   const ObjectVolumes copies = volumes;  // NOLINT(performance-unnecessary-copy-initialization)
   DistanceIndex rebuilt(config_, layers_);
   rebuilt.Reset(copies);

@@ -19,9 +19,9 @@ class CameraTracker {
 
   // The frame with T_WC as the map's background says: its pixels that `segments` (CV_16UC1) calls
   // kBackground, or all where it says nothing at all, are registered to it by the terms of
-  // SdfTracker, whose gates hold. Frames have the
-  // given pose until the map has a background. Nothing where the camera is lost. `map` holds what
-  // was fused before the frame. With kGiven the frame is as it was.
+  // SdfTracker, whose gates hold. Frames have the given pose until the map has a background.
+  // Nothing where the camera is lost. `map` holds what was fused before the frame. With kGiven the
+  // frame is as it was.
   std::optional<Frame> Locate(const Frame& frame, const cv::Mat& segments,
                               const MapRepresentation& map);
 

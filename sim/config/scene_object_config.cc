@@ -37,7 +37,8 @@ Expected<DrivePath> ReadDrive(const toml::table& table, const std::string& where
     reader.Fault("end_frame", fmt::format("is {}, expected more than start_frame ({})",
                                           drive.end_frame, drive.start_frame));
   }
-  const double duration_s = (double{1} * drive.end_frame - drive.start_frame) / config.rate_hz;
+  const double duration_s =
+      (static_cast<double>(drive.end_frame) - drive.start_frame) / config.rate_hz;
   CheckRange(reader, "ramp_s", drive.ramp_s, 0.0, duration_s / 2);
   if (drive.x.empty()) reader.Fault("x", "needs one waypoint at least");
   if (drive.x.size() != drive.y.size()) {

@@ -1,6 +1,5 @@
 // What the figures of an experiment are made by is all in the program's identity, so that a cell
 // of another program is never taken for one of this program.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -298,6 +298,23 @@ TEST(LostObjects, AreBegunAnewWhereTheyCannotBeRegistered) {
   }
 }
 
+// A map of which the brick was seen until it left the view, and is lost.
+struct LostBrick {
+  LostBrick() {
+    map->SetObjectPose(kBrick, Pose::Identity());
+    for (int i = 1; i < kLeaves; ++i) {
+      const Frame before = Coming(i, 0);
+      map->Fuse(before, before.mask);
+    }
+    lost.Keep(kBrick, *map, Pose::Identity());
+    lost.TakeOut({}, *map, T_WO);
+  }
+
+  std::unique_ptr<MapRepresentation> map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
+  LostObjects lost{SdfTrackConfig{}};
+};
+
 // One that is found is tracked on by the model by which it was tracked; one that was something else
 // in between is not.
 TEST(LostObjects, SayWhoseModelTheyComeBackWith) {
@@ -306,16 +323,7 @@ TEST(LostObjects, SayWhoseModelTheyComeBackWith) {
   const LostObjects::Segment segment{pixels, kBrick};
   for (const bool was_on_trial : {false, true}) {
     SCOPED_TRACE(was_on_trial);
-    const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
-    ObjectPoses T_WO{{kBrick, Pose::Identity()}};
-    map->SetObjectPose(kBrick, Pose::Identity());
-    for (int i = 1; i < kLeaves; ++i) {
-      const Frame before = Coming(i, 0);
-      map->Fuse(before, before.mask);
-    }
-    LostObjects lost(SdfTrackConfig{});
-    lost.Keep(kBrick, *map, T_WO.at(kBrick));
-    lost.TakeOut({}, *map, T_WO);
+    auto [map, T_WO, lost] = LostBrick();
     if (was_on_trial) {
       ASSERT_TRUE(lost.PutBack({kBrick, 0, Pose::Identity(), true}, *map, T_WO));
       lost.TakeOut({kBrick}, *map, T_WO);
@@ -332,20 +340,11 @@ TEST(LostObjects, SayWhoseModelTheyComeBackWith) {
 // A search takes many times as long as to track what is there. So it is made in every third frame,
 // also where what is like the object is such that no model may begin with it.
 TEST(LostObjects, AreLookedForInEveryThirdFrame) {
-  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
-  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
-  map->SetObjectPose(kBrick, Pose::Identity());
-  for (int i = 1; i < kLeaves; ++i) {
-    const Frame before = Coming(i, 0);
-    map->Fuse(before, before.mask);
-  }
-  LostObjects lost(SdfTrackConfig{});
-  lost.Keep(kBrick, *map, T_WO.at(kBrick));
-  lost.TakeOut({}, *map, T_WO);
+  LostBrick kept;
   const auto found = [&](double turn_deg) {
     const Frame frame = Coming(kReturns, turn_deg * kDegree);
     const LostObjects::Segment segment{PixelsWhere(frame.mask == kBrick), kNoInstance, false};
-    return !lost.FindAgain(frame, {&segment, 1}).empty();
+    return !kept.lost.FindAgain(frame, {&segment, 1}).empty();
   };
   EXPECT_FALSE(found(-70)) << "nothing says how it stands";
   EXPECT_FALSE(found(40));
@@ -356,24 +355,13 @@ TEST(LostObjects, AreLookedForInEveryThirdFrame) {
 // Among many pieces of the room that have its colours, too, it is looked for in what is known
 // first.
 TEST(LostObjects, AreLookedForInKnownSegmentsFirst) {
-  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
-  ObjectPoses T_WO{{kBrick, Pose::Identity()}};
-  map->SetObjectPose(kBrick, Pose::Identity());
-  for (int i = 1; i < kLeaves; ++i) {
-    const Frame before = Coming(i, 0);
-    map->Fuse(before, before.mask);
-  }
-  LostObjects lost(SdfTrackConfig{});
-  lost.Keep(kBrick, *map, T_WO.at(kBrick));
-  lost.TakeOut({}, *map, T_WO);
-  // Nothing says how it stands in these, and it is as alike.
+  LostBrick kept;
+  // Nothing says how it stands in any of these, all as alike.
   const Frame frame = Coming(kReturns, 40 * kDegree);
   const LoosePixels brick = PixelsWhere(frame.mask == kBrick);
-  const LoosePixels part(brick.begin(),
-                         brick.begin() + static_cast<std::ptrdiff_t>(brick.size() / 3));
-  std::vector<LostObjects::Segment> segments(20, {part, kNoInstance, false, false});
+  std::vector<LostObjects::Segment> segments(20, {brick, kNoInstance, false, false});
   segments.push_back({brick, kNoInstance, true, true});
-  const auto returns = lost.FindAgain(frame, segments);
+  const auto returns = kept.lost.FindAgain(frame, segments);
   ASSERT_EQ(returns.size(), 1U);
   EXPECT_EQ(returns[0].segment, segments.size() - 1);
 }

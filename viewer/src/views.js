@@ -112,9 +112,9 @@ function describe(run, hit) {
 // Comparisons may have been recorded at different frames.
 function nameWhatIsThere(panels, runs, frame) {
   runs.forEach((run, i) => {
-    const is_there = run.recorded.key_frames.some((key) => key.frame === frame);
+    const isThere = run.recorded.key_frames.some((key) => key.frame === frame);
     panels.children[i].querySelector('.panel-title').textContent =
-      `${shortLabel(run, runs)}${is_there ? '' : ', not recorded at this frame'}`;
+      `${shortLabel(run, runs)}${isThere ? '' : ', not recorded at this frame'}`;
   });
 }
 
