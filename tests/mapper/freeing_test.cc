@@ -5,8 +5,6 @@
 #include <set>
 
 #include "mapper/map_editing.h"
-#include "mapper/map_file.h"
-#include "mapper/methods/map_objects.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/mesh_checks.h"
@@ -86,29 +84,6 @@ TEST_P(Freeing, WhatWasFusedInVainIsNotThere) {
     EXPECT_TRUE(EditingOf(*map).Add(kSpeck, {}, Pose::Identity(), std::nullopt));
   }
   EXPECT_GT(in_vain, 0);
-}
-
-// A list that has no room for what a block covers is none, and no block of lists is kept for it: a
-// map with one could not be read again.
-TEST(FreeingOfLists, ABlockThatListsNothingIsNotMade) {
-  MapConfig config = ToyConfig();
-  config.layers = 1;
-  const auto brick = DrivenMap(Method::kTsdfpp, ToyConfig(), 1);
-  const TsdfGrid volume = CopyVolume(*brick, kBrick);
-  for (const double by_m : {0.02, 0.04, 0.06}) {
-    const auto map = MakeMap(Method::kTsdfpp, config);
-    for (const InstanceId id : {kBrick, kTray}) {
-      ASSERT_TRUE(EditingOf(*map).Add(id, volume, Pose::Identity(), Pose::Identity()));
-    }
-    map->Remove(kTray);
-    Frame frame = DriveFrame(0);
-    frame.mask.setTo(static_cast<double>(kNoInstance), frame.mask != static_cast<double>(kBrick));
-    frame.depth += static_cast<float>(by_m);
-    map->Fuse(frame, frame.mask);
-    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt) << by_m;
-    const auto again = MapFromBytes(MapToBytes(*map).value(), "saved");
-    EXPECT_TRUE(again.has_value()) << again.error().message;
-  }
 }
 
 // Forty cameras around the table, again and again.
