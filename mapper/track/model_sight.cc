@@ -95,10 +95,12 @@ FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId 
       const auto pixel = NearestPixel(camera, p_C, 0);
       if (!pixel) return;
       const float depth_m = frame.depth.at<float>(*pixel);
-      if (labels.at<InstanceId>(*pixel) == id) {
+      const InstanceId label = labels.at<InstanceId>(*pixel);
+      if (label == id) {
         ++facing.shown;
-      } else if (IsValidDepth(depth_m) && std::abs(double{depth_m} - p_C.z()) > margin_m) {
-        ++facing.missing;
+      } else if (label != kBackground && IsValidDepth(depth_m) &&
+                 p_C.z() - double{depth_m} > margin_m) {
+        ++facing.covered;
       }
     });
   }

@@ -45,17 +45,18 @@ ModelSight LookAtModel(const Frame& frame, const TsdfGrid& model, const Pose& T_
 // Numbers of the surface voxels that face the camera and are in the picture.
 struct FacingVoxels {
   int shown = 0;    // their pixel is the object's
-  int missing = 0;  // it is not, and its depth is nearer (something is before them) or farther
+  int covered = 0;  // it is another's, and its depth is nearer
 
   // Of all of them; 1 where there are none.
   double ShownShare() const {
-    return shown + missing == 0 ? 1 : static_cast<double>(shown) / (shown + missing);
+    return shown + covered == 0 ? 1 : static_cast<double>(shown) / (shown + covered);
   }
 };
 
 // `T_WL` is where the model's lattice is; `labels` (CV_16UC1, of the depth's size) has `id` at the
-// object's pixels. Depth is nearer or farther by more than `margin_m`: voxels at another's pixel
-// with about their depth, or at one without depth, count as neither.
+// object's pixels, and kBackground at those of what covers no object: where the background is
+// before a voxel, or is farther, the model or its place is wrong there. Depth is nearer by more
+// than `margin_m`. All other voxels count as neither.
 FacingVoxels LookAtFacing(const Frame& frame, const cv::Mat& labels, InstanceId id,
                           const TsdfGrid& model, const Pose& T_WL, double voxel_m, double margin_m);
 

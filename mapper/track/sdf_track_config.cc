@@ -56,6 +56,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("return_frames", return_frames, 0, 10000));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_evidence", rest_evidence, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("rest_frames", rest_frames, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_voxels", motion_voxels, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_frames", motion_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_evidence", motion_evidence, 0, 100));
@@ -99,6 +100,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("return_frames", config.return_frames)
       .Get("rest_voxels", config.rest_voxels)
       .Get("rest_evidence", config.rest_evidence)
+      .Get("rest_frames", config.rest_frames)
       .Get("motion_voxels", config.motion_voxels)
       .Get("motion_frames", config.motion_frames)
       .Get("motion_evidence", config.motion_evidence)
@@ -143,6 +145,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"return_frames", return_frames},
                      {"rest_voxels", rest_voxels},
                      {"rest_evidence", rest_evidence},
+                     {"rest_frames", rest_frames},
                      {"motion_voxels", motion_voxels},
                      {"motion_frames", motion_frames},
                      {"motion_evidence", motion_evidence},

@@ -79,6 +79,9 @@ struct SdfTrackConfig {
   // points say less than 1 + this / sqrt(their number) times as much against its place as against
   // the one found (ComparePlace()). 0 switches this off.
   double rest_evidence = 3;
+  // One that moves rests again where the points say less than half of that against the place that
+  // it had so many frames ago. 0 switches this off.
+  int rest_frames = 4;
 
   // What waits for motion (TrackChoice::kMoving) has moved where so many frames in a row show a
   // point of it this far from where it began, each with this evidence, as above, against its place

@@ -25,6 +25,8 @@ constexpr double kSlow_voxels = 0.1;
 constexpr double kFartherBy = 1.3;
 constexpr double kSameWay = 0.7;
 constexpr double kShareGoingOn = 0.4;
+// What moves rests again where less than this share of the evidence is against it.
+constexpr double kShareAgain = 0.5;
 // Depth that is farther from a model's surface is not the surface's.
 constexpr double kOtherDepth_voxels = 2;
 // What seems to move for longer, and has not come as far as an object that moves, is something
@@ -157,6 +159,7 @@ void SdfTracker::Place(InstanceId id, int frame, PlacedModel model) {
   memory.centre_O.reset();
   memory.leaning.reset();
   memory.place.reset();
+  memory.T_WO_last.clear();
   if (model == PlacedModel::kOther) memory.keyframe.reset();
   memory.is_placed = true;
 }
@@ -191,7 +194,7 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
   if (!rest.is_kept && IsHardlySeen(sight, found)) return std::nullopt;
   if (Waits(sight, rest, memory, found) || !PassesGates(sight, found)) return std::nullopt;
   const MotionUncertainty motion = Uncertainty(sight, found, memory);
-  Remember(sight, found, memory);
+  Remember(sight, found, rest, memory);
 
   const Pose motion_L = MotionOf(model.T_WL, frame.T_WC, found.T_LC);
   if (LongestWay_m(found.frame, motion_L) <= config_.rest_voxels * voxel_m) {
@@ -225,7 +228,10 @@ SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistratio
   const std::optional<Vector6> leant = std::exchange(memory.leaning, std::nullopt);
   Rest rest;
   if ((config_.rest_evidence <= 0 && !waits_) || nearest.counts.observed == 0) return rest;
-  if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) return rest;
+  if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) {
+    rest.is_kept = rest.is_back = RestsAgain(sight, task, nearest, memory, found);
+    return rest;
+  }
   rest.T_LC = sight.T_WL.inverse() * sight.frame->T_WC;
   const OtherPlace there = ComparePlace(task, rest.T_LC, nearest, config_);
   rest.counts = there.counts;
@@ -239,6 +245,23 @@ SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistratio
   found.T_LC = rest.T_LC;
   found.counts = rest.counts;
   return rest;
+}
+
+bool SdfTracker::RestsAgain(const Sight& sight, const SdfRegistration& task,
+                            const SdfRegistrationResult& nearest, const Memory& memory,
+                            SdfRegistrationResult& found) const {
+  const auto frames = static_cast<std::size_t>(config_.rest_frames);
+  if (frames == 0 || config_.rest_evidence <= 0 || (waits_ && !memory.has_moved)) return false;
+  if (sight.passed != 1 || memory.T_WO_last.size() < frames) return false;
+  const Pose& T_WO = memory.T_WO_last[memory.T_WO_last.size() - frames];
+  const Pose T_LC = sight.T_LO * T_WO.inverse() * sight.frame->T_WC;
+  const OtherPlace there = ComparePlace(task, T_LC, nearest, config_);
+  const double evidence =
+      (there.cost_ratio - 1) * std::sqrt(static_cast<double>(nearest.counts.observed));
+  if (evidence >= kShareAgain * config_.rest_evidence) return false;
+  found.T_LC = T_LC;
+  found.counts = there.counts;
+  return true;
 }
 
 bool SdfTracker::Waits(const Sight& sight, const Rest& rest, Memory& memory,
@@ -343,7 +366,7 @@ MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrat
   return motion;
 }
 
-void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found,
+void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found, const Rest& rest,
                           Memory& memory) const {
   const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
   const auto has_turned = [&] {
@@ -353,10 +376,16 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
   if (config_.keyframe_turn_rad > 0 && (!memory.keyframe || has_turned())) {
     memory.keyframe = KeyframeOf(sight, T_OC);
   }
+  if (sight.passed != 1) memory.T_WO_last.clear();
+  memory.T_WO_last.push_back(sight.frame->T_WC * T_OC.inverse());
+  if (memory.T_WO_last.size() > static_cast<std::size_t>(config_.rest_frames)) {
+    memory.T_WO_last.pop_front();
+  }
   memory.frame = sight.frame->index;
   memory.centre_O = T_OC * sight.centre_C;
   const Pose motion_L = MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC);
-  memory.motion_L = KnownPart(motion_L, found, config_.weak_share);
+  memory.motion_L =
+      rest.is_back ? Pose::Identity() : KnownPart(motion_L, found, config_.weak_share);
   if (sight.passed > 1) {
     memory.motion_L = found.frame.MotionOf(found.frame.LengthsOf(memory.motion_L) / sight.passed);
   }

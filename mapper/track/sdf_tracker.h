@@ -2,6 +2,7 @@
 // where its last motion would bring it, and freezes what it cannot register (docs/tracking.md).
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -55,6 +56,7 @@ class SdfTracker : public Tracker {
     std::optional<Keyframe> keyframe;
     std::optional<PlaceUncertainty> place;  // then
     std::optional<Vector6> leaning;         // of what was left at rest: to where it was found
+    std::deque<Pose> T_WO_last;             // of the last frames in a row, the first one first
     // Of one that waits for motion.
     std::optional<Pose> T_WO_begun;  // where it was when it was registered first
     bool has_moved = false;
@@ -107,6 +109,7 @@ class SdfTracker : public Tracker {
   // What a frame says of an object that was at rest.
   struct Rest {
     bool is_kept = false;  // nothing says that it is at rest no more
+    bool is_back = false;  // or it rests again, where it was some frames ago
     // Against its place: (what it costs there / where it is found - 1) sqrt(n), n the number of
     // observed points. 0 where it was not at rest.
     double evidence = 0;
@@ -134,7 +137,12 @@ class SdfTracker : public Tracker {
   // How well its motion is known since it was last tracked; remembers the place for the next.
   MotionUncertainty Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
                                 Memory& memory) const;
-  void Remember(const Sight& sight, const SdfRegistrationResult& found, Memory& memory) const;
+  // What moved, and may rest again. `found` is then where it was rest_frames frames ago.
+  bool RestsAgain(const Sight& sight, const SdfRegistration& task,
+                  const SdfRegistrationResult& nearest, const Memory& memory,
+                  SdfRegistrationResult& found) const;
+  void Remember(const Sight& sight, const SdfRegistrationResult& found, const Rest& rest,
+                Memory& memory) const;
   // The segment, seen from there.
   Keyframe KeyframeOf(const Sight& sight, const Pose& T_OC) const;
 

@@ -78,7 +78,7 @@ cv::Mat TrackedObjects::Select(const cv::Mat& labels) const {
         last = row[u];
         is_last_left_out = last != kNoInstance && last != kBackground && !Contains(last);
       }
-      if (is_last_left_out) row[u] = kBackground;
+      if (is_last_left_out) row[u] = kNoInstance;
     }
   }
   return selected;

@@ -42,8 +42,8 @@ class TrackedObjects {
   // ones; empty where it has none.
   std::string ClassOf(InstanceId id) const;
 
-  // The labels (CV_16UC1) with kBackground for what is not tracked, kNoInstance aside. May share
-  // its pixels with `labels`.
+  // The labels (CV_16UC1) with kNoInstance for objects that are not tracked: they are no
+  // background, and may cover those that are. May share its pixels with `labels`.
   cv::Mat Select(const cv::Mat& labels) const;
 
  private:

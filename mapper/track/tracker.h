@@ -46,7 +46,8 @@ class Tracker {
 
   // The objects' poses after the frame, of all that have had one, by their poses before it.
   // `labels` is the frame's objects that are tracked (mapper/track/tracked_objects.h), as
-  // associated with the map, which holds what was fused before the frame; the rest is kBackground.
+  // associated with the map, which holds what was fused before the frame; the rest is kBackground
+  // or, where it may be an object, kNoInstance.
   virtual TrackedPoses Track(const Frame& frame, const cv::Mat& labels,
                              const MapRepresentation& map, const ObjectPoses& before) = 0;
 

@@ -95,21 +95,25 @@ TEST(ModelSight, FacingVoxelsAreShownAsPixelsAre) {
     between += share > 0.1 && share < 0.9 ? 1 : 0;
   }
   EXPECT_GT(between, 5);
-  // Where nothing is before it, but it is not there.
-  Frame gone = open;
-  gone.depth = cv::Mat(open.depth.size(), CV_32FC1, cv::Scalar(5));
-  gone.mask = cv::Mat(open.mask.size(), CV_16UC1, cv::Scalar(kBackground));
-  EXPECT_EQ(look(gone).ShownShare(), 0);
-  // Another's pixels with its depth, and those without any, say nothing.
-  for (const float factor : {1.0F, 0.0F}) {
-    Frame unsaid = open;
-    unsaid.depth = factor * open.depth;
-    unsaid.mask = cv::Mat(open.mask.size(), CV_16UC1, cv::Scalar(kScreen));
-    EXPECT_LT(look(unsaid).shown + look(unsaid).missing, kShareTolerance * all.shown);
+  const auto all_of = [&](InstanceId id, float depth_factor) {
+    Frame frame = open;
+    frame.depth = cv::Mat(depth_factor * open.depth);
+    frame.mask = cv::Mat(open.mask.size(), CV_16UC1, cv::Scalar(id));
+    return look(frame);
+  };
+  EXPECT_EQ(all_of(kScreen, 0.5F).ShownShare(), 0);
+  EXPECT_EQ(all_of(kNoInstance, 0.5F).ShownShare(), 0);
+  // What is farther covers nothing, nor does another's pixel with its depth, or without any.
+  for (const float factor : {2.0F, 1.0F, 0.0F}) {
+    const FacingVoxels unsaid = all_of(kScreen, factor);
+    EXPECT_LT(unsaid.shown + unsaid.covered, kShareTolerance * all.shown) << factor;
   }
+  // A table that a model is sunk into does not cover it.
+  const FacingVoxels sunk = all_of(kBackground, 0.5F);
+  EXPECT_EQ(sunk.shown + sunk.covered, 0);
   const Pose beside = reference::MakePose(0, Eigen::Vector3d::UnitZ(), {0, 5, 0});
   const FacingVoxels outside = look(open, beside);
-  EXPECT_EQ(outside.shown + outside.missing, 0);
+  EXPECT_EQ(outside.shown + outside.covered, 0);
   EXPECT_EQ(outside.ShownShare(), 1);
 }
 

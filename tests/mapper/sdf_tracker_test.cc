@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "core/units.h"
@@ -97,13 +98,12 @@ void ExpectFrozen(Pipeline& pipeline, const Frame& frame, const std::vector<Inst
 // A brick and a tray at rest until frame kStart, seen with noise by a camera that moves; then the
 // brick has slid so far.
 constexpr int kStart = 10;
-Frame NoisyToys(int index, double slid_m) {
+Frame NoisyToys(int index, double slid_m, const Intrinsics& camera = FineCamera(),
+                double noise_m = 0.002) {
   reference::Scene scene = TableOnly();
   AddBrick(scene, 0.3, {-0.14 + slid_m, 0.03, kTableTop_m + 0.045});
   AddTray(scene, -0.4, {0.08, 0.11, kTableTop_m + 0.016});
-  constexpr double kNoise_m = 0.002;
-  return WithNoise(reference::Render(scene, CircleCamera(0.005 * index), index, FineCamera()),
-                   kNoise_m);
+  return WithNoise(reference::Render(scene, CircleCamera(0.005 * index), index, camera), noise_m);
 }
 
 // Frames kStart + 1 ... kEnd: the largest error of the brick's place.
@@ -148,6 +148,37 @@ TEST(SdfTracker, LeavesAtRestWhatNothingSaysMoves) {
       EXPECT_LT(FarthestOff_m(pipeline, slide_m), kPixel_voxels * kToyVoxel_m);
       EXPECT_EQ(pipeline.track_log().objects().at(kBrick).frozen, 0);
     }
+  }
+}
+
+TEST(SdfTracker, RestsAgainWhereItStops) {
+  constexpr double kFast_m = 0.006;
+  constexpr int kStop = kStart + 5;
+  constexpr int kSettled = kStop + 6;
+  constexpr int kLast = kSettled + 10;
+  // Of so few points that noise alone moves it by more than a tenth of a voxel a frame.
+  constexpr Intrinsics kCoarse{256, 192, 214.0, 214.0, 127.5, 95.5};
+  constexpr double kFiner = 4;
+  constexpr double kNoise_m = 0.004;
+  for (const int frames : {0, SdfTrackConfig{}.rest_frames}) {
+    PipelineConfig config = TrackConfig();
+    config.track.rest_frames = frames;
+    config.map.voxel_m = kToyVoxel_m / kFiner;
+    Pipeline pipeline(config, Toys());
+    int moved = 0;
+    for (int i = 1; i <= kLast; ++i) {
+      const double slid_m = kFast_m * (std::clamp(i, kStart, kStop) - kStart);
+      ASSERT_TRUE(pipeline.Process(NoisyToys(i, slid_m, kCoarse, kNoise_m)));
+      if (i <= kSettled) continue;
+      const auto& poses = pipeline.trajectories().at(kBrick);
+      moved += poses.at(i).matrix() == poses.at(i - 1).matrix() ? 0 : 1;
+    }
+    // Else noise moves it for ever, as it moved before.
+    EXPECT_EQ(moved, frames > 0 ? 0 : kLast - kSettled) << frames;
+    const Pose T_WO_first = NoisyToys(1, 0).T_WO.at(kBrick);
+    const Pose T_WO = NoisyToys(kLast, kFast_m * (kStop - kStart)).T_WO.at(kBrick);
+    const Pose found = pipeline.trajectories().at(kBrick).at(kLast) * T_WO_first;
+    EXPECT_LT((found.translation() - T_WO.translation()).norm(), kPixel_voxels * kToyVoxel_m);
   }
 }
 

@@ -18,11 +18,12 @@ Ids Selected(const TrackedObjects& tracked, const Ids& ids) {
 TEST(TrackedObjects, AreThoseThatWereOnceClassified) {
   TrackedObjects tracked(TrackChoice::kClassified,
                          {{0, "room", "room"}, {3, "a", "car"}, {4, "b", ""}});
-  EXPECT_EQ(Selected(tracked, {0, 3, 4, 5, kNoInstance}), (Ids{0, 3, 0, 0, kNoInstance}));
+  EXPECT_EQ(Selected(tracked, {0, 3, 4, 5, kNoInstance}),
+            (Ids{0, 3, kNoInstance, kNoInstance, kNoInstance}));
   tracked.Learn(5, "cup");
   tracked.Learn(4, "");
   tracked.Learn(0, "room");
-  EXPECT_EQ(Selected(tracked, {0, 3, 4, 5, kNoInstance}), (Ids{0, 3, 0, 5, kNoInstance}));
+  EXPECT_EQ(Selected(tracked, {0, 3, 4, 5, kNoInstance}), (Ids{0, 3, kNoInstance, 5, kNoInstance}));
 }
 
 TEST(TrackedObjects, AreAllButTheBackgroundWhereAllAreAsked) {
