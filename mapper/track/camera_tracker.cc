@@ -33,7 +33,9 @@ SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   config.free_space_weight = config.outline_weight = config.colour_weight = 0;
   // What stands in a room hides it.
   config.min_shown_share = 0;
-  // Where a camera was is no reason to think that it is there still; a given pose is one.
+  // Where a camera was is no reason to think that it is there still; a given pose is one, each
+  // frame's own.
+  config.rest_frames = 0;
   if (source == CameraSource::kTrack) config.rest_evidence = 0;
   config.settled_voxels = std::max(config.settled_voxels, kSettled_voxels);
   config.huber_voxels = std::max(config.huber_voxels, kHuber_voxels);
