@@ -25,4 +25,9 @@ Vector6 MotionFrame::LengthsOf(const Pose& motion) const {
   return x;
 }
 
+double MotionFrame::LongestWay_m(const Pose& motion) const {
+  const Vector6 way = LengthsOf(motion);
+  return way.head<3>().norm() + 2 * way.tail<3>().norm();
+}
+
 }  // namespace tsdfpp

@@ -21,6 +21,8 @@ struct MotionFrame {
   Pose MotionOf(const Vector6& x) const;
   // The inverse of MotionOf, for turns of less than pi.
   Vector6 LengthsOf(const Pose& motion) const;
+  // How far the motion takes a point at most: points lie up to some two radii from the centre.
+  double LongestWay_m(const Pose& motion) const;
 };
 
 }  // namespace tsdfpp

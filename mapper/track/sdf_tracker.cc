@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 #include "mapper/track/model_sight.h"
 
@@ -17,21 +16,8 @@ namespace {
 constexpr double kSameSeed_voxels = 0.5;
 // Motions that were not measured for longer than this are not extrapolated.
 constexpr int kLongestExtrapolation_frames = 5;
-// An object that moves less from frame to frame may be at rest.
-constexpr double kSlow_voxels = 0.1;
-// Where two frames find an object at rest beside its place, the later one farther than that, by
-// this much at least, and in the same direction by this cosine, noise is a worse reason than a
-// motion that begins, and this share of the evidence is enough.
-constexpr double kFartherBy = 1.3;
-constexpr double kSameWay = 0.7;
-constexpr double kShareGoingOn = 0.4;
-// What moves rests again where less than this share of the evidence is against it.
-constexpr double kShareAgain = 0.5;
 // Depth that is farther from a model's surface is not the surface's.
 constexpr double kOtherDepth_voxels = 2;
-// What seems to move for longer, and has not come as far as an object that moves, is something
-// else: its model is wrong there.
-constexpr int kLongestWait_frames = 20;
 // Numbers of frames may be any.
 constexpr std::int64_t kMostPassed = 1'000'000'000;
 
@@ -54,27 +40,6 @@ Pose Repeated(const Pose& motion, int times) {
   return all;
 }
 
-// The motion since the frame before, T_WL(before)^-1 * T_WL(after), from T_WL(before).
-Pose MotionOf(const Pose& T_WL, const Pose& T_WC, const Pose& T_LC) {
-  return T_WL.inverse() * T_WC * T_LC.inverse();
-}
-
-// How far it moves a point at most: points lie up to some two radii from the centre.
-double LongestWay_m(const MotionFrame& frame, const Pose& motion_L) {
-  const Vector6 way = frame.LengthsOf(motion_L);
-  return way.head<3>().norm() + 2 * way.tail<3>().norm();
-}
-
-bool GoesOn(const Vector6& before, const Vector6& now, double voxel_m) {
-  return now.norm() > kSlow_voxels * voxel_m && now.norm() > kFartherBy * before.norm() &&
-         now.dot(before) > kSameWay * now.norm() * before.norm();
-}
-
-// Few points can be off together.
-double LeastEvidence(int points, const SdfTrackConfig& config) {
-  return config.motion_evidence * std::max(1.0, double(config.motion_points) / std::max(points, 1));
-}
-
 // The motion without what it has along directions of which too little is known.
 Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double weak_share) {
   if (weak_share <= 0) return motion_L;
@@ -90,6 +55,10 @@ Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double 
 }
 
 }  // namespace
+
+Pose SdfTracker::Sight::T_LC_stay() const { return T_WL.inverse() * frame->T_WC; }
+
+Pose SdfTracker::Sight::MotionTo(const Pose& T_LC) const { return T_LC_stay() * T_LC.inverse(); }
 
 TrackedPoses SdfTracker::Track(const Frame& frame, const cv::Mat& labels,
                                const MapRepresentation& map, const ObjectPoses& before) {
@@ -196,8 +165,8 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
   const MotionUncertainty motion = Uncertainty(sight, found, memory);
   Remember(sight, found, rest, memory);
 
-  const Pose motion_L = MotionOf(model.T_WL, frame.T_WC, found.T_LC);
-  if (LongestWay_m(found.frame, motion_L) <= config_.rest_voxels * voxel_m) {
+  const Pose motion_L = sight.MotionTo(found.T_LC);
+  if (found.frame.LongestWay_m(motion_L) <= config_.rest_voxels * voxel_m) {
     return Registered{model.T_WL, motion};
   }
   return Registered{AsRigid(frame.T_WC * found.T_LC.inverse()), motion};
@@ -206,7 +175,7 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
 SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) const {
   SdfRegistration task{sight.model, *sight.points, sight.voxel_m, sight.frame->intrinsics};
   const int times = std::min(sight.passed, kLongestExtrapolation_frames);
-  const Pose T_LC_stay = sight.T_WL.inverse() * sight.frame->T_WC;
+  const Pose T_LC_stay = sight.T_LC_stay();
   task.T_LC_expected = Repeated(memory.motion_L, times).inverse() * T_LC_stay;
   const Eigen::Vector3d expected_L = task.T_LC_expected * sight.centre_C;
   const auto add_seed = [&](const Pose& seed) {
@@ -220,85 +189,6 @@ SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) con
     add_seed(Eigen::Translation3d(sight.T_LO * *memory.centre_O - expected_L) * task.T_LC_expected);
   }
   return task;
-}
-
-SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistration& task,
-                                        const SdfRegistrationResult& nearest, Memory& memory,
-                                        SdfRegistrationResult& found) const {
-  const std::optional<Vector6> leant = std::exchange(memory.leaning, std::nullopt);
-  Rest rest;
-  if ((config_.rest_evidence <= 0 && !waits_) || nearest.counts.observed == 0) return rest;
-  if (LongestWay_m(found.frame, memory.motion_L) > kSlow_voxels * sight.voxel_m) {
-    rest.is_kept = rest.is_back = RestsAgain(sight, task, nearest, memory, found);
-    return rest;
-  }
-  rest.T_LC = sight.T_WL.inverse() * sight.frame->T_WC;
-  const OtherPlace there = ComparePlace(task, rest.T_LC, nearest, config_);
-  rest.counts = there.counts;
-  const Vector6 leaning =
-      found.frame.LengthsOf(MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC));
-  rest.evidence = (there.cost_ratio - 1) * std::sqrt(static_cast<double>(nearest.counts.observed));
-  const bool goes_on = leant && sight.passed == 1 && GoesOn(*leant, leaning, sight.voxel_m);
-  rest.is_kept = rest.evidence < config_.rest_evidence * (goes_on ? kShareGoingOn : 1);
-  if (!rest.is_kept) return rest;
-  memory.leaning = leaning;
-  found.T_LC = rest.T_LC;
-  found.counts = rest.counts;
-  return rest;
-}
-
-bool SdfTracker::RestsAgain(const Sight& sight, const SdfRegistration& task,
-                            const SdfRegistrationResult& nearest, const Memory& memory,
-                            SdfRegistrationResult& found) const {
-  const auto frames = static_cast<std::size_t>(config_.rest_frames);
-  if (frames == 0 || config_.rest_evidence <= 0 || (waits_ && !memory.has_moved)) return false;
-  if (sight.passed != 1 || memory.T_WO_last.size() < frames) return false;
-  const Pose& T_WO = memory.T_WO_last[memory.T_WO_last.size() - frames];
-  const Pose T_LC = sight.T_LO * T_WO.inverse() * sight.frame->T_WC;
-  const OtherPlace there = ComparePlace(task, T_LC, nearest, config_);
-  const double evidence =
-      (there.cost_ratio - 1) * std::sqrt(static_cast<double>(nearest.counts.observed));
-  if (evidence >= kShareAgain * config_.rest_evidence) return false;
-  found.T_LC = T_LC;
-  found.counts = there.counts;
-  return true;
-}
-
-bool SdfTracker::Waits(const Sight& sight, const Rest& rest, Memory& memory,
-                       SdfRegistrationResult& found) const {
-  if (!waits_ || memory.has_moved) return false;
-  if (!memory.T_WO_begun) memory.T_WO_begun = sight.T_WL * sight.T_LO;
-  const auto away_voxels = [&](const Pose& T_LC) {
-    const Pose T_WO = sight.frame->T_WC * T_LC.inverse() * sight.T_LO;
-    const Pose motion_W = T_WO * memory.T_WO_begun->inverse();
-    const Eigen::Vector3d begun_W = motion_W.inverse() * (sight.frame->T_WC * sight.centre_C);
-    return LongestWay_m({begun_W, found.frame.radius_m}, motion_W) / sight.voxel_m;
-  };
-  // It was lost, and was found elsewhere.
-  if (std::exchange(memory.is_placed, false) &&
-      away_voxels(sight.T_WL.inverse() * sight.frame->T_WC) >= config_.motion_voxels) {
-    memory.has_moved = true;
-    return false;
-  }
-  if (memory.turn_before != turn_ - 1) memory.turns_away = memory.turns_waited = 0;
-  memory.turn_before = turn_;
-  const bool is_away = !rest.is_kept && away_voxels(found.T_LC) >= config_.motion_voxels;
-  const bool is_sure = rest.evidence >= LeastEvidence(found.counts.observed, config_);
-  memory.turns_away = is_away && is_sure ? memory.turns_away + 1 : 0;
-  memory.has_moved = memory.turns_away >= config_.motion_frames;
-  const bool is_beside =
-      LongestWay_m(found.frame, MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC)) >
-      kSlow_voxels * sight.voxel_m;
-  if (memory.has_moved || rest.is_kept || !is_beside) {
-    memory.turns_waited = 0;
-  } else if (++memory.turns_waited <= kLongestWait_frames || is_away) {
-    return true;
-  }
-  if (!memory.has_moved) {
-    found.T_LC = rest.T_LC;
-    found.counts = rest.counts;
-  }
-  return false;
 }
 
 std::optional<Pose> SdfTracker::Calibration(const Sight& sight, const Memory& memory) const {
@@ -327,7 +217,7 @@ std::vector<std::unique_ptr<PointTerm>> SdfTracker::OthersOf(const Sight& sight,
 }
 
 bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& found) const {
-  const Vector6 way = found.frame.LengthsOf(MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC));
+  const Vector6 way = found.frame.LengthsOf(sight.MotionTo(found.T_LC));
   if (!way.allFinite()) return false;
   const double turn_rad = way.tail<3>().norm() / found.frame.radius_m;
   const DistanceCounts& counts = found.counts;
@@ -383,7 +273,7 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
   }
   memory.frame = sight.frame->index;
   memory.centre_O = T_OC * sight.centre_C;
-  const Pose motion_L = MotionOf(sight.T_WL, sight.frame->T_WC, found.T_LC);
+  const Pose motion_L = sight.MotionTo(found.T_LC);
   memory.motion_L =
       rest.is_back ? Pose::Identity() : KnownPart(motion_L, found, config_.weak_share);
   if (sight.passed > 1) {

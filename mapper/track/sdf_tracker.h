@@ -56,7 +56,7 @@ class SdfTracker : public Tracker {
     std::optional<Keyframe> keyframe;
     std::optional<PlaceUncertainty> place;  // then
     std::optional<Vector6> leaning;         // of what was left at rest: to where it was found
-    std::deque<Pose> T_WO_last;             // of the last frames in a row, the first one first
+    std::deque<Pose> T_WO_last;             // of the last rest_frames in a row, oldest first
     // Of one that waits for motion.
     std::optional<Pose> T_WO_begun;  // where it was when it was registered first
     bool has_moved = false;
@@ -80,6 +80,11 @@ class SdfTracker : public Tracker {
     Pose T_WL = Pose::Identity();
     Pose T_LO = Pose::Identity();
     int passed = 1;  // frames since it was last tracked
+
+    // Where the camera is in L if the object stayed where it was.
+    Pose T_LC_stay() const;
+    // The motion since the frame before, T_WL(before)^-1 * T_WL(after), where the camera is there.
+    Pose MotionTo(const Pose& T_LC) const;
   };
 
   struct Registered {
@@ -110,9 +115,7 @@ class SdfTracker : public Tracker {
   struct Rest {
     bool is_kept = false;  // nothing says that it is at rest no more
     bool is_back = false;  // or it rests again, where it was some frames ago
-    // Against its place: (what it costs there / where it is found - 1) sqrt(n), n the number of
-    // observed points. 0 where it was not at rest.
-    double evidence = 0;
+    double evidence = 0;   // against its place; 0 where it was not at rest
     // That place, and the points there; of an object that was at rest.
     Pose T_LC = Pose::Identity();
     DistanceCounts counts;
@@ -121,6 +124,10 @@ class SdfTracker : public Tracker {
   // `found` is the best guess.
   Rest StayAtRest(const Sight& sight, const SdfRegistration& task,
                   const SdfRegistrationResult& nearest, Memory& memory,
+                  SdfRegistrationResult& found) const;
+  // What moved, and may rest again. `found` is then where it was rest_frames frames ago.
+  bool RestsAgain(const Sight& sight, const SdfRegistration& task,
+                  const SdfRegistrationResult& nearest, const Memory& memory,
                   SdfRegistrationResult& found) const;
   // Takes in how far it is from where it began. Whether it is to wait for more of its motion; it
   // does not wait for ever, and then `found` is where it is at rest.
@@ -137,10 +144,6 @@ class SdfTracker : public Tracker {
   // How well its motion is known since it was last tracked; remembers the place for the next.
   MotionUncertainty Uncertainty(const Sight& sight, const SdfRegistrationResult& found,
                                 Memory& memory) const;
-  // What moved, and may rest again. `found` is then where it was rest_frames frames ago.
-  bool RestsAgain(const Sight& sight, const SdfRegistration& task,
-                  const SdfRegistrationResult& nearest, const Memory& memory,
-                  SdfRegistrationResult& found) const;
   void Remember(const Sight& sight, const SdfRegistrationResult& found, const Rest& rest,
                 Memory& memory) const;
   // The segment, seen from there.
