@@ -42,6 +42,9 @@ export UBSAN_OPTIONS=print_stacktrace=1
 symbolizer=$(command -v llvm-symbolizer-14 || command -v llvm-symbolizer || true)
 if [ -n "$symbolizer" ]; then export ASAN_SYMBOLIZER_PATH=$symbolizer; fi
 
+# How libFuzzer ends when it is told to, by SIGINT or SIGTERM.
+interrupted=72
+
 # Bytes of an input: sets of files are larger than single ones.
 most_bytes() {
   local largest=0 size file
@@ -54,7 +57,7 @@ most_bytes() {
 }
 
 fuzz() {
-  local target=$1 now left log status executions line used cpu=0 tries=0 TIMEFORMAT='%U %S'
+  local target=$1 now left log status executions line used find cpu=0 tries=0 TIMEFORMAT='%U %S'
   local to=$OUT/$target
   mkdir -p "$to/corpus" "$to/crashes"
   export TSDFPP_FUZZ_TARGET=$target
@@ -74,15 +77,16 @@ fuzz() {
     line=$(grep -a ' cov: ' "$log" | tail -1 || true)
     edges=$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' <<<"$line")
     features=$(sed -n 's/.* ft: \([0-9]*\).*/\1/p' <<<"$line")
+    find=$((status != 0 && status != interrupted))
     printf '%s\t%s\t%s\t%s\t%s\t%s\n' "$now" "$used" "${executions:-0}" "${edges:-0}" \
-      "${features:-0}" "$((status != 0))" >>"$to/runs.tsv"
+      "${features:-0}" "$find" >>"$to/runs.tsv"
     # Only logs of finds are worth their place.
-    if [ $status = 0 ]; then rm "$log"; else
+    if [ $find = 0 ]; then rm "$log"; else
       tries=$((tries + 1))
       echo "$target: a find, $log: $(grep -aE '^(complaint|SUMMARY|==[0-9]*== *ERROR)|runtime error' "$log" | head -1)"
     fi
-    # A run that took no time at all would be repeated for ever.
-    if [ "$used" = 0 ]; then break; fi
+    # Who ends a run wants no other. One that took no time at all would be repeated for ever.
+    if [ "$used" = 0 ] || [ $status = $interrupted ]; then break; fi
   done
   rm -f "$to/time.txt"
   echo "$target: $(awk '{s += $2; e += $3} END {print s " s, " e " executions"}' "$to/runs.tsv"), $(find "$to/corpus" -type f | wc -l) inputs, $(find "$to/crashes" -type f | wc -l) finds"
