@@ -80,7 +80,7 @@ struct SdfTrackConfig {
   // the one found (ComparePlace()). 0 switches this off.
   double rest_evidence = 3;
   // One that moves rests again where the points say less than half of that against the place that
-  // it had so many frames ago. 0 switches this off.
+  // it had so many frames ago, which is at most a voxel away. 0 switches this off.
   int rest_frames = 4;
 
   // What waits for motion (TrackChoice::kMoving) has moved where so many frames in a row show a

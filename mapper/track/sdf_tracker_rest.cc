@@ -18,8 +18,11 @@ constexpr double kSlow_voxels = 0.1;
 constexpr double kFartherBy = 1.3;
 constexpr double kSameWay = 0.7;
 constexpr double kShareGoingOn = 0.4;
-// What moves rests again where less than this share of the evidence is against it.
+// What moves rests again where less than this share of the evidence is against it, and no farther
+// than this from there: a flat side slides along itself, and nothing is against its old place. A
+// turn of which nothing is known is left out: noise makes it.
 constexpr double kShareAgain = 0.5;
+constexpr double kNearAgain_voxels = 1;
 // What seems to move for longer, and has not come as far as an object that moves, is something
 // else: its model is wrong there.
 constexpr int kLongestWait_frames = 20;
@@ -38,6 +41,18 @@ double LeastEvidence(int points, const SdfTrackConfig& config) {
 // observed points.
 double EvidenceAgainst(const OtherPlace& there, const SdfRegistrationResult& nearest) {
   return (there.cost_ratio - 1) * std::sqrt(static_cast<double>(nearest.counts.observed));
+}
+
+// How far it is from the place found to T_LC, as MotionFrame::LongestWay_m, without turns along
+// weak directions.
+double WayOfKnownTurns_m(const SdfRegistrationResult& found, const Pose& T_LC,
+                         const SdfTrackConfig& config) {
+  const Vector6 way = found.frame.LengthsOf(T_LC * found.T_LC.inverse());
+  Eigen::Vector3d turn = found.known.turns.transpose() * way.tail<3>();
+  if (config.weak_share > 0) {
+    turn.array() *= (found.known.turn_shares.array() / config.weak_share).min(1);
+  }
+  return way.head<3>().norm() + 2 * turn.norm();
 }
 
 }  // namespace
@@ -73,6 +88,7 @@ bool SdfTracker::RestsAgain(const Sight& sight, const SdfRegistration& task,
   if (frames == 0 || config_.rest_evidence <= 0 || (waits_ && !memory.has_moved)) return false;
   if (sight.passed != 1 || memory.T_WO_last.size() < frames) return false;
   const Pose T_LC = sight.T_LO * memory.T_WO_last.front().inverse() * sight.frame->T_WC;
+  if (WayOfKnownTurns_m(found, T_LC, config_) > kNearAgain_voxels * sight.voxel_m) return false;
   const OtherPlace there = ComparePlace(task, T_LC, nearest, config_);
   if (EvidenceAgainst(there, nearest) >= kShareAgain * config_.rest_evidence) return false;
   found.T_LC = T_LC;

@@ -74,28 +74,36 @@ TEST(TrackerRest, RestsAgainWhereItStops) {
   constexpr int kSettled = kStop + 6;
   constexpr int kLast = kSettled + 10;
   // Of so few points that noise alone moves it by more than a tenth of a voxel a frame.
-  constexpr Intrinsics kCoarse{256, 192, 214.0, 214.0, 127.5, 95.5};
-  constexpr double kFiner = 4;
-  constexpr double kNoise_m = 0.004;
-  for (const int frames : {0, SdfTrackConfig{}.rest_frames}) {
-    PipelineConfig config = TrackConfig();
-    config.track.rest_frames = frames;
-    config.map.voxel_m = kToyVoxel_m / kFiner;
-    Pipeline pipeline(config, Toys());
-    int moved = 0;
-    for (int i = 1; i <= kLast; ++i) {
-      const double slid_m = kFast_m * (std::clamp(i, kStart, kStop) - kStart);
-      ASSERT_TRUE(pipeline.Process(NoisyToys(i, slid_m, kCoarse, kNoise_m)));
-      if (i <= kSettled) continue;
-      const auto& poses = pipeline.trajectories().at(kBrick);
-      moved += poses.at(i).matrix() == poses.at(i - 1).matrix() ? 0 : 1;
+  constexpr Intrinsics kCoarse{192, 144, 160.0, 160.0, 95.5, 71.5};
+  struct Case {
+    double voxel_m;
+    double noise_m;
+  };
+  for (const auto& [voxel_m, noise_m] :
+       {Case{kToyVoxel_m / 2, 0.004}, Case{kToyVoxel_m / 2.5, 0.004}, Case{kToyVoxel_m / 3, 0.003},
+        Case{kToyVoxel_m / 3, 0.004}}) {
+    SCOPED_TRACE(fmt::format("voxels of {} m, noise of {} m", voxel_m, noise_m));
+    for (const int frames : {0, SdfTrackConfig{}.rest_frames}) {
+      PipelineConfig config = TrackConfig();
+      config.track.rest_frames = frames;
+      config.map.voxel_m = voxel_m;
+      Pipeline pipeline(config, Toys());
+      int moved = 0;
+      for (int i = 1; i <= kLast; ++i) {
+        const double slid_m = kFast_m * (std::clamp(i, kStart, kStop) - kStart);
+        ASSERT_TRUE(pipeline.Process(NoisyToys(i, slid_m, kCoarse, noise_m)));
+        if (i <= kSettled) continue;
+        const auto& poses = pipeline.trajectories().at(kBrick);
+        moved += poses.at(i).matrix() == poses.at(i - 1).matrix() ? 0 : 1;
+      }
+      // Else noise moves it for ever, as it moved before.
+      EXPECT_EQ(moved, frames > 0 ? 0 : kLast - kSettled) << frames;
+      if (frames == 0) continue;
+      const Pose T_WO_first = NoisyToys(1, 0).T_WO.at(kBrick);
+      const Pose T_WO = NoisyToys(kLast, kFast_m * (kStop - kStart)).T_WO.at(kBrick);
+      const Pose found = pipeline.trajectories().at(kBrick).at(kLast) * T_WO_first;
+      EXPECT_LT((found.translation() - T_WO.translation()).norm(), kPixel_voxels * kToyVoxel_m);
     }
-    // Else noise moves it for ever, as it moved before.
-    EXPECT_EQ(moved, frames > 0 ? 0 : kLast - kSettled) << frames;
-    const Pose T_WO_first = NoisyToys(1, 0).T_WO.at(kBrick);
-    const Pose T_WO = NoisyToys(kLast, kFast_m * (kStop - kStart)).T_WO.at(kBrick);
-    const Pose found = pipeline.trajectories().at(kBrick).at(kLast) * T_WO_first;
-    EXPECT_LT((found.translation() - T_WO.translation()).norm(), kPixel_voxels * kToyVoxel_m);
   }
 }
 
