@@ -1,6 +1,7 @@
 #include "cli/segment.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <filesystem>
@@ -86,6 +87,7 @@ class SegmentWriter {
           WriteFile(out_ / "colour" / NameOf(index), PngFile(SegmentPicture(frame.colour, ids))));
     }
     ++frames_;
+    shows_any_ = shows_any_ || cv::countNonZero((ids != kBackground) & (ids != kNoInstance)) > 0;
     if (!options_.score) return {};
     cv::Mat truth = frame.mask;
     if (source_.IsSensed()) {
@@ -100,6 +102,8 @@ class SegmentWriter {
   }
 
   int frames() const { return frames_; }
+  // Whether any frame has more than background.
+  bool shows_any() const { return shows_any_; }
   double SecondsAFrame() const { return frames_ == 0 ? 0 : seconds_ / frames_; }
   SegmentScores Scores() const { return scorer_.Result(); }
 
@@ -110,6 +114,7 @@ class SegmentWriter {
   SegmentScorer scorer_;
   double seconds_ = 0;
   int frames_ = 0;
+  bool shows_any_ = false;
 };
 
 std::string ScoreText(const Measured& value) {
@@ -182,6 +187,10 @@ Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::A
   }
   TSDFPP_RETURN_IF_ERROR(WriteFile(run_folder.path() / "segments.json", JsonText(json, 2) + "\n"));
   TSDFPP_RETURN_IF_ERROR(run_folder.Commit());
+  if (!writer.shows_any() && options.segmentation.segmentation != "none") {
+    spdlog::warn("{}: no frame has a segment beside the background (--segmentation {})", info.name,
+                 options.segmentation.segmentation);
+  }
   return CommandResult{json, text};
 }
 

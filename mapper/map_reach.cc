@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 
 #include "core/farthest.h"
 #include "core/pixel_ray.h"
@@ -51,8 +52,27 @@ bool HoldsView(const LatticeRange& range, const Frame& frame, const Pose& T_LC,
   return true;
 }
 
-Expected<void> CheckPixels(const LatticeRange& range, const Frame& frame, const cv::Mat& labels,
-                           const Lattices& T_WL, const MapConfig& config) {
+// Whether what the camera could see lies in the range of each lattice.
+bool HoldsAll(const LatticeRange& range, const Frame& frame, const Lattices& T_WL,
+              const MapConfig& config) {
+  return HoldsView(range, frame, frame.T_WC, config) &&
+         std::all_of(T_WL.begin(), T_WL.end(), [&](const auto& lattice) {
+           return HoldsView(range, frame, lattice.second.inverse() * frame.T_WC, config);
+         });
+}
+
+// What a pixel shows beyond the range of its label's lattice.
+struct PixelBeyond {
+  int v = 0;
+  int u = 0;
+  InstanceId id = kNoInstance;
+  Eigen::Vector3d p_L;
+};
+
+// `visit` says whether to go on.
+void ForEachBeyond(const LatticeRange& range, const Frame& frame, const cv::Mat& labels,
+                   const Lattices& T_WL, const MapConfig& config,
+                   const std::function<bool(const PixelBeyond&)>& visit) {
   InstanceId last = kNoInstance;
   Pose T_LC = Pose::Identity();
   for (int v = 0; v < labels.rows; ++v) {
@@ -70,13 +90,24 @@ Expected<void> CheckPixels(const LatticeRange& range, const Frame& frame, const 
       for (const Eigen::Vector3d& p_C : {ends.near_C, ends.far_C}) {
         const Eigen::Vector3d p_L = T_LC * p_C;
         if (range.Holds(p_L)) continue;
-        return DataError("frame {}: pixel ({}, {}) shows object {} at {}{}", frame.index, u, v, id,
-                         T_WL.contains(id) ? "a place that in the object's own lattice is " : "",
-                         range.Beyond(p_L));
+        if (!visit({v, u, id, p_L})) return;
+        break;
       }
     }
   }
-  return {};
+}
+
+Expected<void> CheckPixels(const LatticeRange& range, const Frame& frame, const cv::Mat& labels,
+                           const Lattices& T_WL, const MapConfig& config) {
+  Expected<void> status;
+  ForEachBeyond(range, frame, labels, T_WL, config, [&](const PixelBeyond& pixel) {
+    status = DataError(
+        "frame {}: pixel ({}, {}) shows object {} at {}{}", frame.index, pixel.u, pixel.v, pixel.id,
+        T_WL.contains(pixel.id) ? "a place that in the object's own lattice is " : "",
+        range.Beyond(pixel.p_L));
+    return false;
+  });
+  return status;
 }
 
 Expected<void> CheckTranslation(const LatticeRange& range, const Pose& T, const std::string& what) {
@@ -135,6 +166,9 @@ Expected<void> CheckFrameForm(const Frame& frame) {
   }
   TSDFPP_RETURN_IF_ERROR(CheckImageForm(frame, "colour", frame.colour, CV_8UC3, "8-bit colours"));
   TSDFPP_RETURN_IF_ERROR(CheckImageForm(frame, "depth", frame.depth, CV_32FC1, "32-bit depths"));
+  if (frame.index < 0) {
+    return DataError("frame {}: its number is negative, expected 0 or more", frame.index);
+  }
   return CheckRigid(frame.T_WC, fmt::format("frame {}: the camera's", frame.index));
 }
 
@@ -169,12 +203,23 @@ Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, cons
   });
   TSDFPP_RETURN_IF_ERROR(
       CheckTranslation(range, frame.T_WC, fmt::format("frame {}: the camera is at", frame.index)));
-  const bool holds_all =
-      HoldsView(range, frame, frame.T_WC, config) &&
-      std::all_of(T_WL.begin(), T_WL.end(), [&](const auto& lattice) {
-        return HoldsView(range, frame, lattice.second.inverse() * frame.T_WC, config);
-      });
-  return holds_all ? Expected<void>{} : CheckPixels(range, frame, labels, T_WL, config);
+  if (HoldsAll(range, frame, T_WL, config)) return {};
+  return CheckPixels(range, frame, labels, T_WL, config);
+}
+
+cv::Mat WithoutBeyond(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels) {
+  const BlockMoves* moves = map.block_moves();
+  if (moves == nullptr) return labels;
+  const MapConfig& config = map.config();
+  const LatticeRange range(config.voxel_m);
+  const Lattices T_WL = moves->MovedLattices();
+  if (HoldsAll(range, frame, T_WL, config)) return labels;
+  cv::Mat held = labels.clone();
+  ForEachBeyond(range, frame, labels, T_WL, config, [&](const PixelBeyond& pixel) {
+    held.at<InstanceId>(pixel.v, pixel.u) = kNoInstance;
+    return true;
+  });
+  return held;
 }
 
 namespace {
@@ -213,8 +258,10 @@ Expected<void> CheckAddition(const MapConfig& config, InstanceId id, const TsdfG
   if (T_WO) {
     TSDFPP_RETURN_IF_ERROR(CheckTranslation(range, *T_WO, what + " is posed at"));
     // The pose at birth is kept too, where the lattice stays the object's own.
+    const Pose T_LO = T_WL.inverse() * *T_WO;
     TSDFPP_RETURN_IF_ERROR(
-        CheckTranslation(range, T_WL.inverse() * *T_WO, what + "'s pose in its own lattice is at"));
+        CheckTranslation(range, T_LO, what + "'s pose in its own lattice is at"));
+    TSDFPP_RETURN_IF_ERROR(CheckRigid(T_LO, what + "'s, in its own lattice, whose"));
   }
   TSDFPP_RETURN_IF_ERROR(CheckValues(config, volume, what));
   ObjectMove move;

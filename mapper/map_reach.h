@@ -10,8 +10,8 @@
 namespace tsdfpp {
 
 // Whether the frame is one at all: images of the camera's size and of the types that core/types.h
-// states and two pixels a side at least, a camera with focal lengths, a rigid camera pose. The mask
-// is that which is given.
+// states and two pixels a side at least, a camera with focal lengths, a rigid camera pose, a number
+// of 0 or more. The mask is that which is given.
 // Errors: kData, a sentence beginning with the frame's number. No pixel is looked at.
 Expected<void> CheckFrameForm(const Frame& frame, const cv::Mat& labels);
 // The same of what there is before segmentation: all but the mask.
@@ -25,6 +25,9 @@ Expected<void> CheckFrameForm(const Frame& frame);
 // image's corners, as far away as depth is valid, do not all lie in the range.
 Expected<void> CheckReach(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels,
                           const std::map<InstanceId, Pose>& T_WO);
+
+// The labels without those of pixels that CheckReach would refuse, which become kNoInstance.
+cv::Mat WithoutBeyond(const MapRepresentation& map, const Frame& frame, const cv::Mat& labels);
 
 // For Add(): the volume, where it is to be and the pose. Errors: kData, a sentence; kUsage where
 // there is no pose, and the lattice is not the world's.

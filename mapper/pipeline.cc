@@ -74,6 +74,13 @@ std::unique_ptr<Associator> MakeAssociator(
   std::abort();
 }
 
+// Poses that are as far from rigid as a frame's may be, multiplied, are none that a map takes.
+Frame WithRotations(Frame frame) {
+  frame.T_WC = NearestRigid(frame.T_WC);
+  for (auto& [id, T_WO] : frame.T_WO) T_WO = NearestRigid(T_WO);
+  return frame;
+}
+
 }  // namespace
 
 bool PipelineConfig::BleedingWaits() const {
@@ -174,7 +181,8 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
   StopWatch watch;
   TSDFPP_ASSIGN(const Segments segments, Segment(given));
   times.segment_s = watch.Lap();
-  const std::optional<Frame> frame = camera_->Locate(given, segments.IdsOfObjects(), *map_);
+  const std::optional<Frame> frame =
+      camera_->Locate(WithRotations(given), segments.IdsOfObjects(), *map_);
   times.locate_s = watch.Lap();
   if (!frame) return times;
   if (lost_ != nullptr) associator_->ExpectReturns(lost_->Awaited(*frame, *map_));
@@ -187,6 +195,7 @@ Expected<StepTimes> Pipeline::Process(const Frame& given) {
     if (lost_ != nullptr) lost_->Undo(found, *map_, T_WO_);
     return tl::unexpected(tracked.error());
   }
+  camera_->Accept();
   TakeOutLost(*frame, association, found, *tracked);
   times.track_s = watch.Lap();
   UpdatePoses(frame->index, std::move(tracked->T_WO));
@@ -333,13 +342,15 @@ cv::Mat Pipeline::RepairMasks(const Frame& frame, const TrackedFrame& tracked) {
         (status->second == TrackStatus::kBegun || status->second == TrackStatus::kTracked);
     if (!is_placed) unplaced.insert(id);
   }
-  return repair_->Repair(frame, tracked.labels, T_WO_, unplaced, *map_);
+  // Pixels have other objects than those of CheckReach(), and objects perhaps other lattices.
+  return WithoutBeyond(*map_, frame,
+                       repair_->Repair(frame, tracked.labels, T_WO_, unplaced, *map_));
 }
 
 void Pipeline::Fuse(const Frame& frame, const cv::Mat& labels) {
   map_->Fuse(frame, labels);
   CountWhileEmpty(frame, labels);
-  labels_ = labels;
+  labels_ = labels.clone();  // of images that whoever gave them may fill again
   farthest_m_ = std::max(farthest_m_, frame.T_WC.translation().cwiseAbs().maxCoeff());
 }
 

@@ -42,7 +42,7 @@ Expected<void> MaskRepairConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckRepair("take_voxels", take_voxels, 0, keep_voxels));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("sigma_voxels", sigma_voxels, 0.01, 100));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("own_factor", own_factor, 1, 1e6));
-  TSDFPP_RETURN_IF_ERROR(CheckRepair("cell_voxels", cell_voxels, 0.5, 100));
+  TSDFPP_RETURN_IF_ERROR(CheckRepair("cell_voxels", cell_voxels, 1, 100));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("confirm_frames", confirm_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("forget_frames", forget_frames, 1, 1'000'000));
   return {};

@@ -30,4 +30,9 @@ class InstanceFinder {
   virtual Expected<std::vector<Instance>> Find(const Frame& frame) = 0;
 };
 
+// What the finder finds in the frame, in its order. Errors: the finder's; kData, a sentence that
+// begins with the frame's number, where it finds more than ids can name (kNoInstance - 1), or what
+// is no Instance.
+Expected<std::vector<Instance>> FindInstances(InstanceFinder& finder, const Frame& frame);
+
 }  // namespace tsdfpp

@@ -91,7 +91,8 @@ Expected<std::vector<Instance>> FindGivingWay(InstanceFinder& finder, const Fram
   sched_setscheduler(0, SCHED_IDLE, &none);
   // A loop of OpenCV's within another is run by the thread that is in it.
   std::optional<Expected<std::vector<Instance>>> found;
-  cv::parallel_for_(cv::Range(0, 1), [&](const cv::Range&) { found = finder.Find(frame); });
+  cv::parallel_for_(cv::Range(0, 1),
+                    [&](const cv::Range&) { found = FindInstances(finder, frame); });
   return *std::move(found);
 }
 
@@ -191,7 +192,7 @@ Expected<Segments> InstanceSegments::Segment(const Frame& frame) {
     segments.ids = cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(kNoInstance));
     return segments;
   }
-  TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
+  TSDFPP_ASSIGN(const std::vector<Instance> instances, FindInstances(*finder_, frame));
   ++frames_;
   segments.ids = PaintInstances(instances, frame.depth.size());
   for (std::size_t i = 0; i < instances.size(); ++i) {
@@ -254,7 +255,7 @@ JoinedSegments::Search JoinedSegments::Begin(const Frame& frame) const {
   search.frame = frames_;
   search.found = std::async(std::launch::async, [finder = finder_, copy = std::move(copy),
                                                  gives_way = config_.gives_way] {
-    return gives_way ? FindGivingWay(*finder, copy) : finder->Find(copy);
+    return gives_way ? FindGivingWay(*finder, copy) : FindInstances(*finder, copy);
   });
   return search;
 }
@@ -273,7 +274,7 @@ Expected<Segments> JoinedSegments::Segment(const Frame& frame) {
   const bool is_asked = is_first || frames_ % config_.every == 0;
   if (is_first) search_.reset();
   if (is_first || (is_asked && config_.latency == 0)) {
-    TSDFPP_ASSIGN(const std::vector<Instance> instances, finder_->Find(frame));
+    TSDFPP_ASSIGN(const std::vector<Instance> instances, FindInstances(*finder_, frame));
     ++frames_;
     return known_.Set(depth.ids, instances);
   }

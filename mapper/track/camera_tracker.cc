@@ -73,6 +73,7 @@ CameraTracker::CameraTracker(CameraSource source, const SdfTrackConfig& config)
 
 std::optional<Frame> CameraTracker::Locate(const Frame& frame, const cv::Mat& segments,
                                            const MapRepresentation& map) {
+  located_ = {};
   if (source_ == CameraSource::kGiven) return frame;
   const bool begins = !ModelOf(map, kBackground);
   if (begins || !T_WC_first_) T_WC_first_ = frame.T_WC;
@@ -84,16 +85,25 @@ std::optional<Frame> CameraTracker::Locate(const Frame& frame, const cv::Mat& se
   const auto status = after.seen.find(kRoom);
   if (status != after.seen.end() && status->second == TrackStatus::kTracked) {
     T_WB_ = after.T_WO.at(kRoom);
-    ++log_.located;
-  } else if (!begins && source_ == CameraSource::kTrack) {
-    ++log_.lost;
-    return std::nullopt;
-  } else if (!begins) {
-    ++log_.carried_on;
+    ++located_.located;
+  } else if (!begins || status == after.seen.end() || status->second != TrackStatus::kBegun) {
+    // There is no room in sight, or it is not found.
+    if (source_ == CameraSource::kTrack) {
+      ++log_.lost;
+      return std::nullopt;
+    }
+    ++located_.carried_on;
   }
   assumed.T_WC = T_WB_.inverse() * assumed.T_WC;
-  log_.T_WC[frame.index] = assumed.T_WC;
+  located_.T_WC[frame.index] = assumed.T_WC;
   return assumed;
+}
+
+void CameraTracker::Accept() {
+  for (const auto& [index, T_WC] : located_.T_WC) log_.T_WC[index] = T_WC;
+  log_.located += located_.located;
+  log_.carried_on += located_.carried_on;
+  located_ = {};
 }
 
 }  // namespace tsdfpp

@@ -19,11 +19,14 @@ class CameraTracker {
 
   // The frame with T_WC as the map's background says: its pixels that `segments` (CV_16UC1) calls
   // kBackground, or all where it says nothing at all, are registered to it by the terms of
-  // SdfTracker, whose gates hold. Frames have the given pose until the map has a background.
-  // Nothing where the camera is lost. `map` holds what was fused before the frame. With kGiven the
-  // frame is as it was.
+  // SdfTracker, whose gates hold. A frame has the given pose if the map begins with its background;
+  // with kRefine also where the map has none yet. Nothing where the camera is lost, which with
+  // kTrack it is until there is a background. `map` holds what was fused before the frame. With
+  // kGiven the frame is as it was.
   std::optional<Frame> Locate(const Frame& frame, const cv::Mat& segments,
                               const MapRepresentation& map);
+  // The frame that was located last is mapped: the log has it from now on.
+  void Accept();
 
   // Empty with kGiven.
   const CameraLog& log() const { return log_; }
@@ -36,6 +39,7 @@ class CameraTracker {
   std::optional<Pose> T_WC_first_;
   SdfTracker tracker_;
   CameraLog log_;
+  CameraLog located_;  // what the frame located last adds
 };
 
 }  // namespace tsdfpp

@@ -28,8 +28,9 @@ constexpr double kLeastAlike = 0.3;
 constexpr double kLeastLikeness = 0.5;
 constexpr double kLeastLead = 0.1;
 constexpr int kEvery_frames = 3;
-// Searches in one frame, of the pairs of segments and objects that are the most alike, known
-// segments first: of a room there may be dozens of pieces with an object's colours.
+// Searches in one frame, of objects on trial, then of the pairs of segments and objects that are
+// the most alike, known segments first: of a room there may be dozens of pieces with an object's
+// colours.
 constexpr int kMostSearches = 8;
 
 // 255 at the pixels, else 0.
@@ -204,12 +205,20 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
   };
   const auto search = [&](Pair& pair) -> const Return& {
     if (!pair.searched) {
+      ++searches_;
       pair.searched = Find(pair.id, kept_.at(pair.id), frame, segments[pair.segment].pixels,
                            looks[pair.segment], pair.segment);
     }
     return *pair.searched;
   };
-  int searches = 0;
+  for (Pair& pair : pairs) {
+    const auto recalled = recalled_.find(pair.id);
+    if (recalled == recalled_.end() || segments[pair.segment].id != pair.id) continue;
+    pair.searched = recalled->second.found;
+    pair.searched->segment = pair.segment;
+  }
+  std::set<InstanceId> searched;
+  std::set<InstanceId> waiting;  // for their turn
   for (Pair& pair : pairs) {
     const Kept& kept = kept_.at(pair.id);
     if (kept.is_given_up && segments[pair.segment].id == pair.id) {
@@ -217,13 +226,19 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
       continue;
     }
     if (taken_ids.contains(pair.id) || taken_segments.contains(pair.segment)) continue;
-    if (kept.frames_asked % kEvery_frames != 0 || ++searches > kMostSearches) continue;
+    if (kept.frames_asked % kEvery_frames != 0) continue;
+    if (!pair.searched && searches_ >= kMostSearches) {
+      waiting.insert(pair.id);
+      continue;
+    }
+    searched.insert(pair.id);
     const Return& found = search(pair);
     if (!found.begins_anew) take(found);
   }
   std::set<InstanceId> asked;
   for (const Pair& pair : pairs) {
-    if (asked.insert(pair.id).second) ++kept_.at(pair.id).frames_asked;
+    const bool waits = waiting.contains(pair.id) && !searched.contains(pair.id);
+    if (!waits && asked.insert(pair.id).second) ++kept_.at(pair.id).frames_asked;
   }
   // Of the others, by their looks.
   std::erase_if(pairs, [&](const Pair& pair) { return !segments[pair.segment].may_begin; });
@@ -242,8 +257,20 @@ std::vector<LostObjects::Return> LostObjects::FindAgain(const Frame& frame,
              other.alike > pair.alike - kLeastLead;
     });
     if (pair.alike < kLeastLikeness || !is_clear) continue;
+    if (!pair.searched && searches_ >= kMostSearches) {
+      --kept.frames_in_sight;  // it is its turn in the next frame
+      continue;
+    }
     take(search(pair));
   }
+  // What was found, but has no segment any more, stays as it began anew.
+  for (auto& [id, recalled] : recalled_) {
+    if (taken_ids.contains(id)) continue;
+    kept_.erase(id);
+    on_trial_.insert_or_assign(id, std::move(recalled.trial));
+  }
+  recalled_.clear();
+  searches_ = 0;
   return returns;
 }
 
@@ -297,20 +324,29 @@ std::vector<InstanceId> LostObjects::TakeOut(const std::vector<InstanceId>& foun
 
 void LostObjects::AskTrials(const Frame& frame,
                             const std::map<InstanceId, LoosePixels>& pixels_of) {
-  for (auto trial = on_trial_.begin(); trial != on_trial_.end();) {
-    const auto& [before, frames_seen, frames_unseen] = trial->second;
-    const auto pixels = pixels_of.find(trial->first);
-    const bool is_asked = pixels != pixels_of.end() && frames_seen % kEvery_frames == 0;
-    const SegmentLook look =
-        is_asked ? LookAtSegment(frame, pixels->second, before.voxel_m, config_) : SegmentLook{};
-    if (!look.is_large || look.is_at_edge ||
-        Find(trial->first, before, frame, pixels->second, look, 0).begins_anew) {
-      ++trial;
-      continue;
-    }
-    KeepAsItWas(trial->first, before);
-    kept_.at(trial->first).is_missing = false;
-    trial = on_trial_.erase(trial);
+  std::vector<InstanceId> asked;
+  for (const auto& [id, trial] : on_trial_) {
+    if (pixels_of.contains(id) && trial.frames_seen % kEvery_frames == 0) asked.push_back(id);
+  }
+  // All have their turn.
+  std::rotate(asked.begin(), std::ranges::upper_bound(asked, last_trial_), asked.end());
+  searches_ = 0;
+  for (const InstanceId id : asked) {
+    const auto trial = on_trial_.find(id);
+    const Kept& before = trial->second.before;
+    const LoosePixels& pixels = pixels_of.at(id);
+    const SegmentLook look = LookAtSegment(frame, pixels, before.voxel_m, config_);
+    if (!look.is_large || look.is_at_edge) continue;
+    if (++searches_ > kMostSearches) break;
+    last_trial_ = id;
+    Return found = Find(id, before, frame, pixels, look, 0);
+    if (found.begins_anew) continue;
+    KeepAsItWas(id, before);
+    Kept& kept = kept_.at(id);
+    kept.is_missing = false;
+    found.model = kept.model;
+    recalled_.insert_or_assign(id, Recalled{std::move(trial->second), found});
+    on_trial_.erase(trial);
   }
 }
 

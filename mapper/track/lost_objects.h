@@ -46,7 +46,8 @@ class LostObjects {
   std::vector<InstanceId> TakeOut(const std::vector<InstanceId>& found, MapRepresentation& map,
                                   ObjectPoses& T_WO);
   // Of those that began anew, by the pixels that are theirs: keeps those as they were before of
-  // which FindModel() is certain now, so that FindAgain() finds them. Looks at every third frame.
+  // which FindModel() is certain now, so that FindAgain() finds them. Looks at every third frame,
+  // at eight objects at most, of which FindAgain() looks for so many fewer.
   void AskTrials(const Frame& frame, const std::map<InstanceId, LoosePixels>& pixels_of);
   // Of those that began anew: takes out of the map and of `T_WO`, and keeps as they were before,
   // those that were out of sight in return_frames frames before they were seen in as many. What
@@ -92,7 +93,8 @@ class LostObjects {
   // place. Where it is not, but the segment may begin a model, and looks like the object and like
   // no other that is missing, the object waits for return_frames frames in which such a segment is
   // in sight, twice as many where something covers it. A segment at the picture's edge is left
-  // alone. Looks for an object in every third of the frames that have a segment that is like it.
+  // alone. Looks for an object in every third of the frames that have a segment that is like it,
+  // for eight at most in a frame; the others have their turn in the next ones.
   std::vector<Return> FindAgain(const Frame& frame, std::span<const Segment> segments);
 
   // Puts a kept object where it was found, into the map and `T_WO`; one that begins anew into
@@ -131,6 +133,14 @@ class LostObjects {
     int frames_unseen = 0;
   };
   std::map<InstanceId, Trial> on_trial_;
+  InstanceId last_trial_ = 0;  // that was searched for
+  // Those that AskTrials() keeps, and where it found them, until FindAgain() has.
+  struct Recalled {
+    Trial trial;
+    Return found;
+  };
+  std::map<InstanceId, Recalled> recalled_;
+  int searches_ = 0;  // in this frame
 };
 
 }  // namespace tsdfpp

@@ -12,6 +12,9 @@
 namespace tsdfpp {
 namespace {
 
+// Of products of some that are off by no more CheckRigid still takes the least rigid.
+constexpr double kRigidInProducts = kRigidTolerance / 100;
+
 std::string TextOfPoint(const Eigen::Vector3d& p) {
   return fmt::format("({:.6g}, {:.6g}, {:.6g}) m", p.x(), p.y(), p.z());
 }
@@ -69,6 +72,16 @@ Expected<void> CheckRigid(const Pose& T, std::string_view whose) {
         whose, off, kRigidTolerance, R.determinant());
   }
   return {};
+}
+
+Pose NearestRigid(const Pose& T) {
+  const Eigen::Matrix3d R = T.linear();
+  if ((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidInProducts) {
+    return T;
+  }
+  Pose rigid = T;
+  rigid.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
+  return rigid;
 }
 
 Expected<void> CheckMoved(const LatticeRange& range, const ObjectMove& move, int slack_blocks,

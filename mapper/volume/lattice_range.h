@@ -48,6 +48,9 @@ inline constexpr double kRigidTolerance = 1e-6;
 // What R R^T may be off by is kRigidTolerance. Errors: kData, a fragment that begins with `whose`.
 Expected<void> CheckRigid(const Pose& T, std::string_view whose);
 
+// A pose that CheckRigid takes, as rigid as products of it have to be: as it is where it is.
+Pose NearestRigid(const Pose& T);
+
 // Whether an object's blocks lie in the range once they are moved. Errors: kData, beginning with
 // `what`, which ends as a place can follow.
 Expected<void> CheckMoved(const LatticeRange& range, const ObjectMove& move, int slack_blocks,

@@ -151,6 +151,17 @@ TEST_F(SegmentCommand, MasksOfAFolder) {
   const Frame frame = test::BoxSource(4).Read(0).value();
   EXPECT_EQ(cv::countNonZero((ids == 1) != (frame.mask == 3)), 0);
   EXPECT_EQ(cv::countNonZero((ids == 2) != (frame.mask == 8)), 0);
+  constexpr const char* kNothing = "no frame has a segment beside the background";
+  EXPECT_EQ(run.err.find(kNothing), std::string::npos);
+  // A network may say the same of every frame, and ends as one that found all.
+  for (int i = 0; i < 4; ++i) {
+    const std::string mask = (folder_ / fmt::format("masks/{:06d}.png", i)).string();
+    ASSERT_TRUE(cv::imwrite(mask, cv::Mat(frame.mask.size(), CV_16UC1, cv::Scalar(0))));
+  }
+  const CommandOutput none =
+      Run({"--segmentation", "network", "--masks", folder_ / "masks"}, recording);
+  EXPECT_EQ(none.exit_code, 0) << none.err;
+  EXPECT_NE(none.err.find(kNothing), std::string::npos) << none.err;
 }
 
 // Our own network, every second frame: between them there are no segments.

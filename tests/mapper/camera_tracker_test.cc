@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/units.h"
 #include "mapper/pipeline.h"
+#include "mapper/volume/lattice_range.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/toy_scene.h"
 
@@ -150,6 +153,54 @@ TEST(CameraTracker, LeavesAFrameOutWhereTheCameraIsLost) {
 }
 
 // Refined, such a frame is mapped where the given motion since the last one puts it.
+// The first pose alone is given: where there is no room, no other is taken.
+TEST(CameraTracker, IsLostWhereNoFrameShowsTheRoom) {
+  for (const CameraSource source : {CameraSource::kTrack, CameraSource::kRefine}) {
+    Pipeline pipeline(ConfigOf(source), Toys());
+    for (int i = 1; i <= 3; ++i) {
+      Frame frame = Room(i);
+      frame.mask.setTo(kBrick);
+      ASSERT_TRUE(pipeline.Process(frame));
+    }
+    const CameraLog& log = pipeline.camera_log();
+    EXPECT_EQ(log.located, 0);
+    EXPECT_EQ(log.lost, source == CameraSource::kTrack ? 3 : 0);
+    EXPECT_EQ(log.carried_on, source == CameraSource::kRefine ? 3 : 0);
+    EXPECT_EQ(log.T_WC.size(), source == CameraSource::kTrack ? 0U : 3U);
+    const std::vector<std::string> remarks = pipeline.Remarks();
+    EXPECT_TRUE(std::ranges::any_of(remarks, [](const std::string& remark) {
+      return remark.find("the camera was not found in 3 of 3 frames") != std::string::npos;
+    }));
+  }
+}
+
+// Their products with what was found are rigid, too.
+TEST(CameraTracker, TakesPosesThatAreJustRigid) {
+  const Eigen::Matrix3d slant =
+      Eigen::Matrix3d::Identity() + 0.45 * kRigidTolerance * Eigen::Matrix3d::Ones();
+  for (const CameraSource source : {CameraSource::kTrack, CameraSource::kRefine}) {
+    Pipeline pipeline(ConfigOf(source), Toys());
+    for (int i = 1; i <= kFrames; ++i) {
+      Frame frame = Room(i);
+      frame.T_WC.linear() = slant * frame.T_WC.linear();
+      ASSERT_TRUE(pipeline.Process(frame));
+    }
+    ExpectFound(pipeline, kFrames);
+  }
+}
+
+// Of what is refused nothing is mapped.
+TEST(CameraTracker, DoesNotCountRefusedFrames) {
+  Pipeline pipeline(ConfigOf(CameraSource::kRefine), Toys());
+  for (int i = 1; i <= 3; ++i) ASSERT_TRUE(pipeline.Process(Room(i)));
+  const CameraLog before = pipeline.camera_log();
+  Frame far = Room(4);
+  far.T_WO[kBrick] = Pose(Eigen::Translation3d(1e9, 0, 0));
+  EXPECT_FALSE(pipeline.Process(far));
+  EXPECT_EQ(pipeline.camera_log().located, before.located);
+  EXPECT_FALSE(pipeline.camera_log().T_WC.contains(4));
+}
+
 TEST(CameraTracker, GoesOnByTheGivenMotionWhereTheBackgroundIsOutOfSight) {
   Pipeline pipeline(ConfigOf(CameraSource::kRefine), Toys());
   const Pose off = MakePose(0.5 * kDegree, {1, 0, 1}, {0.01, 0, -0.01});

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -13,6 +14,8 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "mapper/segment/joined_segments.h"
 
@@ -241,6 +244,64 @@ TEST(JoinedSegments, AnErrorOfTheFinderComesWithItsLatency) {
   const auto wrong = segmenter.Segment(BoxFrame(5));
   ASSERT_FALSE(wrong.has_value());
   EXPECT_EQ(wrong.error().message, "frame 3: no");
+}
+
+// A program's own finder may give anything.
+TEST(FindInstances, SaysWhatIsNoInstance) {
+  class Given : public InstanceFinder {
+   public:
+    explicit Given(std::vector<Instance> instances) : instances_(std::move(instances)) {}
+    Expected<std::vector<Instance>> Find(const Frame&) override { return instances_; }
+
+   private:
+    std::vector<Instance> instances_;
+  };
+  const Instance good = BoxOf({1, 0, 3, 4}, "box", 1);
+  const auto with = [&](const auto& change) {
+    Instance instance = good;
+    change(instance);
+    return std::vector<Instance>{good, instance};
+  };
+  constexpr int kBig = std::numeric_limits<int>::max();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<std::pair<std::vector<Instance>, std::string>> cases{
+      {with([](Instance& i) { i.box.x = 2; }), "a box of 3 x 4 pixels at (2, 0), expected one in"},
+      {with([](Instance& i) { i.box.y = -1; }), "in the image of 4 x 4"},
+      {with([](Instance& i) { i.box.width = -3; }), "a box of -3 x 4"},
+      {with([](Instance& i) {
+         i.box = {kBig, kBig, kBig, kBig};
+       }),
+       "a box of 2147483647"},
+      {with([](Instance& i) { i.mask = i.mask.rowRange(0, 3); }), "a mask of 3 x 3 pixels"},
+      {with([](Instance& i) { i.mask = cv::Mat(); }), "a mask of 0 x 0 pixels"},
+      {with([](Instance& i) { i.mask.convertTo(i.mask, CV_32F); }),
+       "type CV_32FC1, expected 3 x 4"},
+      {with([](Instance& i) { i.semantic_class = ""; }), "no class"},
+      {with([](Instance& i) { i.score = kNan; }), "a score of nan, expected 0 to 1"},
+      {with([](Instance& i) { i.score = -0.1F; }), "a score of -0.1"},
+      {std::vector<Instance>(kNoInstance, good), "65535 instances, expected 65534 at most"},
+  };
+  Frame frame;
+  frame.index = 7;
+  frame.intrinsics = {4, 4, 5, 5, 1.5, 1.5};
+  frame.depth = cv::Mat(4, 4, CV_32FC1, cv::Scalar(1));
+  for (const auto& [instances, words] : cases) {
+    NetworkConfig config;
+    InstanceSegments alone(std::make_shared<Given>(instances), config);
+    JoinedSegments joined(std::make_shared<Given>(instances), config, DepthSegmentsConfig{});
+    for (Segmenter* segmenter :
+         {static_cast<Segmenter*>(&alone), static_cast<Segmenter*>(&joined)}) {
+      const auto segments = segmenter->Segment(frame);
+      ASSERT_FALSE(segments.has_value()) << words;
+      EXPECT_EQ(segments.error().kind, ErrorKind::kData);
+      EXPECT_TRUE(segments.error().message.starts_with("frame 7: ")) << segments.error().message;
+      EXPECT_NE(segments.error().message.find(words), std::string::npos)
+          << segments.error().message;
+    }
+  }
+  // What it may be at most.
+  Given edge({BoxOf({0, 0, 4, 4}, "box", 0), BoxOf({4, 4, 0, 0}, "none", 1)});
+  EXPECT_TRUE(FindInstances(edge, frame).has_value());
 }
 
 }  // namespace

@@ -6,8 +6,10 @@
 #include <limits>
 
 #include "mapper/map_file.h"
+#include "mapper/map_reach.h"
 #include "mapper/pipeline.h"
 #include "mapper/volume/lattice_range.h"
+#include "mapper/voxel_inspection.h"
 #include "tests/mapper/dyadic_scene.h"
 #include "tests/mapper/every_method.h"
 
@@ -163,6 +165,110 @@ TEST(PipelineForm, WhatNoNumberCanHoldIsRefused) {
       EXPECT_TRUE(pipeline.Process(DyadicFrame(2)).has_value());
     }
   }
+}
+
+// Products of poses that a frame may just have are none that a map takes: here of an object's with
+// that at its birth, when masks that merged two objects are repaired.
+TEST(PipelineForm, PosesThatAreJustRigidCanBeMapped) {
+  constexpr double kMerged_frames = 5;
+  for (const Method method : {Method::kTsdfppAnchored, Method::kVolumes, Method::kTsdfpp}) {
+    for (const double share : {0.22, 0.49}) {
+      SCOPED_TRACE(fmt::format("{}, {}", MethodName(method), share));
+      PipelineConfig config;
+      config.map = ToyConfig();
+      config.method = method;
+      config.mask_repair = MaskRepairMode::kOn;
+      config.repair.confirm_frames = 1;
+      Pipeline pipeline(config, {});
+      for (int i = 1; i <= 8; ++i) {
+        reference::Scene scene = TableOnly();
+        AddBrick(scene, 0.3, {-0.1 + 0.004 * i, 0.03, kTableTop_m + 0.045});
+        AddBall(scene, {0.05 + 0.004 * i, 0.03, kTableTop_m + 0.055});
+        Frame frame = reference::Render(scene, CircleCamera(0.02 * i), i,
+                                        {192, 144, 160.0, 160.0, 95.5, 71.5});
+        for (auto& [id, T_WO] : frame.T_WO) T_WO.linear() *= 1 + share * kRigidTolerance;
+        if (i <= kMerged_frames) frame.mask.setTo(kBrick, frame.mask == static_cast<double>(kBall));
+        const auto status = pipeline.Process(frame);
+        ASSERT_TRUE(status.has_value()) << status.error().message;
+        const auto bytes = MapToBytes(pipeline.map());
+        ASSERT_TRUE(bytes.has_value());
+        const auto again = MapFromBytes(*bytes, "the map");
+        ASSERT_TRUE(again.has_value()) << again.error().message;
+      }
+    }
+  }
+}
+
+// Nor is anything added that could not be read again.
+TEST(PipelineForm, AnAdditionIsRigidInItsOwnLattice) {
+  const auto from = MakeMap(Method::kTsdfppAnchored, DyadicConfig());
+  const Frame frame = DyadicFrame(0);
+  SetPosesThenFuse(*from, frame);
+  Pose T = Pose::Identity();
+  T.linear() *= 1 + 0.49 * kRigidTolerance;
+  const TsdfGrid& grid = *VoxelsOf(*from).GridOf(kBrick);
+  EXPECT_FALSE(CheckAddition(from->config(), 5, grid, T, T.inverse()));
+  T.linear() = Eigen::Matrix3d::Identity();
+  EXPECT_TRUE(CheckAddition(from->config(), 5, grid, T, T.inverse()));
+}
+
+// A pixel of the background that a repaired mask gives to an object may lie beyond the range of the
+// object's lattice, which the check of the given masks could not know.
+TEST(PipelineForm, RepairedMasksLeaveOutWhatLiesBeyond) {
+  for (const Method method : {Method::kTsdfppAnchored, Method::kVolumes}) {
+    PipelineConfig config;
+    config.map = ToyConfig();
+    config.method = method;
+    config.mask_repair = MaskRepairMode::kOn;
+    config.repair.confirm_frames = 1;
+    config.repair.take_voxels = 1;
+    Pipeline pipeline(config, {{kBackground, "background", ""}, {1, "plate", ""}});
+    const double reach_m = LatticeRange(kToyVoxel_m).reach_m;
+    const Eigen::Vector3d at(reach_m - 0.06 + 0.004, 0, 0);
+    const Eigen::Vector3d inwards(-(reach_m - 1), 0, 0);
+    const auto plate = [&](int i, const Eigen::Vector3d& moved, const Eigen::Vector3d& eye) {
+      reference::Scene scene;
+      scene.shapes.push_back(
+          reference::Cuboid(1, {200, 30, 30}, Pose::Identity(), {0.004, 0.12, 0.12}));
+      scene.T_WO[1] = reference::MakePose(0, Eigen::Vector3d::UnitZ(), at + moved);
+      return reference::Render(scene, reference::LookAt(eye + moved, at + moved), i,
+                               {128, 96, 260.0, 260.0, 63.5, 47.5});
+    };
+    for (int i = 1; i <= 6; ++i) {
+      ASSERT_TRUE(pipeline.Process(
+          plate(i, Eigen::Vector3d::Zero(), at + Eigen::Vector3d(-0.3, -0.95 - 0.02 * i, 0.02))));
+    }
+    // Moved inwards, seen head on and taken for the background.
+    for (int i = 7; i <= 12; ++i) {
+      Frame frame = plate(i, inwards, at + Eigen::Vector3d(-0.9, 0.01 * i, 0.02));
+      frame.mask.setTo(i >= 8 ? kBackground : kNoInstance);
+      EXPECT_TRUE(pipeline.Process(frame)) << i;
+    }
+  }
+}
+
+TEST(PipelineForm, NegativeNumbersAreRefused) {
+  PipelineConfig config;
+  config.map = DyadicConfig();
+  Pipeline pipeline(config, {});
+  Frame frame = DyadicFrame(0);
+  frame.index = std::numeric_limits<int>::min();
+  const auto status = pipeline.Process(frame);
+  ASSERT_FALSE(status.has_value());
+  EXPECT_EQ(status.error().message,
+            "frame -2147483648: its number is negative, expected 0 or more");
+}
+
+// A camera's buffers are filled again.
+TEST(PipelineForm, LabelsAreTheMapsOwn) {
+  PipelineConfig config;
+  config.map = DyadicConfig();
+  Pipeline pipeline(config, {});
+  Frame frame = DyadicFrame(0);
+  ASSERT_TRUE(pipeline.Process(frame).has_value());
+  const cv::Mat before = pipeline.labels().clone();
+  frame.mask.setTo(9);
+  EXPECT_EQ(cv::norm(before, pipeline.labels(), cv::NORM_INF), 0);
 }
 
 // Segments of depth and networks see a frame first of all.

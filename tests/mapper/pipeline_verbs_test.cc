@@ -104,6 +104,7 @@ const std::map<std::string, std::string>& AllowedReaders() {
   static const std::map<std::string, std::string> readers{
       {"mapper/segment/given_masks.cc frame.mask", "the verb whose answer it is"},
       {"mapper/track/given_poses.cc frame.T_WO", "the verb whose answer it is"},
+      {"mapper/segment/instance_finder.cc instance.mask", "what a network found"},
       {"mapper/methods/object_volume_map.cc added.T_WO", "the map's own pose of an object"},
       {"mapper/methods/object_volume_map.cc volume.T_WO", "the map's own pose of an object"},
       {"mapper/methods/surfel_map.cc object.T_WO", "the map's own pose of an object"},
@@ -111,6 +112,7 @@ const std::map<std::string, std::string>& AllowedReaders() {
       {"mapper/volume/object_volume.h volume.T_WO", "the map's own pose of an object"},
       {"mapper/volume/freeing.cc volume.T_WO", "whether the map has a pose of an object"},
       {"mapper/pipeline.cc tracked.T_WO", "what the tracker answered"},
+      {"mapper/pipeline.cc frame.T_WO", "made rotations, for the verb that reads them"},
       {"mapper/track/lost_objects.cc found.T_WO", "where a lost object was found"},
       {"mapper/track/lost_objects.cc kept.T_WO", "where the map had a lost object"},
       {"mapper/track/camera_tracker.cc after.T_WO", "the tracker's answer"},
