@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "cli/command.h"
 #include "cli/sweep_progress.h"
@@ -48,6 +49,10 @@ Expected<CommandResult> Describe(const BenchSet& set) {
 Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments& options) {
   if (options.out.empty()) return UsageError("--out is required with --run");
   TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
+  std::set<std::string> methods;
+  for (const std::string& method : SplitList(options.run)) {
+    if (!methods.insert(method).second) return UsageError("--run names {} twice", method);
+  }
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
   SweepOptions sweep;
   sweep.out = std::filesystem::path(options.out) / "work";
@@ -75,6 +80,14 @@ Expected<CommandResult> RunBenchSet(const BenchSetArguments& options) {
   if (!options.leaderboard.empty()) {
     TSDFPP_ASSIGN(const std::string page, Leaderboard(set, options.leaderboard));
     if (options.out.empty()) return CommandResult{{{"page", page}}, page};
+    const std::filesystem::path out(options.out);
+    std::error_code ignored;
+    const bool is_beside = std::filesystem::equivalent(
+        out.has_parent_path() ? out.parent_path() : ".", options.leaderboard, ignored);
+    if (is_beside && out.extension() == ".json") {
+      return UsageError("--out '{}' would be one of the results of '{}', expected another place",
+                        options.out, options.leaderboard);
+    }
     TSDFPP_RETURN_IF_ERROR(WriteFile(options.out, page));
     return CommandResult{{{"page", options.out}}, fmt::format("{}\n", options.out)};
   }

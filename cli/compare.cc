@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <charconv>
 #include <utility>
 
 #include "cli/command.h"
@@ -57,6 +58,16 @@ Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSourc
   if (plan.frame < info.first_index || plan.frame > last) {
     return UsageError("--reveal {} is out of range: {} has frames {} to {}", plan.frame, info.name,
                       info.first_index, last);
+  }
+  int until = last;
+  const std::string& text = options.config.until;
+  std::from_chars(text.data(), text.data() + text.size(), until);
+  if (options.reveal > until) {
+    return UsageError("--reveal {} is after --until {}, expected a frame that is mapped",
+                      options.reveal, until);
+  }
+  if (!options.removed.empty() && SplitList(options.removed).empty()) {
+    return UsageError("--removed '{}' names no object", options.removed);
   }
   if (!options.removed.empty()) {
     TSDFPP_ASSIGN(plan.removed, FindObjects(info, SplitList(options.removed)));

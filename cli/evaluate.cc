@@ -39,6 +39,9 @@ Expected<CommandResult> RunEvaluateCommand(const EvaluateArguments& options, boo
     }
     config.frames.push_back(frame);
   }
+  if (!options.removed.empty() && SplitList(options.removed).empty()) {
+    return UsageError("--removed '{}' names no object", options.removed);
+  }
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
   FrameSource* const source = opened.source.get();
   TSDFPP_ASSIGN(const std::vector<InstanceId> removed,

@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "cli/command.h"
 #include "cli/map_start.h"
@@ -121,6 +122,38 @@ bool IsOfTheRun(const std::filesystem::path& save, const std::filesystem::path& 
 }
 
 // Before anything is mapped, which may take long.
+// What a run reads: files, and folders as a whole. The map of --load may take its own place.
+std::vector<std::string> ReadBeside(const MapArguments& options) {
+  return {options.source.path,
+          options.source.calibration,
+          options.segmentation.depth_config,
+          options.segmentation.model,
+          options.segmentation.masks,
+          options.segmentation.network_config,
+          options.votes,
+          options.repair.config,
+          options.tracking.config};
+}
+
+// Whether the file is, or would be, `place` or in it.
+bool LiesIn(const std::filesystem::path& file, const std::string& place) {
+  namespace fs = std::filesystem;
+  std::error_code failure;
+  if (place.empty() || !fs::exists(place, failure)) return false;
+  const fs::path way =
+      fs::weakly_canonical(file, failure).lexically_relative(fs::weakly_canonical(place, failure));
+  return !way.empty() && *way.begin() != "..";
+}
+
+Expected<void> CheckSaveReplacesNothingRead(const MapArguments& options) {
+  for (const std::string& read : ReadBeside(options)) {
+    if (options.save.empty() || !LiesIn(options.save, read)) continue;
+    return UsageError("--save '{}' lies in '{}', which is read, expected another place",
+                      options.save, read);
+  }
+  return {};
+}
+
 Expected<void> CheckOutputs(const MapArguments& options, int frames) {
   if (options.views > 0 && frames == 0) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
@@ -233,6 +266,7 @@ CommandResult ResultOf(const MapArguments& options, const MapStart& start, nlohm
 
 Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app) {
   TSDFPP_ASSIGN(const MeshFormat mesh_format, MeshFormatFromName(options.mesh_format));
+  TSDFPP_RETURN_IF_ERROR(CheckSaveReplacesNothingRead(options));
   TSDFPP_ASSIGN(const MapStart start, Start(options, app));
   std::vector<InstanceId> removed;
   // With votes the map's objects are known once it is made.

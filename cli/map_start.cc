@@ -183,6 +183,10 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
     }
     const int end = start.info.first_index + start.info.frame_count - 1;
     start.last = until < 0 ? end : until;
+    if (until < 0 && start.last < start.first) {
+      return UsageError("--load {} goes to frame {}, and {} has none after it", file,
+                        run.last_frame, start.info.name);
+    }
     if (start.last < start.first || start.last > end) {
       return UsageError(
           "--until {} is out of range: {} has frames up to {}, and --load {} goes to {}",

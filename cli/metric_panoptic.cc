@@ -50,8 +50,11 @@ Expected<PanopticEvaluation> EvaluateFolders(const MetricPanopticArguments& opti
     if (!things.empty()) {
       return UsageError("--things does not go with --encoding coco, whose JSON names them");
     }
-    return EvaluateCoco(CocoFolderOf(options.truth, options.truth_json),
-                        CocoFolderOf(options.prediction, options.prediction_json));
+    auto evaluation =
+        EvaluateCoco(CocoFolderOf(options.truth, options.truth_json),
+                     CocoFolderOf(options.prediction, options.prediction_json), &remarks);
+    for (const std::string& remark : remarks) spdlog::warn("{}", remark);
+    return evaluation;
   }
   if (!options.truth_json.empty() || !options.prediction_json.empty()) {
     return UsageError("--gt-json and --pred-json go with --encoding coco only");

@@ -1,7 +1,5 @@
 #include "cli/stop_on_signal.h"
 
-#include <csignal>
-
 #include "core/guard.h"
 
 namespace tsdfpp {
@@ -21,11 +19,15 @@ StopOnSignal::StopOnSignal() {
   struct sigaction action {};
   action.sa_handler = OnSignal;
   action.sa_flags = SA_RESETHAND;  // and no SA_RESTART: waiting ends
-  for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], nullptr, &before_[i]);
+    // Who called this ignores it, as of what runs in the background, and so does this.
+    if (before_[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
+  }
 }
 
 StopOnSignal::~StopOnSignal() {
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before_[i], nullptr);
 }
 
 const std::atomic<bool>& StopOnSignal::stop() { return stop_asked; }

@@ -30,6 +30,12 @@ Expected<cv::Mat> DecodeBytes(std::string_view bytes, const std::string& where, 
     return DataError("{}: is to be turned or mirrored, orientation {}, expected 1", where,
                      header.orientation);
   }
+  if (header.format == ImageFormat::kJpeg && !IsWholeJpeg(bytes)) {
+    return DataError("{}: ends before its image does, expected a whole JPEG", where);
+  }
+  if (as == DecodeAs::kNumbers && header.format == ImageFormat::kJpeg) {
+    return DataError("{}: is a JPEG, whose values are approximate, expected another format", where);
+  }
   if (as == DecodeAs::kNumbers && header.is_stretched) {
     return DataError(
         "{}: its values are stretched to 0 to 255 when they are read, expected 8 or 16 bits a "

@@ -23,9 +23,9 @@ enum class DecodeAs {
 using HeaderCheck = std::function<Expected<void>(const ImageHeader&, std::string_view bytes)>;
 
 // As stored: what a JPEG says of turning it is not followed. Errors: kData, beginning with `where`:
-// those of ReadImageHeader and of `check`; a TIFF that is to be turned; for kNumbers values that a
-// decoder stretches; pixels that cannot be decoded, or are of another size than the header says. An
-// EXR image is decoded from its file only: see below.
+// those of ReadImageHeader and of `check`; a TIFF that is to be turned; a JPEG that is cut; for
+// kNumbers any JPEG, and values that a decoder stretches; pixels that cannot be decoded, or are of
+// another size than the header says. An EXR image is decoded from its file only: see below.
 Expected<cv::Mat> DecodeImage(std::string_view bytes, const std::string& where,
                               DecodeAs as = DecodeAs::kAsItIs, const HeaderCheck& check = {});
 

@@ -45,6 +45,8 @@ class FrameSource {
   // The same frame as it was, where Read() gives what a sensor with faults made of it: true depth,
   // mask and camera pose, for evaluation only; colour as Read()'s. Errors: those of Read().
   virtual Expected<Frame> ReadTrue(int index) { return Read(index); }
+  // Whether there are true surfaces; those in files may be unreadable all the same.
+  virtual bool HasTruth() const { return true; }
   // The true surfaces, for evaluation only. Error kData where the source has none.
   virtual Expected<std::vector<TrueModel>> Truth() = 0;
 };

@@ -223,6 +223,33 @@ std::optional<ImageHeader> HeaderOf(std::string_view bytes) {
 
 }  // namespace
 
+bool IsWholeJpeg(std::string_view bytes) {
+  HeaderBytes file(bytes);
+  bool in_scan = false;
+  for (std::size_t at = 2; file.ok();) {
+    const auto byte = file.Big(at, 1);
+    if (byte != 0xFF) {
+      if (!in_scan) return false;
+      at = bytes.find('\xff', at);
+      continue;
+    }
+    const auto marker = file.Big(at + 1, 1);
+    if (marker == 0xFF) {  // filling
+      ++at;
+      continue;
+    }
+    at += 2;
+    if (marker == 0xD9) return file.ok();
+    // A byte 0xFF of the scan's data, a restart in it, or a marker without a length.
+    if (marker == 0 || marker == 0x01 || (marker >= 0xD0 && marker <= 0xD8)) continue;
+    const auto length = file.Big(at, 2);
+    if (length < 2) return false;
+    in_scan = marker == 0xDA;
+    at += length;
+  }
+  return false;
+}
+
 Expected<ImageHeader> ReadImageHeader(std::string_view bytes, std::string_view where) {
   const auto header = HeaderOf(bytes);
   if (!header || header->width < 1 || header->height < 1) {

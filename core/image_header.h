@@ -24,6 +24,10 @@ struct ImageHeader {
   bool is_stretched = false;
 };
 
+// Whether a JPEG's segments and scans go on to its end-of-image marker. Decoders fill up what a cut
+// one lacks, and say nothing.
+bool IsWholeJpeg(std::string_view bytes);
+
 // By the bytes, not by the file's name. `where` begins the sentence. Errors: kData where the format
 // is none of these, the header is cut short or says something that cannot be, and where the size is
 // over the limits image_side or image_pixels.

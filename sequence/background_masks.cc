@@ -12,6 +12,7 @@ class BackgroundSource : public FrameSource {
   bool IsSensed() const override { return source_->IsSensed(); }
   Expected<Frame> Read(int index) override { return WithMask(source_->Read(index)); }
   Expected<Frame> ReadTrue(int index) override { return WithMask(source_->ReadTrue(index)); }
+  bool HasTruth() const override { return source_->HasTruth(); }
   Expected<std::vector<TrueModel>> Truth() override { return source_->Truth(); }
 
  private:

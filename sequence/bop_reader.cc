@@ -13,6 +13,7 @@
 #include "sequence/bop_instances.h"
 #include "sequence/bop_layout.h"
 #include "sequence/dataset_readers.h"
+#include "sequence/image_files.h"
 #include "sequence/pose_matrix.h"
 #include "sequence/text_lines.h"
 
@@ -61,7 +62,9 @@ Expected<std::map<int, nlohmann::json>> ReadByImage(const fs::path& path) {
   for (const auto& [key, value] : json.items()) {
     const auto number = ParseWholeNumber(key);
     if (!number) return DataError("{}: '{}' is not the number of an image", path.string(), key);
-    images.emplace(*number, value);
+    if (!images.emplace(*number, value).second) {
+      return DataError("{}: image {} is there twice", path.string(), *number);
+    }
   }
   return images;
 }
@@ -83,7 +86,8 @@ class BopOpener {
   Expected<std::unique_ptr<DatasetSource>> Open() {
     // Where a scene alone is named, its models lie beside it in the dataset.
     TSDFPP_ASSIGN(const fs::path models, DataFolder(dataset_).Find("models"));
-    if (Exists(models)) TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(models));
+    sequence_.has_truth = Exists(models);
+    if (sequence_.has_truth) TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(models));
     TSDFPP_RETURN_IF_ERROR(ReadCameras());
     if (Exists(scene_ / bop::kTruth)) {
       TSDFPP_RETURN_IF_ERROR(ReadTruth());
@@ -132,9 +136,8 @@ class BopOpener {
       frame.camera = {0, 0, (*k)[0], (*k)[4], (*k)[2], (*k)[5]};
       frame.depth_units_per_m = bop::kMillimetres / scale->get<double>();
       frame.depth = scene_ / bop::ImageFile("depth", number);
-      frame.colour = scene_ / bop::ImageFile("rgb", number);
-      const fs::path jpeg = scene_ / bop::ImageFile("rgb", number, "jpg");
-      if (!Exists(frame.colour) && Exists(jpeg)) frame.colour = jpeg;
+      TSDFPP_ASSIGN(frame.colour, OnlyOneOf(scene_ / bop::ImageFile("rgb", number),
+                                            scene_ / bop::ImageFile("rgb", number, "jpg")));
       if (json.contains("cam_R_w2c")) {
         TSDFPP_ASSIGN(const Pose T_CW, PoseOf(json, "cam_R_w2c", "cam_t_w2c", where));
         frame.T_WC = T_CW.inverse();
@@ -146,6 +149,11 @@ class BopOpener {
     if (placed != 0 && placed != cameras.size()) {
       return DataError("{}: {} of {} images have cam_R_w2c, expected all or none", path.string(),
                        placed, cameras.size());
+    }
+    if (placed != 0 && options_.fixed_camera) {
+      return UsageError(
+          "{}: has camera poses, expected none where the camera is to be taken as fixed",
+          path.string());
     }
     if (placed == 0 && !options_.fixed_camera) {
       return DataError(

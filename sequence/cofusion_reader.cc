@@ -96,6 +96,15 @@ class CofusionSource : public FrameSource {
   }
   Expected<Frame> ReadTrue(int index) override { return ReadFrame(index, false, false, {}); }
 
+  bool HasTruth() const override {
+    const fs::path models = folder_ / cofusion::kModels;
+    if (!expected_models_.empty()) return true;
+    if (!Exists(models)) return false;
+    const auto names = NamesIn(models);
+    return !names || std::ranges::any_of(*names, [](const std::string& name) {
+      return cofusion::ObjectOf(name, "", ".ply").has_value();
+    });
+  }
   Expected<std::vector<TrueModel>> Truth() override {
     const fs::path models = folder_ / cofusion::kModels;
     for (const std::string& file : expected_models_) {

@@ -102,14 +102,14 @@ Expected<ExportReport> ExportSequence(FrameSource& source, DatasetFormat format,
                                       const std::function<void(int, int)>& progress,
                                       const std::atomic<bool>* stop) {
   const SequenceInfo& info = source.info();
-  // A source without true surfaces is exported without.
-  auto truth = source.Truth();
-  const bool has_models = truth.has_value() && !truth->empty();
+  std::vector<TrueModel> truth;
+  if (source.HasTruth()) {
+    TSDFPP_ASSIGN(truth, source.Truth());
+  }
+  const bool has_models = !truth.empty();
   TSDFPP_RETURN_IF_ERROR(CheckReplaceable(out, false));
   StagingFolder staging(out);
-  TSDFPP_ASSIGN(const auto writer,
-                MakeWriter(format, info, staging.path(),
-                           truth ? std::move(*truth) : std::vector<TrueModel>{}));
+  TSDFPP_ASSIGN(const auto writer, MakeWriter(format, info, staging.path(), std::move(truth)));
   TSDFPP_RETURN_IF_ERROR(staging.Make());
   bool with_mask = false;
   bool has_poses = false;

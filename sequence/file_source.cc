@@ -77,6 +77,7 @@ class FileSource : public DatasetSource {
     return frame;
   }
 
+  bool HasTruth() const override { return sequence_.has_truth; }
   Expected<std::vector<TrueModel>> Truth() override {
     if (sequence_.truth) return sequence_.truth(info_);
     return DataError(
@@ -160,9 +161,24 @@ std::vector<ObjectInfo> NamedByIds(const std::vector<InstanceId>& ids) {
 Expected<std::vector<fs::path>> FindMasks(const fs::path& folder,
                                           const std::vector<std::string>& stems,
                                           SequenceNotes& notes) {
-  for (const char* name : {"mask", "masks"}) {
+  constexpr std::array kNames{"mask", "masks"};
+  std::set<std::string> filled;
+  for (const char* name : kNames) {
     TSDFPP_ASSIGN(const auto there, NamesIn(folder / name));
-    if (there.empty()) continue;
+    if (!there.empty()) filled.insert(name);
+  }
+  if (filled.size() == kNames.size()) {
+    return DataError("{}: holds both {}/ and {}/, expected one", folder.string(), kNames[0],
+                     kNames[1]);
+  }
+  std::map<std::string, std::size_t> frame_of;
+  for (std::size_t i = 0; i < stems.size() && !filled.empty(); ++i) {
+    const auto [other, is_new] = frame_of.emplace(stems[i], i);
+    if (is_new) continue;
+    return DataError("{}: frames {} and {} have colour images of one name, '{}', and so one mask",
+                     folder.string(), other->second, i, stems[i]);
+  }
+  for (const std::string& name : filled) {
     std::vector<fs::path> masks;
     for (const std::string& stem : stems) {
       masks.push_back(folder / name / (stem + ".png"));

@@ -49,6 +49,7 @@ struct FileSequence {
   // Where colour and id images are another camera's at the same place (ScanNet): they are sampled
   // at the depth image's pixels, colours bilinearly, ids at the nearest pixel.
   std::optional<Intrinsics> colour_camera;
+  bool has_truth = false;  // files of true surfaces are there
   // The true surfaces; where absent Truth() says that the format has none.
   std::function<Expected<std::vector<TrueModel>>(const SequenceInfo&)> truth;
 };

@@ -3,8 +3,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstddef>
 #include <set>
 #include <vector>
 
@@ -53,15 +55,13 @@ cv::Mat SwapRedAndBlue(const cv::Mat& image) {
 // The first channel, if the first three agree bit for bit.
 template <typename T>
 bool TakeEqualChannel(const cv::Mat& image, cv::Mat& channel) {
+  const auto bits = [](T value) { return std::bit_cast<std::array<std::byte, sizeof(T)>>(value); };
   const int channels = image.channels();
   channel.create(image.size(), CV_MAKETYPE(image.depth(), 1));
   for (int y = 0; y < image.rows; ++y) {
     const T* pixel = image.ptr<T>(y);
     for (int x = 0; x < image.cols; ++x, pixel += channels) {
-      if (std::memcmp(pixel, pixel + 1, sizeof(T)) != 0 ||
-          std::memcmp(pixel, pixel + 2, sizeof(T)) != 0) {
-        return false;
-      }
+      if (bits(pixel[1]) != bits(pixel[0]) || bits(pixel[2]) != bits(pixel[0])) return false;
       channel.at<T>(y, x) = pixel[0];
     }
   }
@@ -248,6 +248,14 @@ Expected<cv::Mat> ReadMask(const fs::path& path, cv::Size expected) {
   cv::Mat ids;
   mask.convertTo(ids, CV_16U);
   return ids;
+}
+
+Expected<fs::path> OnlyOneOf(const fs::path& first, const fs::path& second) {
+  std::error_code code;
+  if (!fs::exists(second, code)) return first;
+  if (!fs::exists(first, code)) return second;
+  return DataError("{}: there is {} as well, expected one of them", first.string(),
+                   second.filename().string());
 }
 
 }  // namespace tsdfpp

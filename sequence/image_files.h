@@ -35,6 +35,9 @@ Expected<cv::Mat> ReadMask(const std::filesystem::path& path, cv::Size expected)
 Expected<cv::Mat> ReadImage(const std::filesystem::path& path, DecodeAs as = DecodeAs::kAsItIs);
 // ReadColour of an image file's bytes.
 Expected<cv::Mat> DecodeColour(const std::string& bytes, const std::string& file);
+// The one of two places that is there, the first where none is. Errors: kData where both are.
+Expected<std::filesystem::path> OnlyOneOf(const std::filesystem::path& first,
+                                          const std::filesystem::path& second);
 // The bytes of an image of 8 or 16 bits as it is.
 Expected<std::string> EncodePng(const cv::Mat& image, const std::string& file);
 

@@ -117,6 +117,7 @@ class KlgSource : public DatasetSource {
     return frame;
   }
 
+  bool HasTruth() const override { return false; }
   Expected<std::vector<TrueModel>> Truth() override {
     return DataError(
         "{}: a klg sequence has no true surfaces; it can be mapped but not compared with truth",
@@ -181,6 +182,11 @@ class KlgSource : public DatasetSource {
     std::error_code code;
     const bool known = fs::exists(file, code);
     TSDFPP_RETURN_IF_ERROR(RemarkOnPoseOffset(file, options.pose_offset_s, notes));
+    if (known && options.fixed_camera) {
+      return UsageError(
+          "{}: has camera poses, expected none where the camera is to be taken as fixed",
+          file.string());
+    }
     if (!known && !options.fixed_camera) {
       return DataError(
           "{}: a .klg holds no camera poses, expected groundtruth.txt (t tx ty tz qx qy qz qw) "

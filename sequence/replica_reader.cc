@@ -4,6 +4,7 @@
 #include "core/json_text.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/dataset_readers.h"
+#include "sequence/image_files.h"
 #include "sequence/pose_matrix.h"
 #include "sequence/text_lines.h"
 
@@ -42,6 +43,11 @@ Expected<ReplicaCamera> ReadCameraJson(const fs::path& path) {
 Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
                                                      const SequenceOptions& options,
                                                      SequenceNotes& notes) {
+  if (options.fixed_camera) {
+    return UsageError(
+        "{}: has camera poses, expected none where the camera is to be taken as fixed",
+        folder.string());
+  }
   std::error_code code;
   fs::path params = folder / "cam_params.json";
   if (!fs::exists(params, code)) {
@@ -80,11 +86,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
     frame.time_s = *number / kUsualRate_hz;
     frame.depth = folder / "results" / name;
     const std::string stem = fmt::format("frame{:06d}", *number);
-    frame.colour = folder / "results" / (stem + ".jpg");
-    if (!fs::exists(frame.colour, code)) {
-      const fs::path png = folder / "results" / (stem + ".png");
-      if (fs::exists(png, code)) frame.colour = png;
-    }
+    TSDFPP_ASSIGN(frame.colour, OnlyOneOf(folder / "results" / (stem + ".jpg"),
+                                          folder / "results" / (stem + ".png")));
     frame.camera = camera.camera;
     frame.depth_units_per_m = camera.units_per_m;
     TSDFPP_ASSIGN(frame.T_WC, PoseFromNumbers(numbers, where));

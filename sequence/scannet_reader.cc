@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "sequence/dataset_readers.h"
+#include "sequence/image_files.h"
 #include "sequence/pose_matrix.h"
 #include "sequence/text_lines.h"
 
@@ -19,13 +20,6 @@ Expected<std::optional<Pose>> ReadPoseOrNone(const fs::path& path) {
   }
   TSDFPP_ASSIGN(const Pose pose, PoseFromNumbers(numbers, path.string()));
   return pose;
-}
-
-// The image "<stem>" with the first of the extensions that is there.
-fs::path ImageOf(const fs::path& folder, const std::string& stem) {
-  std::error_code code;
-  const fs::path png = folder / (stem + ".png");
-  return fs::exists(png, code) ? png : folder / (stem + ".jpg");
 }
 
 // The depth images' numbers and names, by number.
@@ -74,7 +68,8 @@ Expected<std::optional<FrameFiles>> FilesOf(const fs::path& folder, int number,
   frame.number = number;
   frame.time_s = number / kUsualRate_hz;
   frame.depth = folder / "depth" / (stem + ".png");
-  frame.colour = ImageOf(folder / "color", stem);
+  TSDFPP_ASSIGN(frame.colour,
+                OnlyOneOf(folder / "color" / (stem + ".jpg"), folder / "color" / (stem + ".png")));
   if (!has_ids) return frame;
   frame.ids = folder / "instance-filt" / (stem + ".png");
   std::error_code code;
@@ -92,6 +87,11 @@ Expected<std::optional<FrameFiles>> FilesOf(const fs::path& folder, int number,
 Expected<std::unique_ptr<DatasetSource>> OpenScannet(const fs::path& folder,
                                                      const SequenceOptions& options,
                                                      SequenceNotes& notes) {
+  if (options.fixed_camera) {
+    return UsageError(
+        "{}: has camera poses, expected none where the camera is to be taken as fixed",
+        folder.string());
+  }
   FileSequence sequence;
   sequence.format = DatasetFormat::kScannet;
   sequence.name = NameOfFolder(folder);

@@ -1,5 +1,6 @@
 #include "sequence/cofusion_layout.h"
 #include "sequence/dataset_readers.h"
+#include "sequence/image_files.h"
 #include "sequence/pose_matrix.h"
 #include "sequence/text_lines.h"
 
@@ -15,6 +16,11 @@ constexpr std::uint16_t kNoDepth = 65535;
 Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
                                                          const SequenceOptions& options,
                                                          SequenceNotes& notes) {
+  if (options.fixed_camera) {
+    return UsageError(
+        "{}: has camera poses, expected none where the camera is to be taken as fixed",
+        folder.string());
+  }
   FileSequence sequence;
   sequence.format = DatasetFormat::kSevenScenes;
   sequence.name = NameOfFolder(folder);
@@ -41,9 +47,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
     frame.number = *number;
     frame.time_s = *number / kUsualRate_hz;
     frame.depth = folder / name;
-    frame.colour = folder / (stem + ".color.png");
-    const fs::path jpeg = folder / (stem + ".color.jpg");
-    if (!fs::exists(frame.colour, code) && fs::exists(jpeg, code)) frame.colour = jpeg;
+    TSDFPP_ASSIGN(frame.colour,
+                  OnlyOneOf(folder / (stem + ".color.png"), folder / (stem + ".color.jpg")));
     frame.camera = camera;
     TSDFPP_ASSIGN(frame.T_WC, ReadPoseMatrix(folder / (stem + ".pose.txt")));
     frame.ids = folder / (stem + ".mask.png");

@@ -67,7 +67,7 @@ Expected<void> CheckReplaceable(const fs::path& out, bool overwrite) {
     return UsageError("{}: is a file, expected a folder to make", folder.string());
   }
   if (fs::is_empty(folder, code)) return {};
-  const bool ours = ReadSequenceJson(folder / cofusion::kSequence).has_value();
+  const auto ours = ReadSequenceJson(folder / cofusion::kSequence);
   if (!ours) {
     return UsageError(
         "{}: the folder holds something other than a sequence of ours, expected a "
@@ -77,6 +77,13 @@ Expected<void> CheckReplaceable(const fs::path& out, bool overwrite) {
   if (!overwrite) {
     return UsageError("{}: the folder already holds a sequence, expected a new or an empty folder",
                       folder.string());
+  }
+  TSDFPP_ASSIGN(const std::vector<fs::path> there, ListFilesBelow(folder));
+  for (const fs::path& path : there) {
+    const std::string file = path.lexically_relative(folder).string();
+    if (file == cofusion::kSequence || ours->hashes.contains(file)) continue;
+    return UsageError("{}: is no file of the sequence and would be gone, expected it elsewhere",
+                      path.string());
   }
   return {};
 }

@@ -144,8 +144,23 @@ Expected<std::vector<Association>> Associate(const std::vector<TimedFile>& colou
 
 Expected<std::vector<Association>> Pairs(const fs::path& folder, SequenceNotes& notes) {
   std::error_code code;
-  for (const char* name : {"associations.txt", "associated.txt"}) {
-    if (fs::exists(folder / name, code)) return ReadAssociations(folder, folder / name);
+  constexpr std::array kNames{"associations.txt", "associated.txt"};
+  if (fs::exists(folder / kNames[0], code) && fs::exists(folder / kNames[1], code)) {
+    return DataError("{}: holds both {} and {}, expected one", folder.string(), kNames[0],
+                     kNames[1]);
+  }
+  for (const char* name : kNames) {
+    if (!fs::exists(folder / name, code)) continue;
+    TSDFPP_ASSIGN(std::vector<Association> pairs, ReadAssociations(folder, folder / name));
+    const auto time = [](const Association& pair) { return pair.depth.time_s; };
+    if (!std::ranges::is_sorted(pairs, {}, time)) {
+      std::ranges::stable_sort(pairs, {}, time);
+      notes.push_back(
+          fmt::format("{}: not in the order of the depth images' times, in which its "
+                      "frames are read",
+                      (folder / name).string()));
+    }
+    return pairs;
   }
   TSDFPP_ASSIGN(const std::vector<TimedFile> colour, ReadList(folder / "rgb.txt"));
   TSDFPP_ASSIGN(const std::vector<TimedFile> depth, ReadList(folder / "depth.txt"));
@@ -174,6 +189,11 @@ Expected<std::unique_ptr<DatasetSource>> OpenTum(const fs::path& folder,
   std::error_code code;
   const fs::path truth = folder / "groundtruth.txt";
   TSDFPP_RETURN_IF_ERROR(RemarkOnPoseOffset(truth, options.pose_offset_s, notes));
+  if (fs::exists(truth, code) && options.fixed_camera) {
+    return UsageError(
+        "{}: has camera poses, expected none where the camera is to be taken as fixed",
+        truth.string());
+  }
   TimedPoses poses;
   if (fs::exists(truth, code) || !options.fixed_camera) {
     TSDFPP_ASSIGN(poses, ReadTimedPoses(truth, &notes));

@@ -42,6 +42,7 @@ class MapperView : public FrameSource {
   }
   const SequenceInfo& info() const override { return info_; }
   Expected<Frame> Read(int index) override { return source_.Read(index); }
+  bool HasTruth() const override { return false; }
   Expected<std::vector<TrueModel>> Truth() override { return std::vector<TrueModel>{}; }
 
  private:

@@ -7,6 +7,7 @@
 #include "core/files.h"
 #include "core/folders.h"
 #include "core/json_text.h"
+#include "core/plain_name.h"
 
 namespace tsdfpp {
 namespace {
@@ -88,10 +89,11 @@ bool HasForm(const json& recording) {
            NumbersOfLength(frame.value("T_WC", json()), 7) &&
            frame.value("T_WO", json()).is_object();
   };
-  return recording.value("sequence", json("")).is_string() && number("error_step_m") &&
-         number("age_step_frames") && list("objects") && list("frames") && list("key_frames") &&
-         list("runs") && recording.contains("grid") && recording.contains("intrinsics") &&
-         recording.contains("truth") &&
+  const json sequence = recording.value("sequence", json(""));
+  return sequence.is_string() && CheckLabel(sequence.get<std::string>(), "sequence") &&
+         number("error_step_m") && number("age_step_frames") && list("objects") && list("frames") &&
+         list("key_frames") && list("runs") && recording.contains("grid") &&
+         recording.contains("intrinsics") && recording.contains("truth") &&
          NumbersOfLength(recording.value("depth_range_m", json()), 2) &&
          std::all_of(recording["objects"].begin(), recording["objects"].end(), object_has_form) &&
          std::all_of(recording["frames"].begin(), recording["frames"].end(), frame_has_form);

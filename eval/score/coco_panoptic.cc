@@ -36,10 +36,19 @@ Expected<CocoAnnotations> ReadCocoAnnotations(const std::filesystem::path& path)
   TSDFPP_ASSIGN(const nlohmann::json json, ReadJsonObject(path));
   CocoAnnotations out;
   try {
-    for (const auto& category : json.value("categories", nlohmann::json::array())) {
-      out.is_thing[IdOf(category.at("id"))] = IsFlagged(category, "isthing", 1);
+    const nlohmann::json categories = json.value("categories", nlohmann::json::array());
+    const nlohmann::json& annotations = json.at("annotations");
+    for (const auto& [name, list] :
+         {std::pair("categories", &categories), std::pair("annotations", &annotations)}) {
+      if (!list->is_array()) throw std::out_of_range(fmt::format("'{}' is no list", name));
     }
-    for (const auto& annotation : json.at("annotations")) {
+    for (const auto& category : categories) {
+      const auto id = IdOf(category.at("id"));
+      if (!out.is_thing.emplace(id, IsFlagged(category, "isthing", 1)).second) {
+        throw std::out_of_range(fmt::format("category {} is there twice", id));
+      }
+    }
+    for (const auto& annotation : annotations) {
       const std::string file = annotation.at("file_name");
       const std::string id = JsonText(annotation.at("image_id"));
       if (out.by_file.contains(file) || out.file_of_id.contains(id)) {

@@ -21,7 +21,10 @@ Expected<std::vector<std::string>> ImagesIn(const fs::path& folder) {
   std::vector<std::string> names;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
        entry.increment(failure)) {
-    if (entry->path().extension() == ".png") names.push_back(entry->path().filename().string());
+    std::string extension = entry->path().extension().string();
+    std::ranges::transform(extension, extension.begin(),
+                           [](unsigned char c) { return std::tolower(c); });
+    if (extension == ".png") names.push_back(entry->path().filename().string());
   }
   if (failure) return DataError("{}: cannot be read as a folder", folder.string());
   std::sort(names.begin(), names.end());
@@ -100,7 +103,8 @@ std::optional<TrackingQuality> TrackingOf(const LabelEncoding& encoding) {
 
 }  // namespace
 
-Expected<PanopticEvaluation> EvaluateCoco(const CocoFolder& truth, const CocoFolder& prediction) {
+Expected<PanopticEvaluation> EvaluateCoco(const CocoFolder& truth, const CocoFolder& prediction,
+                                          std::vector<std::string>* remarks) {
   TSDFPP_ASSIGN(const CocoAnnotations true_notes, ReadCocoAnnotations(truth.json));
   TSDFPP_ASSIGN(const CocoAnnotations predicted_notes, ReadCocoAnnotations(prediction.json));
   PanopticEvaluation evaluation;
@@ -132,6 +136,11 @@ Expected<PanopticEvaluation> EvaluateCoco(const CocoFolder& truth, const CocoFol
     if (!counts) return DataError("image {}: {}", id, counts.error().message);
     Add(*counts, evaluation.counts);
     ++evaluation.images;
+  }
+  if (predicted_notes.by_file.size() > true_notes.by_file.size()) {
+    remarks->push_back(fmt::format(
+        "{}: {} of its images are not in {} and are left out", prediction.json.string(),
+        predicted_notes.by_file.size() - true_notes.by_file.size(), truth.json.string()));
   }
   return evaluation;
 }

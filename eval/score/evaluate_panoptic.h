@@ -33,10 +33,12 @@ struct CocoFolder {
   std::filesystem::path json;
 };
 
-// Scores the predictions of all images that the truth has annotations of. Errors: kData where a
+// Scores the predictions of all images that the truth has annotations of. Those of others are left
+// out, which a line in `remarks` says. Errors: kData where a
 // file cannot be read, an image has no prediction, a category is not the truth's, or image and
 // annotations disagree.
-Expected<PanopticEvaluation> EvaluateCoco(const CocoFolder& truth, const CocoFolder& prediction);
+Expected<PanopticEvaluation> EvaluateCoco(const CocoFolder& truth, const CocoFolder& prediction,
+                                          std::vector<std::string>* remarks);
 
 // What the numbers of an image of labels mean.
 struct LabelEncoding {

@@ -115,6 +115,7 @@ class RaisedTruth final : public FrameSource {
 
   const SequenceInfo& info() const override { return source_.info(); }
   Expected<Frame> Read(int index) override { return source_.Read(index); }
+  bool HasTruth() const override { return source_.HasTruth(); }
   Expected<std::vector<TrueModel>> Truth() override {
     TSDFPP_ASSIGN(std::vector<TrueModel> models, source_.Truth());
     for (TrueModel& model : models) {

@@ -28,8 +28,17 @@ void MultiplyRates(MaskFaultConfig& masks, double factor) {
 }
 
 Expected<void> SetSensor(const CellSettings& settings, SensorConfig& sensor) {
+  const bool reads_masks = settings.segmentation == CellSettings().segmentation;
   if (settings.sensor != "scene") {
     TSDFPP_ASSIGN(sensor, SensorPresetNamed(settings.sensor));
+    if (!reads_masks && !(sensor.masks == MaskFaultConfig{})) {
+      return UsageError("sensor '{}' has mask faults, but segmentation '{}' reads no masks",
+                        settings.sensor, settings.segmentation);
+    }
+  }
+  if (!reads_masks && settings.mask_faults > 0) {
+    return UsageError("mask_faults is {}, but segmentation '{}' reads no masks, expected 0",
+                      settings.mask_faults, settings.segmentation);
   }
   if (settings.noise != 1) {
     if (sensor.depth.model == DepthModel::kExact) {

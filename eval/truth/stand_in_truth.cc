@@ -53,6 +53,7 @@ class PlannedSource : public FrameSource {
   Expected<Frame> Read(int index) override { return source_->Read(index); }
   bool IsSensed() const override { return source_->IsSensed(); }
   Expected<Frame> ReadTrue(int index) override { return source_->ReadTrue(index); }
+  bool HasTruth() const override { return !models_.empty() || source_->HasTruth(); }
   Expected<std::vector<TrueModel>> Truth() override {
     if (models_.empty()) return source_->Truth();
     return models_;

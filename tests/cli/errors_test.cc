@@ -307,5 +307,54 @@ TEST_F(CommandErrors, UnwritableOutput) {
   EXPECT_EQ(ReadFile(folder_ / "mine/letter.txt"), "kept");
 }
 
+// What is in no set of ours would be gone with it.
+TEST_F(CommandErrors, OverwriteTakesNothingElse) {
+  const auto generate = [&] {
+    return test::RunTsdfpp({"generate", scene_, "--out", folder_ / "set", "--overwrite"},
+                           folder_.path());
+  };
+  ASSERT_EQ(generate().exit_code, 0);
+  ASSERT_EQ(generate().exit_code, 0);
+  for (const char* file : {"letter.txt", "depth_original/mine.exr", "map/mesh/scene.ply"}) {
+    fs::create_directories((folder_ / "set" / file).parent_path());
+    Write(folder_ / "set" / file, "kept");
+    ExpectError({"generate", scene_, "--out", folder_ / "set", "--overwrite"}, kUsage,
+                {file, "is no file of the sequence and would be gone"});
+    EXPECT_EQ(ReadFile(folder_ / "set" / file), "kept");
+    fs::remove(folder_ / "set" / file);
+  }
+}
+
+TEST_F(CommandErrors, ASavedMapReplacesNothingThatIsRead) {
+  ASSERT_EQ(
+      test::RunTsdfpp({"generate", scene_, "--out", folder_ / "set"}, folder_.path()).exit_code, 0);
+  Write(folder_ / "votes.toml", "");
+  const std::string listed = ReadFile(folder_ / "set/sequence.json").value();
+  for (const fs::path& save :
+       {folder_ / "set/sequence.json", folder_ / "set/new.map", folder_ / "votes.toml"}) {
+    ExpectError({"map", folder_ / "set", "--associate", "votes", "--poses", "track",
+                 "--vote-config", folder_ / "votes.toml", "--out", folder_ / "out", "--save", save},
+                kUsage, {save.string(), "which is read"});
+  }
+  EXPECT_EQ(ReadFile(folder_ / "set/sequence.json"), listed);
+  EXPECT_EQ(ReadFile(folder_ / "votes.toml"), "");
+}
+
+TEST_F(CommandErrors, WhatWouldBeOfNoUseIsSaid) {
+  ExpectError({"evaluate", scene_, "--meshes", folder_.path(), "--at", "2", "--removed", ","},
+              kUsage, {"--removed ',' names no object"});
+  ExpectError({"compare", scene_, "--removed", ",", "--out", folder_ / "out"}, kUsage,
+              {"--removed ',' names no object"});
+  ExpectError({"compare", scene_, "--until", "2", "--reveal", "3", "--out", folder_ / "out"},
+              kUsage, {"--reveal 3 is after --until 2"});
+  ASSERT_EQ(
+      test::RunTsdfpp({"map", scene_, "--out", folder_ / "mapped", "--save", folder_ / "whole.map"},
+                      folder_.path())
+          .exit_code,
+      0);
+  ExpectError({"map", scene_, "--load", folder_ / "whole.map", "--out", folder_ / "out"}, kUsage,
+              {"whole.map goes to frame", "has none after it"});
+}
+
 }  // namespace
 }  // namespace tsdfpp

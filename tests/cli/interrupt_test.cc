@@ -20,10 +20,11 @@ namespace fs = std::filesystem;
 class InterruptedExport : public testing::Test {
  protected:
   // Starts an export of a scene and waits until it has written something.
-  pid_t Start() {
+  pid_t Start(int ignored = 0) {
     const std::string out = folder_ / "out";
     const pid_t process = fork();
     if (process == 0) {
+      if (ignored != 0) signal(ignored, SIG_IGN);
       const int nowhere = open("/dev/null", O_WRONLY);
       dup2(nowhere, STDERR_FILENO);
       dup2(nowhere, STDOUT_FILENO);
@@ -52,6 +53,15 @@ TEST_F(InterruptedExport, AStoppedOneLeavesNothing) {
   for (const int signal : {SIGINT, SIGTERM}) {
     EXPECT_EQ(End(Start(), signal), signal);
     EXPECT_TRUE(fs::is_empty(folder_.path()));
+  }
+}
+
+// As what a script starts in the background ignores Ctrl-C.
+TEST_F(InterruptedExport, ASignalThatIsIgnoredStaysSo) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    EXPECT_EQ(End(Start(signal), signal), 0);
+    EXPECT_TRUE(fs::exists(folder_ / "out/rgb.txt"));
+    fs::remove_all(folder_ / "out");
   }
 }
 

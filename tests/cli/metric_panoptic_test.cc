@@ -54,6 +54,24 @@ TEST_F(MetricPanoptic, AnAnnotationIsThereOnce) {
   edited = sound;
   edited["annotations"][0]["segments_info"][0]["iscrowd"] = 2;
   refused(edited, "'iscrowd' is 2, expected 0 or 1");
+  edited = sound;
+  edited["annotations"] = {{"a", sound["annotations"][0]}};
+  refused(edited, "'annotations' is no list");
+  edited = sound;
+  edited["categories"] = {{{"id", 1}, {"isthing", 1}}, {{"id", 1}, {"isthing", 0}}};
+  refused(edited, "category 1 is there twice");
+  // One of an image that the truth lacks is left out, and said.
+  edited = sound;
+  nlohmann::json other = sound["annotations"][0];
+  other["file_name"] = "other.png";
+  other["image_id"] = 123456789;
+  edited["annotations"].push_back(other);
+  ASSERT_TRUE(WriteFile(folder_ / "sample/pred.json", edited.dump()).has_value());
+  const auto run = test::RunTsdfpp(
+      {"metric", "panoptic", folder_ / "sample/gt", folder_ / "sample/pred", "--encoding", "coco"},
+      folder_.path());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.err.find("1 of its images are not in"), std::string::npos) << run.err;
 }
 
 TEST_F(MetricPanoptic, PrintsDeeplab2sNumbers) {

@@ -231,6 +231,31 @@ TEST(ImageHeader, TheCallersCheckComesBeforeThePixels) {
   EXPECT_EQ(image.error().message, "5 by 4");
 }
 
+// Decoders fill up what a cut JPEG lacks.
+TEST(ImageHeader, CutJpegsAreRefused) {
+  cv::Mat noise(96, 128, CV_8UC3);
+  cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  for (const std::vector<int>& options :
+       {std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 90},
+        {cv::IMWRITE_JPEG_PROGRESSIVE, 1, cv::IMWRITE_JPEG_RST_INTERVAL, 4},
+        {cv::IMWRITE_JPEG_OPTIMIZE, 1}}) {
+    std::vector<unsigned char> encoded;
+    ASSERT_TRUE(cv::imencode(".jpg", noise, encoded, options));
+    const std::string jpeg(encoded.begin(), encoded.end());
+    EXPECT_TRUE(DecodeImage(jpeg, "x").has_value());
+    EXPECT_TRUE(DecodeImage(jpeg + "what follows", "x").has_value());
+    int cut = 0;
+    for (std::size_t size = 1; size < jpeg.size(); ++size) {
+      cut += DecodeImage(jpeg.substr(0, size), "x").has_value() ? 0 : 1;
+    }
+    EXPECT_EQ(cut, static_cast<int>(jpeg.size()) - 1);
+    EXPECT_EQ(DecodeImage(jpeg.substr(0, jpeg.size() / 2), "x").error().message,
+              "x: ends before its image does, expected a whole JPEG");
+    EXPECT_EQ(DecodeImage(jpeg, "x", DecodeAs::kNumbers).error().message,
+              "x: is a JPEG, whose values are approximate, expected another format");
+  }
+}
+
 // What a codec prints comes neither before our sentence nor in its place.
 TEST(ImageHeader, DamagedPixelsAreRefusedInSilence) {
   const std::string png = Encoded(".png", cv::Mat(64, 64, CV_8UC3, cv::Scalar(1, 2, 3)));

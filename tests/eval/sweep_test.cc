@@ -250,6 +250,9 @@ TEST_F(Sweep, WhatDoesNotFitASceneGetsASentence) {
       {"objects = 3", "objects is 3, but the scene has 2"},
       {"mask_faults = 5", "rate"},
       {"sensor = \"masks_mild\"\nmask_faults = 1", "has mask faults of its own"},
+      {"poses = \"track\"\nsegmentation = \"depth\"\nmask_faults = 1",
+       "reads no masks, expected 0"},
+      {"poses = \"track\"\nsegmentation = \"depth\"\nsensor = \"masks_mild\"", "has mask faults"},
       {"sensor = \"pose_drift\"\ncamera_error = 1", "has pose errors of its own"},
       {"speed = 100", "expected 2 or more"},
       {"fuse_until = 8", "fuse_until is 8, but the last frame is 7"},
@@ -258,7 +261,9 @@ TEST_F(Sweep, WhatDoesNotFitASceneGetsASentence) {
   };
   for (const auto& [setting, sentence] : cases) {
     const bool with_method = setting.starts_with("method");
-    const std::string grid = with_method ? setting : "method = \"tsdf\"\n" + setting;
+    const std::string method = setting.starts_with("poses") ? "tsdf++/anchored" : "tsdf";
+    const std::string grid =
+        with_method ? setting : fmt::format("method = \"{}\"\n{}", method, setting);
     const auto ran =
         RunTsdfpp({"sweep", Experiment(grid).string(), "--out", folder_ / "out"}, folder_.path());
     EXPECT_EQ(ran.exit_code, 2) << grid;

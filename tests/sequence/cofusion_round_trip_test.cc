@@ -66,6 +66,31 @@ TEST(CofusionRoundTrip, TruthIsTheSame) {
   for (std::size_t i = 0; i < truth->size(); ++i) ExpectSame((*truth)[i], source.models_[i]);
 }
 
+// Of recordings of others nothing lists the models.
+TEST(CofusionRoundTrip, UnreadableTruthIsNotAbsent) {
+  const TempFolder folder;
+  const fs::path set = folder / "set";
+  MemorySource source;
+  source.info_.intrinsics = {13, 7, 11.3, 11.4, 6.1, 3.1};
+  ASSERT_TRUE(WriteCofusion(source, SomeGenerator(), set).has_value());
+  const auto has_truth = [&] {
+    const auto read = OpenSequence(set);
+    EXPECT_TRUE(read.has_value()) << read.error().message;
+    const bool is_readable = (*read)->Truth().has_value();
+    return std::pair((*read)->HasTruth(), is_readable);
+  };
+  EXPECT_EQ(has_truth(), std::pair(true, true));
+  fs::remove(set / "sequence.json");
+  EXPECT_EQ(has_truth(), std::pair(true, true));
+  const fs::path model = set / "models/car-2.ply";
+  fs::resize_file(model, fs::file_size(model) / 2);
+  EXPECT_EQ(has_truth(), std::pair(true, false));
+  for (const auto& entry : fs::directory_iterator(set / "models")) fs::remove(entry);
+  EXPECT_EQ(has_truth(), std::pair(false, false)) << "an empty folder";
+  fs::remove(set / "models");
+  EXPECT_EQ(has_truth(), std::pair(false, false));
+}
+
 // A set that was read and is written again is the same set, file for file.
 TEST(CofusionRoundTrip, SecondGenerationIsTheSameFiles) {
   const TempFolder folder;

@@ -83,6 +83,28 @@ TEST(ForeignFormats, Scannet) {
   }
 }
 
+// As associations list them, frames may go back in time.
+TEST(ForeignFormats, TumFramesAreInTheOrderOfTime) {
+  const TempFolder folder;
+  BoxSource source(4);
+  const fs::path set = folder / "desk";
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kTum, set).has_value());
+  std::string turned;
+  std::ifstream read(set / "associations.txt");
+  for (std::string line; std::getline(read, line);) turned = line + "\n" + turned;
+  ASSERT_TRUE(WriteFile(set / "associations.txt", turned));
+  SequenceNotes notes;
+  const auto sequence = OpenSequence(set, {}, &notes).value();
+  EXPECT_TRUE(NotesSay(notes, "not in the order of the depth images' times"));
+  for (int i = 0; i < 4; ++i) {
+    const Frame was = source.Read(i).value();
+    const Frame is = sequence->Read(i).value();
+    EXPECT_NEAR(is.time_s, i / 30.0, 1e-6);
+    EXPECT_EQ(cv::norm(was.mask, is.mask, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(was.colour, is.colour, cv::NORM_INF), 0);
+  }
+}
+
 // Lists without associations: the nearest depth image in time, each taken once; poses in between.
 TEST(ForeignFormats, TumAssociatesAndInterpolates) {
   const TempFolder folder;

@@ -39,6 +39,9 @@ inline auto Image(const std::string& file, const cv::Mat& image) {
 inline auto Remove(const std::string& file) {
   return [=](const fs::path& set) { ASSERT_GT(fs::remove_all(set / file), 0U) << file; };
 }
+inline auto Copy(const std::string& from, const std::string& to) {
+  return [=](const fs::path& set) { fs::copy(set / from, set / to, fs::copy_options::recursive); };
+}
 // The first half of the file is left.
 inline auto Cut(const std::string& file) {
   return [=](const fs::path& set) { fs::resize_file(set / file, fs::file_size(set / file) / 2); };

@@ -19,6 +19,10 @@ TEST(Malformed, Bop) {
           {Text(scene + "scene_camera.json", "{"), at + "scene_camera.json: not a JSON object"},
           {Text(scene + "scene_camera.json", "{\"first\": {}}"),
            at + "scene_camera.json: 'first' is not the number of an image"},
+          {Json(scene + "scene_camera.json", [](auto& json) { json["01"] = json["1"]; }),
+           at + "scene_camera.json: image 1 is there twice"},
+          {Copy(scene + "rgb/000001.png", scene + "rgb/000001.jpg"),
+           at + "rgb/000001.png: there is 000001.jpg as well, expected one of them"},
           {Json(scene + "scene_camera.json", first("cam_K", {1, 2, 3})),
            at + "scene_camera.json: image 0: expected cam_K of 9 numbers and depth_scale"},
           {Json(scene + "scene_camera.json", first("cam_K", {60, 0.5, 4, 0, 61, 3, 0, 0, 1})),
@@ -105,6 +109,13 @@ TEST(Malformed, BopTruth) {
   ASSERT_FALSE(truth.has_value());
   EXPECT_EQ(truth.error().kind, ErrorKind::kData);
   EXPECT_EQ(Strip(truth.error().message, set.string()), "@/models/obj_000008.ply: no such file");
+  // Nor is it left out of an export without a word, as what there is not is.
+  const auto exported = ExportSequence(*read, DatasetFormat::kTum, folder / "tum");
+  ASSERT_FALSE(exported.has_value());
+  EXPECT_EQ(exported.error().message, truth.error().message);
+  EXPECT_FALSE(fs::exists(folder / "tum"));
+  fs::remove_all(set / "models");
+  EXPECT_TRUE(ExportSequence(*OpenSequence(set).value(), DatasetFormat::kTum, folder / "tum"));
 }
 
 }  // namespace

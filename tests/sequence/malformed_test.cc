@@ -46,6 +46,16 @@ TEST(Malformed, Tum) {
            "rgb/0.000000.png is 8-bit unsigned with 3 channels, expected one of them to be depth "
            "(16-bit unsigned with 1 channel)"},
           {Text("associations.txt", "\n"), "@/associations.txt: holds no images"},
+          {Copy("associations.txt", "associated.txt"),
+           "@: holds both associations.txt and associated.txt, expected one"},
+          {Copy("mask", "masks"), "@: holds both mask/ and masks/, expected one"},
+          {[](const fs::path& set) {
+             Copy("rgb", "rgb2")(set);
+             Text("associations.txt",
+                  "0 rgb/0.000000.png 0 depth/0.000000.png\n"
+                  "0.033333 rgb2/0.000000.png 0.033333 depth/0.033333.png\n")(set);
+           },
+           "@: frames 0 and 1 have colour images of one name, '0.000000', and so one mask"},
           {Text("associations.txt", "0 /dev/zero 0 depth/0.000000.png\n"),
            "@/associations.txt:1: the path '/dev/zero' is absolute, expected one inside the data's "
            "folder"},
@@ -213,6 +223,9 @@ TEST(Malformed, SevenScenes) {
            "image: intrinsics of another resolution"},
           {Image(depth, kSmallDepth),
            In(depth, ": the image is 32x24, expected 64x48 (as frame-000000.depth.png)")},
+          {Copy("frame-000001.color.png", "frame-000001.color.jpg"),
+           "@/frame-000001.color.png: there is frame-000001.color.jpg as well, expected one of "
+           "them"},
           {Cut(depth), In(depth, ": cannot be decoded as an image")},
           {Remove("frame-000001.color.png"), "@/frame-000001.color.png: no such image"},
           {Remove("frame-000001.mask.png"),
@@ -251,6 +264,8 @@ TEST(Malformed, Replica) {
           {Text("traj.txt", "1 0 0 0 0 x 0 0 0 0 1 0 0 0 0 1\n"),
            "@/traj.txt:1: 'x' is not a number"},
           {Remove("results/frame000001.jpg"), "@/results/frame000001.jpg: no such image"},
+          {Copy("results/frame000001.jpg", "results/frame000001.png"),
+           "@/results/frame000001.jpg: there is frame000001.png as well, expected one of them"},
           {Cut("results/depth000001.png"),
            "@/results/depth000001.png: cannot be decoded as an image"},
       });
@@ -278,6 +293,8 @@ TEST(Malformed, Scannet) {
           {Image("instance-filt/10.png", kSmallMask),
            "@/instance-filt/10.png: the image is 32x24, expected 128x96 (as 0.png)"},
           {Remove("color/10.png"), "@/color/10.jpg: no such image"},
+          {Copy("color/10.png", "color/10.jpg"),
+           "@/color/10.jpg: there is 10.png as well, expected one of them"},
           {Text("intrinsic/intrinsic_depth.txt", "60 0 31 0\n"),
            "@/intrinsic/intrinsic_depth.txt: not a camera matrix, expected fx 0 cx, 0 fy cy, 0 0 1 "
            "(3x3 or 4x4)"},
@@ -309,6 +326,12 @@ TEST(Malformed, OptionsThatDoNotFit) {
   ASSERT_FALSE(mirrored.has_value());
   EXPECT_EQ(mirrored.error().kind, ErrorKind::kUsage);
   EXPECT_EQ(mirrored.error().message, "bop-000000: a negative fy does not fit objects with poses");
+  options = {};
+  options.fixed_camera = true;
+  const auto fixed = OpenSequence(folder / "bop", options);
+  ASSERT_FALSE(fixed.has_value());
+  EXPECT_EQ(fixed.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(fixed.error().message.find("has camera poses, expected none"), std::string::npos);
   options = {};
   options.format = DatasetFormat::kBop;
   const auto forced = OpenSequence(folder / "room", options);
