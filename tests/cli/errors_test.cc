@@ -98,7 +98,7 @@ class CommandErrors : public testing::Test {
 
   // A sequence on disk made from the tiny scene.
   std::string Generate() {
-    const std::string sequence = folder_ / "sequence";
+    std::string sequence = folder_ / "sequence";
     const CommandOutput output = RunTsdfpp({"generate", scene_, "--out", sequence}, folder_.path());
     EXPECT_EQ(output.exit_code, 0) << output.err;
     return sequence;

@@ -91,7 +91,7 @@ TEST(ForeignFormats, TumFramesAreInTheOrderOfTime) {
   ASSERT_TRUE(ExportSequence(source, DatasetFormat::kTum, set).has_value());
   std::string turned;
   std::ifstream read(set / "associations.txt");
-  for (std::string line; std::getline(read, line);) turned = line + "\n" + turned;
+  for (std::string line; std::getline(read, line);) turned.insert(0, line += '\n');
   ASSERT_TRUE(WriteFile(set / "associations.txt", turned));
   SequenceNotes notes;
   const auto sequence = OpenSequence(set, {}, &notes).value();
