@@ -16,6 +16,7 @@
 #include "mapper/track/object_model.h"
 #include "mapper/track/pcl_icp.h"
 #include "mapper/track/sdf_tracker.h"
+#include "mapper/volume/lattice_range.h"
 
 namespace tsdfpp {
 namespace {

@@ -25,7 +25,8 @@ TEST(ManyLostObjects, AllHaveTheirTurn) {
         {0.7, 0.9, 0.05}));
     for (int k = 0; k < kCount && shown != Shown::kNothing; ++k) {
       const auto id = static_cast<InstanceId>(1 + k);
-      const Eigen::Vector3d cell(k % 2 == 1 ? 0.2 : -0.2, -0.5 + 0.25 * (k / 2), 0);
+      const int row = k / 2;
+      const Eigen::Vector3d cell(k % 2 == 1 ? 0.2 : -0.2, -0.5 + 0.25 * row, 0);
       if (shown == Shown::kBalls) {
         scene.shapes.push_back(reference::Sphere(id, {200, 30, 30}, Eigen::Vector3d::Zero(), 0.05));
         scene.T_WO[id] = reference::MakePose(
