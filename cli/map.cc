@@ -121,7 +121,6 @@ bool IsOfTheRun(const std::filesystem::path& save, const std::filesystem::path& 
   return first.starts_with('.') || kOwn.contains(first);
 }
 
-// Before anything is mapped, which may take long.
 // What a run reads: files, and folders as a whole. The map of --load may take its own place.
 std::vector<std::string> ReadBeside(const MapArguments& options) {
   return {options.source.path,
@@ -154,6 +153,7 @@ Expected<void> CheckSaveReplacesNothingRead(const MapArguments& options) {
   return {};
 }
 
+// Before anything is mapped, which may take long.
 Expected<void> CheckOutputs(const MapArguments& options, int frames) {
   if (options.views > 0 && frames == 0) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",

@@ -151,9 +151,7 @@ class BopOpener {
                        placed, cameras.size());
     }
     if (placed != 0 && options_.fixed_camera) {
-      return UsageError(
-          "{}: has camera poses, expected none where the camera is to be taken as fixed",
-          path.string());
+      return FixedCameraWithPoses(path);
     }
     if (placed == 0 && !options_.fixed_camera) {
       return DataError(

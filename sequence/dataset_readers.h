@@ -53,4 +53,10 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const std::filesystem::
                                                          const SequenceOptions& options,
                                                          SequenceNotes& notes);
 
+// kUsage, of `place`, which has camera poses though --fixed-camera was given.
+inline tl::unexpected<Error> FixedCameraWithPoses(const std::filesystem::path& place) {
+  return UsageError("{}: has camera poses, expected none where the camera is to be taken as fixed",
+                    place.string());
+}
+
 }  // namespace tsdfpp

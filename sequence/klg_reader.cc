@@ -183,9 +183,7 @@ class KlgSource : public DatasetSource {
     const bool known = fs::exists(file, code);
     TSDFPP_RETURN_IF_ERROR(RemarkOnPoseOffset(file, options.pose_offset_s, notes));
     if (known && options.fixed_camera) {
-      return UsageError(
-          "{}: has camera poses, expected none where the camera is to be taken as fixed",
-          file.string());
+      return FixedCameraWithPoses(file);
     }
     if (!known && !options.fixed_camera) {
       return DataError(

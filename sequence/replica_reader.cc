@@ -44,9 +44,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenReplica(const fs::path& folder,
                                                      const SequenceOptions& options,
                                                      SequenceNotes& notes) {
   if (options.fixed_camera) {
-    return UsageError(
-        "{}: has camera poses, expected none where the camera is to be taken as fixed",
-        folder.string());
+    return FixedCameraWithPoses(folder);
   }
   std::error_code code;
   fs::path params = folder / "cam_params.json";

@@ -17,9 +17,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
                                                          const SequenceOptions& options,
                                                          SequenceNotes& notes) {
   if (options.fixed_camera) {
-    return UsageError(
-        "{}: has camera poses, expected none where the camera is to be taken as fixed",
-        folder.string());
+    return FixedCameraWithPoses(folder);
   }
   FileSequence sequence;
   sequence.format = DatasetFormat::kSevenScenes;

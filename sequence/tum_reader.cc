@@ -190,9 +190,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenTum(const fs::path& folder,
   const fs::path truth = folder / "groundtruth.txt";
   TSDFPP_RETURN_IF_ERROR(RemarkOnPoseOffset(truth, options.pose_offset_s, notes));
   if (fs::exists(truth, code) && options.fixed_camera) {
-    return UsageError(
-        "{}: has camera poses, expected none where the camera is to be taken as fixed",
-        truth.string());
+    return FixedCameraWithPoses(truth);
   }
   TimedPoses poses;
   if (fs::exists(truth, code) || !options.fixed_camera) {
