@@ -12,10 +12,11 @@
 
 namespace tsdfpp {
 
-// TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt; associations.txt (either order) replaces the
-// search for the depth image nearest in time (kAssociationLimit_s); poses are interpolated at the
-// depth image's time (timed_poses.h); frames without one are left out. mask/<stem of the colour
-// image>.png holds ids. Default: 5000 units a metre, 525 525 319.5 239.5 at 640x480.
+// TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt; associations.txt or associated.txt (either image
+// first) replaces the search for the depth image nearest in time (kAssociationLimit_s); frames are
+// in the order of the depth images' times; poses are interpolated at the depth image's time
+// (timed_poses.h); frames without one are left out. mask/<stem of the colour image>.png holds ids.
+// Default: 5000 units a metre, 525 525 319.5 239.5 at 640x480.
 Expected<std::unique_ptr<DatasetSource>> OpenTum(const std::filesystem::path& folder,
                                                  const SequenceOptions& options,
                                                  SequenceNotes& notes);
