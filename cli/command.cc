@@ -137,6 +137,12 @@ std::vector<std::string> SplitList(const std::string& text) {
   return words;
 }
 
+Expected<std::vector<std::string>> NamesOf(const std::string& option, const std::string& text) {
+  std::vector<std::string> names = SplitList(text);
+  if (!text.empty() && names.empty()) return UsageError("{} '{}' names no object", option, text);
+  return names;
+}
+
 std::string CommandText(const CLI::App& app) {
   std::string text = "tsdfpp " + app.get_name();
   for (const CLI::Option* option : app.get_options()) {

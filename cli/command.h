@@ -85,4 +85,7 @@ std::string CommandText(const CLI::App& app);
 // The words between commas. Empty text gives none.
 std::vector<std::string> SplitList(const std::string& text);
 
+// The same of an option that names objects. Errors: kUsage where there is text and no word in it.
+Expected<std::vector<std::string>> NamesOf(const std::string& option, const std::string& text);
+
 }  // namespace tsdfpp

@@ -66,11 +66,9 @@ Expected<std::unique_ptr<FrameSource>> WithExperiment(std::unique_ptr<FrameSourc
     return UsageError("--reveal {} is after --until {}, expected a frame that is mapped",
                       options.reveal, until);
   }
-  if (!options.removed.empty() && SplitList(options.removed).empty()) {
-    return UsageError("--removed '{}' names no object", options.removed);
-  }
-  if (!options.removed.empty()) {
-    TSDFPP_ASSIGN(plan.removed, FindObjects(info, SplitList(options.removed)));
+  TSDFPP_ASSIGN(const std::vector<std::string> removed, NamesOf("--removed", options.removed));
+  if (!removed.empty()) {
+    TSDFPP_ASSIGN(plan.removed, FindObjects(info, removed));
   }
   if (std::find(plan.removed.begin(), plan.removed.end(), kBackground) != plan.removed.end()) {
     return UsageError("--removed names the background, which cannot be removed");

@@ -39,13 +39,10 @@ Expected<CommandResult> RunEvaluateCommand(const EvaluateArguments& options, boo
     }
     config.frames.push_back(frame);
   }
-  if (!options.removed.empty() && SplitList(options.removed).empty()) {
-    return UsageError("--removed '{}' names no object", options.removed);
-  }
+  TSDFPP_ASSIGN(const std::vector<std::string> names, NamesOf("--removed", options.removed));
   TSDFPP_ASSIGN(MaskedSource opened, OpenForScores(options.source));
   FrameSource* const source = opened.source.get();
-  TSDFPP_ASSIGN(const std::vector<InstanceId> removed,
-                FindObjects(source->info(), SplitList(options.removed)));
+  TSDFPP_ASSIGN(const std::vector<InstanceId> removed, FindObjects(source->info(), names));
   config.removed = {removed.begin(), removed.end()};
   ProgressBar bar("evaluate");
   TSDFPP_ASSIGN(const EvaluateResult result,

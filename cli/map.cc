@@ -14,6 +14,7 @@
 #include "cli/segmentation_options.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/picture/map_output.h"
 #include "eval/picture/map_views.h"
@@ -134,16 +135,6 @@ std::vector<std::string> ReadBeside(const MapArguments& options) {
           options.tracking.config};
 }
 
-// Whether the file is, or would be, `place` or in it.
-bool LiesIn(const std::filesystem::path& file, const std::string& place) {
-  namespace fs = std::filesystem;
-  std::error_code failure;
-  if (place.empty() || !fs::exists(place, failure)) return false;
-  const fs::path way =
-      fs::weakly_canonical(file, failure).lexically_relative(fs::weakly_canonical(place, failure));
-  return !way.empty() && *way.begin() != "..";
-}
-
 Expected<void> CheckSaveReplacesNothingRead(const MapArguments& options) {
   for (const std::string& read : ReadBeside(options)) {
     if (options.save.empty() || !LiesIn(options.save, read)) continue;
@@ -159,9 +150,7 @@ Expected<void> CheckOutputs(const MapArguments& options, int frames) {
     return UsageError("--views {} needs a camera: name the sequence and map a frame of it",
                       options.views);
   }
-  if (!options.remove.empty() && SplitList(options.remove).empty()) {
-    return UsageError("--remove '{}' names no object", options.remove);
-  }
+  TSDFPP_RETURN_IF_ERROR(NamesOf("--remove", options.remove));
   if (IsOurSequence(options.out)) {
     return UsageError("--out '{}' is a sequence, expected another folder", options.out);
   }
@@ -208,7 +197,7 @@ Expected<RunFolder> BeginRun(const MapArguments& options, const CLI::App& app) {
   TSDFPP_ASSIGN(RunFolder folder, RunFolder::Begin(options.out, CommandText(app)));
   std::set<std::string> files{"stats.json", fmt::format("mesh/scene.{}", options.mesh_format)};
   if (options.views > 0) files.insert("views/1");
-  TSDFPP_RETURN_IF_ERROR(folder.CheckPlaces(std::move(files)));
+  TSDFPP_RETURN_IF_ERROR(folder.CheckPlaces(files));
   return folder;
 }
 

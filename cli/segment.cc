@@ -13,6 +13,7 @@
 #include "cli/segmentation_options.h"
 #include "cli/sequence_options.h"
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/picture/segment_picture.h"
 #include "eval/run/run_folder.h"
@@ -123,19 +124,13 @@ std::string ScoreText(const Measured& value) {
 
 // Errors: kUsage where `out` lies in the sequence's folder, or is that of the masks.
 Expected<void> CheckOut(const SegmentArguments& options) {
-  namespace fs = std::filesystem;
-  std::error_code failure;
-  const fs::path out = fs::weakly_canonical(options.out, failure);
   const auto refused = [&](const std::string& read) {
     return UsageError("--out '{}' lies in '{}', which is read, expected a folder outside",
                       options.out, read);
   };
-  if (fs::is_directory(options.source.path, failure)) {
-    const fs::path way = out.lexically_relative(fs::weakly_canonical(options.source.path, failure));
-    if (!way.empty() && *way.begin() != "..") return refused(options.source.path);
-  }
+  if (LiesIn(options.out, options.source.path)) return refused(options.source.path);
   const std::string& masks = options.segmentation.masks;
-  if (!masks.empty() && out == fs::weakly_canonical(masks, failure)) return refused(masks);
+  if (LiesIn(options.out, masks) && LiesIn(masks, options.out)) return refused(masks);
   return {};
 }
 
@@ -157,8 +152,7 @@ Expected<CommandResult> RunSegment(const SegmentArguments& options, const CLI::A
       files.insert("colour/" + SegmentWriter::NameOf(info.first_index + i));
     }
   }
-  // Images that have the names of ours are often what others made or read.
-  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(std::move(files), ForeignFiles::kStay));
+  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces(files));
   SegmentWriter writer(options, *source, run_folder.path());
   {
     ProgressBar bar("segment");

@@ -64,6 +64,14 @@ fs::path AbsolutePath(const fs::path& path) {
   return code ? path : absolute;
 }
 
+bool LiesIn(const fs::path& path, const fs::path& place) {
+  std::error_code code;
+  if (place.empty() || !fs::exists(place, code)) return false;
+  const fs::path way =
+      fs::weakly_canonical(path, code).lexically_relative(fs::weakly_canonical(place, code));
+  return !way.empty() && *way.begin() != "..";
+}
+
 std::string OwnName(const fs::path& folder) {
   return AbsolutePath(folder / "").lexically_normal().parent_path().filename().string();
 }

@@ -140,7 +140,7 @@ Expected<void> CheckPlaces(const CompareResult& result, const RunFolder& folder)
   for (const AdapterConfig& adapter : result.config.adapters) {
     files.insert(adapter.name + "/log.txt");
   }
-  return folder.CheckPlaces(std::move(files));
+  return folder.CheckPlaces(files);
 }
 
 // The last frame at which all that is left was evaluated; before the first where there is none.

@@ -206,7 +206,21 @@ std::set<std::string> RunFolder::OldFiles() const {
   return old;
 }
 
-Expected<void> RunFolder::CheckPlaces(std::set<std::string> files, ForeignFiles foreign) const {
+Expected<void> RunFolder::CheckPlaces(const std::set<std::string>& files) const {
+  TSDFPP_RETURN_IF_ERROR(CheckWays(files));
+  const std::set<std::string> old = OldFiles();
+  std::error_code failure;
+  for (const std::string& name : files) {
+    const fs::file_status there = fs::symlink_status(out_ / name, failure);
+    if (!fs::exists(there) || fs::is_directory(there) || old.contains(name)) continue;
+    return UsageError("{}: is of no earlier run and would be replaced, expected another folder",
+                      (out_ / name).string());
+  }
+  return {};
+}
+
+// What stands where a file or its folders are to be, but for files.
+Expected<void> RunFolder::CheckWays(std::set<std::string> files) const {
   const std::set<std::string> old = OldFiles();
   files.insert({kRunNote, kRunMoving});
   std::error_code failure;
@@ -227,11 +241,6 @@ Expected<void> RunFolder::CheckPlaces(std::set<std::string> files, ForeignFiles 
     const fs::file_status there = fs::symlink_status(out_ / name, failure);
     if (fs::is_other(there)) {
       return UsageError("{}: is no regular file, expected one or nothing", (out_ / name).string());
-    }
-    if (foreign == ForeignFiles::kStay && fs::exists(there) && !fs::is_directory(there) &&
-        !old.contains(name) && name != kRunNote && name != kRunMoving) {
-      return UsageError("{}: is of no earlier run and would be replaced, expected another folder",
-                        (out_ / name).string());
     }
     if (!fs::is_directory(there)) continue;
     // A folder of the old run's files alone goes with them, and one without files.
@@ -267,7 +276,7 @@ Expected<void> RunFolder::Commit(const std::set<std::string>& rewritten) {
   TSDFPP_RETURN_IF_ERROR(ListFiles(rewritten));
   std::set<std::string> names;
   for (const auto& [name, bytes] : note_.files) names.insert(name);
-  TSDFPP_RETURN_IF_ERROR(CheckPlaces(std::move(names)));
+  TSDFPP_RETURN_IF_ERROR(CheckWays(std::move(names)));
   const std::set<std::string> old = OldFiles();
   RunNote moving = note_;
   for (const std::string& name : old) moving.files.try_emplace(name, std::nullopt);

@@ -24,14 +24,12 @@ struct RunNote {
 
 inline constexpr const char* kRunNote = "run.json";
 
-// What becomes of files that no run wrote down, where new ones have their names.
-enum class ForeignFiles { kAreReplaced, kStay };
-
 // A run writes all its files into a hidden folder inside its output folder. In the end they move to
-// their places: the old run.json goes first, then what else that run left; what nobody wrote down
-// stays, but for files of the same names as new ones. The new run.json comes last. So whoever finds
-// it finds all files of that run and none of another; a killed run leaves either the earlier result
-// as it was or a folder without run.json, which the next run puts in order.
+// their places: the old run.json goes first, then what else that run left; what no run wrote down
+// stays, but for files of the same names as new ones that nobody asked about (CheckPlaces). The new
+// run.json comes last. So whoever finds it finds all files of that run and none of another; a
+// killed run leaves either the earlier result as it was or a folder without run.json, which the
+// next run puts in order.
 class RunFolder {
  public:
   // Makes the folder and locks it, and removes what killed runs left half done. Errors:
@@ -50,10 +48,8 @@ class RunFolder {
   const std::string& id() const { return note_.run; }
 
   // Whether files of these names could take their places: who knows what will be written asks
-  // before the work. Errors: kUsage, as Commit, and where `foreign` ones that are to stay have such
-  // a name.
-  Expected<void> CheckPlaces(std::set<std::string> files,
-                             ForeignFiles foreign = ForeignFiles::kAreReplaced) const;
+  // before the work. Errors: kUsage, as Commit, and where a file that no run wrote has such a name.
+  Expected<void> CheckPlaces(const std::set<std::string>& files) const;
 
   // Moves everything to its place. Of the files named in `rewritten` the size is not kept. Errors:
   // kUsage where a folder of somebody else's, a pipe or a device stands in a file's place, or a
@@ -65,6 +61,7 @@ class RunFolder {
  private:
   RunFolder(FolderLock lock, std::filesystem::path out, const std::string& command);
   Expected<void> ListFiles(const std::set<std::string>& rewritten);
+  Expected<void> CheckWays(std::set<std::string> files) const;
   // What earlier runs left, whole or not.
   std::set<std::string> OldFiles() const;
   Expected<void> MoveFiles(const std::set<std::string>& old) const;

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "mapper/track/model_sight.h"
+#include "mapper/volume/lattice_range.h"
 
 namespace tsdfpp {
 namespace {
@@ -20,12 +21,6 @@ constexpr int kLongestExtrapolation_frames = 5;
 constexpr double kOtherDepth_voxels = 2;
 // Numbers of frames may be any.
 constexpr std::int64_t kMostPassed = 1'000'000'000;
-
-// With a rotation again after a product of many, whose rounding would else grow.
-Pose AsRigid(Pose T) {
-  T.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
-  return T;
-}
 
 Eigen::Vector3d CentreOf(const std::vector<SegmentPoint>& points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -118,7 +113,7 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
   turn.status = TrackStatus::kTracked;
   turn.motion = registered->motion;
   if (SameNumbers(registered->T_WL, model->T_WL)) return;  // at rest
-  turn.moved_to = AsRigid(registered->T_WL * model->T_WL.inverse() * known->second);
+  turn.moved_to = MadeRigid(registered->T_WL * model->T_WL.inverse() * known->second);
 }
 
 void SdfTracker::Place(InstanceId id, int frame, PlacedModel model) {
@@ -169,7 +164,7 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
   if (found.frame.LongestWay_m(motion_L) <= config_.rest_voxels * voxel_m) {
     return Registered{model.T_WL, motion};
   }
-  return Registered{AsRigid(frame.T_WC * found.T_LC.inverse()), motion};
+  return Registered{MadeRigid(frame.T_WC * found.T_LC.inverse()), motion};
 }
 
 SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) const {

@@ -74,14 +74,18 @@ Expected<void> CheckRigid(const Pose& T, std::string_view whose) {
   return {};
 }
 
+Pose MadeRigid(const Pose& T) {
+  Pose rigid = T;
+  rigid.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
+  return rigid;
+}
+
 Pose NearestRigid(const Pose& T) {
   const Eigen::Matrix3d R = T.linear();
   if ((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidInProducts) {
     return T;
   }
-  Pose rigid = T;
-  rigid.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
-  return rigid;
+  return MadeRigid(T);
 }
 
 Expected<void> CheckMoved(const LatticeRange& range, const ObjectMove& move, int slack_blocks,

@@ -48,6 +48,9 @@ inline constexpr double kRigidTolerance = 1e-6;
 // What R R^T may be off by is kRigidTolerance. Errors: kData, a fragment that begins with `whose`.
 Expected<void> CheckRigid(const Pose& T, std::string_view whose);
 
+// What is nearly rigid, with a rotation again: of products of many, whose rounding would else grow.
+Pose MadeRigid(const Pose& T);
+
 // A pose that CheckRigid takes, as rigid as products of it have to be: as it is where it is.
 Pose NearestRigid(const Pose& T);
 

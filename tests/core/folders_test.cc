@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "core/files.h"
 #include "tests/core/temp_folder.h"
 
@@ -53,6 +55,23 @@ TEST(Folders, NamesOfAnyPath) {
   EXPECT_EQ(OwnName("."), fs::current_path().filename().string());
   EXPECT_EQ(AbsolutePath("/a/../b"), "/a/../b");
   EXPECT_TRUE(AbsolutePath("x").is_absolute());
+}
+
+TEST(Folders, WhatLiesInWhat) {
+  const TempFolder folder;
+  fs::create_directories(folder / "a" / "b");
+  std::ofstream(folder / "a" / "file").put('x');
+  fs::create_directory_symlink(folder / "a", folder / "link");
+  const fs::path a = folder / "a";
+  EXPECT_TRUE(LiesIn(a, a));
+  EXPECT_TRUE(LiesIn(a / "b", a));
+  EXPECT_TRUE(LiesIn(a / "not there", a));
+  EXPECT_TRUE(LiesIn(a / "file", a / "file"));
+  EXPECT_TRUE(LiesIn(folder / "link" / "b" / "not there", a));
+  EXPECT_FALSE(LiesIn(a / ".." / "ab", a));
+  EXPECT_FALSE(LiesIn(folder.path(), a));
+  EXPECT_FALSE(LiesIn(a / "b", folder / "not there"));
+  EXPECT_FALSE(LiesIn(a, ""));
 }
 
 TEST(Folders, AWorkingFolderThatIsGoneIsNoException) {
