@@ -1,7 +1,5 @@
 #include "mapper/segment/joined_segments.h"
 
-#include <sched.h>
-
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -10,6 +8,7 @@
 #include <numeric>
 #include <opencv2/core/utility.hpp>
 
+#include "mapper/segment/give_way.h"
 #include "mapper/segment/pixel_rays.h"
 
 namespace tsdfpp {
@@ -85,10 +84,7 @@ std::size_t InstanceOf(const Overlaps& overlaps, std::span<const std::int64_t> a
 
 // On one thread, this one, which is not needed again.
 Expected<std::vector<Instance>> FindGivingWay(InstanceFinder& finder, const Frame& frame) {
-  // Linux has a policy for each thread; that of 0 is the one that calls. Such a one has a core
-  // where nobody else wants it, and others that wake have it at once.
-  const sched_param none{};
-  sched_setscheduler(0, SCHED_IDLE, &none);
+  GiveWay();
   // A loop of OpenCV's within another is run by the thread that is in it.
   std::optional<Expected<std::vector<Instance>>> found;
   cv::parallel_for_(cv::Range(0, 1),

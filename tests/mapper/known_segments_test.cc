@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <chrono>
@@ -163,17 +164,25 @@ TEST(JoinedSegments, WhatIsFoundBecomesKnownWithItsLatency) {
   }
 }
 
-// Which thread looks, by which policy, and on how many it could run OpenCV's loops.
+// On how many cores this thread may run.
+int Cores() {
+  cpu_set_t cores;
+  return sched_getaffinity(0, sizeof cores, &cores) == 0 ? CPU_COUNT(&cores) : 0;
+}
+
+// Which thread looks, by which policy, on how many cores it may be, and on how many threads it
+// could run OpenCV's loops.
 class WatchingFinder : public InstanceFinder {
  public:
   struct Look {
     std::thread::id thread;
     int policy = 0;
+    int cores = 0;
     std::set<std::thread::id> helpers;
   };
 
   Expected<std::vector<Instance>> Find(const Frame& frame) override {
-    Look look{std::this_thread::get_id(), sched_getscheduler(0), {}};
+    Look look{std::this_thread::get_id(), sched_getscheduler(0), Cores(), {}};
     std::mutex mutex;
     cv::parallel_for_(cv::Range(0, 64), [&](const cv::Range&) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -210,6 +219,28 @@ TEST(JoinedSegments, ANetworkThatGivesWayHasOneLessUrgentThread) {
     }
     EXPECT_EQ(sched_getscheduler(0), policy);
   }
+}
+
+// Nobody else runs on the core of a network that gives way where the map's threads are fewer than
+// cores; where they are as many, it keeps to one of them.
+TEST(JoinedSegments, ANetworkThatGivesWayKeepsToOneOfTheMapsCores) {
+  const int cores = Cores();
+  ASSERT_GT(cores, 0);
+  const auto cores_with = [](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    NetworkConfig config;
+    config.every = 2;
+    config.latency = 2;
+    config.gives_way = true;
+    const auto finder = std::make_shared<WatchingFinder>();
+    auto segmenter = std::make_unique<JoinedSegments>(finder, config, DepthSegmentsConfig{});
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(segmenter->Segment(BoxFrame(i)).has_value());
+    segmenter.reset();  // waits for the last search
+    return finder->looks.back().cores;
+  };
+  EXPECT_EQ(cores_with(static_cast<std::size_t>(cores)), 1);
+  EXPECT_EQ(cores_with(1), cores);
+  EXPECT_EQ(Cores(), cores);
 }
 
 TEST(JoinedSegments, AnImageOfAnotherSizeBeginsAnew) {
