@@ -48,11 +48,11 @@ Expected<CommandResult> Describe(const BenchSet& set) {
 
 Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments& options) {
   if (options.out.empty()) return UsageError("--out is required with --run");
-  TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   std::set<std::string> methods;
   for (const std::string& method : SplitList(options.run)) {
     if (!methods.insert(method).second) return UsageError("--run names {} twice", method);
   }
+  TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
   SweepOptions sweep;
   sweep.out = std::filesystem::path(options.out) / "work";
@@ -74,20 +74,24 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments&
   return result;
 }
 
+// Errors: kUsage where the page would be one of the results that it is made of.
+Expected<void> CheckPlaceOfPage(const BenchSetArguments& options) {
+  const std::filesystem::path out(options.out);
+  std::error_code ignored;
+  const bool is_beside = std::filesystem::equivalent(
+      out.has_parent_path() ? out.parent_path() : ".", options.leaderboard, ignored);
+  if (!is_beside || out.extension() != ".json") return {};
+  return UsageError("--out '{}' would be one of the results of '{}', expected another place",
+                    options.out, options.leaderboard);
+}
+
 Expected<CommandResult> RunBenchSet(const BenchSetArguments& options) {
   TSDFPP_ASSIGN(const BenchSet set, BenchSet::Load(options.sets, options.name));
   if (!options.run.empty()) return RunMethods(set, options);
   if (!options.leaderboard.empty()) {
+    TSDFPP_RETURN_IF_ERROR(CheckPlaceOfPage(options));
     TSDFPP_ASSIGN(const std::string page, Leaderboard(set, options.leaderboard));
     if (options.out.empty()) return CommandResult{{{"page", page}}, page};
-    const std::filesystem::path out(options.out);
-    std::error_code ignored;
-    const bool is_beside = std::filesystem::equivalent(
-        out.has_parent_path() ? out.parent_path() : ".", options.leaderboard, ignored);
-    if (is_beside && out.extension() == ".json") {
-      return UsageError("--out '{}' would be one of the results of '{}', expected another place",
-                        options.out, options.leaderboard);
-    }
     TSDFPP_RETURN_IF_ERROR(WriteFile(options.out, page));
     return CommandResult{{{"page", options.out}}, fmt::format("{}\n", options.out)};
   }

@@ -193,9 +193,18 @@ void LogStart(const MapStart& start) {
   }
 }
 
-Expected<RunFolder> BeginRun(const MapArguments& options, const CLI::App& app) {
+Expected<RunFolder> BeginRun(const MapArguments& options, const MapStart& start,
+                             const CLI::App& app) {
   TSDFPP_ASSIGN(RunFolder folder, RunFolder::Begin(options.out, CommandText(app)));
-  std::set<std::string> files{"stats.json", fmt::format("mesh/scene.{}", options.mesh_format)};
+  std::set<std::string> files{"stats.json", fmt::format("mesh/scene.{}", options.mesh_format),
+                              "trajectories/camera.txt"};
+  // With votes the map's objects are known once it is made.
+  if (!start.by_votes()) {
+    for (const ObjectInfo& object : start.info.objects) {
+      files.insert(fmt::format("mesh/{}.{}", FileStem(object), options.mesh_format));
+      files.insert(fmt::format("trajectories/{}.txt", FileStem(object)));
+    }
+  }
   if (options.views > 0) files.insert("views/1");
   TSDFPP_RETURN_IF_ERROR(folder.CheckPlaces(files));
   return folder;
@@ -265,7 +274,7 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   TSDFPP_RETURN_IF_ERROR(CheckStart(options, start, removed));
   LogStart(start);
   TSDFPP_RETURN_IF_ERROR(CheckOutputs(options, start.frames()));
-  TSDFPP_ASSIGN(RunFolder run_folder, BeginRun(options, app));
+  TSDFPP_ASSIGN(RunFolder run_folder, BeginRun(options, start, app));
   const std::filesystem::path& out = run_folder.path();
 
   TSDFPP_ASSIGN(const MappedFrames mapped, MapFrames(start));

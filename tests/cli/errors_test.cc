@@ -325,6 +325,30 @@ TEST_F(CommandErrors, OverwriteTakesNothingElse) {
   }
 }
 
+// Files that no run of ours left, by the names that one would write.
+TEST_F(CommandErrors, ARunReplacesNothingOfOthers) {
+  const auto kept = [&](const std::string& command, const std::vector<std::string>& files) {
+    for (const std::string& file : files) {
+      fs::create_directories((folder_ / "theirs" / file).parent_path());
+      Write(folder_ / "theirs" / file, "kept");
+      ExpectError({command, scene_, "--out", folder_ / "theirs"}, kUsage,
+                  {file, "is of no earlier run and would be replaced"});
+      EXPECT_EQ(ReadFile(folder_ / "theirs" / file), "kept");
+      fs::remove_all(folder_ / "theirs");
+    }
+  };
+  kept("map", {"stats.json", "mesh/scene.ply", "mesh/background-0.ply", "trajectories/mug-1.txt"});
+  kept("compare", {"summary.json", "report.html"});
+  // Another name stays, and so does a file of the run's own.
+  fs::create_directories(folder_ / "theirs/mesh");
+  Write(folder_ / "theirs/mesh/notes.txt", "kept");
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(
+        test::RunTsdfpp({"map", scene_, "--out", folder_ / "theirs"}, folder_.path()).exit_code, 0);
+  }
+  EXPECT_EQ(ReadFile(folder_ / "theirs/mesh/notes.txt"), "kept");
+}
+
 TEST_F(CommandErrors, ASavedMapReplacesNothingThatIsRead) {
   ASSERT_EQ(
       test::RunTsdfpp({"generate", scene_, "--out", folder_ / "set"}, folder_.path()).exit_code, 0);

@@ -149,6 +149,12 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
       {{"compare", scene, "--out", "@/o", "--methods", "tsdf,tsdf++,tsdf"},
        "--methods names tsdf twice"},
       {{"map", scene, "--out", "@/o", "--remove", ","}, "--remove ',' names no object"},
+      {{"bench-set", "v1", "--sets", TSDFPP_SOURCE_DIR "/eval/bench-sets", "--run", "tsdf,tsdf",
+        "--out", "@/o"},
+       "--run names tsdf twice"},
+      {{"bench-set", "v1", "--sets", TSDFPP_SOURCE_DIR "/eval/bench-sets", "--leaderboard", "@",
+        "--out", "@/board.json"},
+       "--out '@/board.json' would be one of the results of '@', expected another place"},
   };
   EXPECT_GE(wrong.size(), 30U);
   for (const Wrong& one : wrong) {
