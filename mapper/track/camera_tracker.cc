@@ -26,6 +26,8 @@ constexpr int kMaxIterations = 40;
 constexpr int kCoarsePoints = 1500;
 // Over a room's radius, several times an object's.
 constexpr double kSettled_voxels = 0.02;
+// A camera that turns so far has other things in sight.
+constexpr double kKeyframeTurn_rad = 0.15;
 
 SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   config.rest_voxels = 0;
@@ -33,6 +35,9 @@ SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   config.free_space_weight = config.outline_weight = config.colour_weight = 0;
   // What stands in a room hides it.
   config.min_shown_share = 0;
+  // Its floor is seen at grazing angles, and has no other side.
+  config.max_slope = 0;
+  config.keyframe_turn_rad = std::min(config.keyframe_turn_rad, kKeyframeTurn_rad);
   // Where a camera was is no reason to think that it is there still; a given pose is one, each
   // frame's own.
   config.rest_frames = 0;

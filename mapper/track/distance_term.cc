@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 #include "mapper/track/robust_deviation.h"
 
@@ -51,6 +52,8 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
   kept_.assign(points_.size(), {});
   cubes_.resize(points_.size());
   const Eigen::Vector3d camera_L = T_LC.translation();
+  const auto max_slope = static_cast<float>(
+      config_.max_slope > 0 ? config_.max_slope : std::numeric_limits<float>::max());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, Taken(), kPointsPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
@@ -62,7 +65,7 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
           Kept& kept = kept_[i];
           if (config_.curved) kept.sag_m = model_->SagAt(y, sags);
           const SurfaceSample at = model_->At(y, kept.sag_m, cubes_[i]);
-          if (!at.has_slope) continue;
+          if (!at.has_slope || at.slope > max_slope) continue;
           kept.per_slope = 1 / at.slope;
           kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
           kept.distance_m = at.distance_m();

@@ -24,6 +24,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("axial_growth", axial_growth, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("lateral_px", lateral_px, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("model_voxels", model_voxels, 0.001, 10));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_slope", max_slope, 0, 1e6));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_voxels", huber_voxels, 0.001, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_deviations", huber_deviations, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("coarse_points", coarse_points, 10, 1000000));
@@ -77,6 +78,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("lateral_px", config.lateral_px)
       .Get("model_voxels", config.model_voxels)
       .Get("curved", config.curved)
+      .Get("max_slope", config.max_slope)
       .Get("huber_voxels", config.huber_voxels)
       .Get("huber_deviations", config.huber_deviations)
       .Get("coarse_points", config.coarse_points)
@@ -122,6 +124,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"lateral_px", lateral_px},
                      {"model_voxels", model_voxels},
                      {"curved", curved},
+                     {"max_slope", max_slope},
                      {"huber_voxels", huber_voxels},
                      {"huber_deviations", huber_deviations},
                      {"coarse_points", coarse_points},

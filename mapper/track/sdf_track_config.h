@@ -1,6 +1,7 @@
 // Settings of the tracker that registers an object's segment to the object's signed distances.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 #include "core/error.h"
@@ -28,7 +29,11 @@ struct SdfTrackConfig {
   double model_voxels = 0.1;
 
   // Point to signed distance.
-  bool curved = true;       // distances without their sag between voxels (SurfaceReader::SagAt)
+  bool curved = true;  // distances without their sag between voxels (SurfaceReader::SagAt)
+  // Where distances fall by more than this a metre they are not one surface's: of a side seen first
+  // at a grazing angle, whose free space is seen far along the ray, and of the side beside it,
+  // which lies before what is behind it. Points there have no distance. 0 switches this off.
+  double max_slope = 4;
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
   int coarse_points = 400;        // of the first passes
@@ -41,9 +46,9 @@ struct SdfTrackConfig {
   double weak_share = 0.02;
 
   // A segment is kept, at most so many points of it, and registered along with each later one until
-  // the object has turned by so much before the camera: what the model adds to both is taken off.
-  // 0 switches this off.
-  double keyframe_turn_rad = 0.15;
+  // the object has turned by so much before the camera, or by kMostViewTurn_rad where terms of the
+  // image compare it: what the model adds to both is taken off. 0 switches this off.
+  double keyframe_turn_rad = 0.8;
   int keyframe_points = 1500;
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
@@ -52,6 +57,11 @@ struct SdfTrackConfig {
   double free_space_weight = 0;
   double outline_weight = 0;
   double colour_weight = 0;
+  static constexpr double kMostViewTurn_rad = 0.15;
+  double KeyframeTurn_rad() const {
+    const bool compares = outline_weight > 0 || colour_weight > 0;
+    return compares ? std::min(keyframe_turn_rad, kMostViewTurn_rad) : keyframe_turn_rad;
+  }
 
   // Gates; an object that fails one is frozen for the frame.
   // A point nearer than this to the model's surface is an inlier, and one nearer than three of its

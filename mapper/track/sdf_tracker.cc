@@ -256,7 +256,7 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
   const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
   const auto has_turned = [&] {
     const Eigen::Matrix3d turn = memory.keyframe->T_OC.linear().transpose() * T_OC.linear();
-    return Eigen::AngleAxisd(turn).angle() > config_.keyframe_turn_rad;
+    return Eigen::AngleAxisd(turn).angle() > config_.KeyframeTurn_rad();
   };
   if (config_.keyframe_turn_rad > 0 && (!memory.keyframe || has_turned())) {
     memory.keyframe = KeyframeOf(sight, T_OC);
