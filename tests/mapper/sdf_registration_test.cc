@@ -246,6 +246,29 @@ TEST(SdfRegistration, IsBiasedWithoutSags) {
   EXPECT_GT(off(), 2 * kSmooth_voxels);
 }
 
+// A side that has been seen at a grazing angle alone: what is free before it was seen far along the
+// rays, what is behind it from another side. Between both distances cross zero beside the surface.
+TEST(SdfRegistration, IsNotDrawnToASideThatWasSeenGrazing) {
+  constexpr double kSide_m = 0.084;  // between two voxels
+  constexpr float kAlongTheRay_m = 10 * kVoxel_m;
+  const DistanceFunction box = reference::BoxDistance({kSide_m, 0.05, 0.06});
+  const TsdfGrid grid = GridOf([&](const Eigen::Vector3d& p) {
+    const bool is_before = p.x() > kSide_m && std::abs(p.y()) < 0.05 && std::abs(p.z()) < 0.06;
+    return is_before ? double{kAlongTheRay_m} : box(p);
+  });
+  const SurfaceReader model(grid, kVoxel_m);
+  const auto points = InCamera(reference::VisiblePoints(box, kEye, 120));
+  SdfTrackConfig config;
+  const auto off = [&] {
+    const auto found = RegisterToDistances(TaskFrom(model, points, Pose::Identity()), config);
+    EXPECT_TRUE(found.converged);
+    return (found.T_LC * TrueLC().inverse()).translation().norm() / kVoxel_m;
+  };
+  EXPECT_LT(off(), kEdges_voxels);
+  config.max_slope = 0;
+  EXPECT_GT(off(), 2 * kEdges_voxels);
+}
+
 // Distances that are whole multiples of 2^-10 m, which halves hold exactly.
 TEST(SurfaceReader, KnowsTheSagOfAQuadraticFunction) {
   const DistanceFunction quadratic = [](const Eigen::Vector3d& p) {
