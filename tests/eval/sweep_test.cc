@@ -170,6 +170,12 @@ TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
   EXPECT_EQ(RunSweep(file, "one").at("run_now"), 1);
   EXPECT_EQ(Timeless(fs::path("one/cells") / first), before);
   EXPECT_EQ(Bytes(fs::path("one/cells") / last), kept);
+  // An edited one is made again as well.
+  json edited = json::parse(Bytes(fs::path("one/cells") / first));
+  edited["examined"]["visible_completion"] = 0.123;
+  ASSERT_TRUE(WriteFile(folder_ / "one" / "cells" / first, edited.dump()).has_value());
+  EXPECT_EQ(RunSweep(file, "one").at("run_now"), 1);
+  EXPECT_EQ(Timeless(fs::path("one/cells") / first), before);
   // A larger experiment adds what is new.
   EXPECT_EQ(RunSweep(Experiment("method = [\"tsdf\", \"open3d/3\"]\nseed = [1, 2]\n"
                                 "voxel_m = [0.02, 0.03]",
