@@ -50,7 +50,12 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments&
   if (options.out.empty()) return UsageError("--out is required with --run");
   std::set<std::string> methods;
   for (const std::string& method : SplitList(options.run)) {
-    if (!methods.insert(method).second) return UsageError("--run names {} twice", method);
+    // As results have it: "anchored" is "tsdf++/anchored". What is unknown is said below.
+    CellSettings probe;
+    if (!FindAxis("method")->set(probe, method)) continue;
+    if (!methods.insert(probe.method).second) {
+      return UsageError("--run names {} twice", probe.method);
+    }
   }
   TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));

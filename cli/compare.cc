@@ -163,6 +163,12 @@ Expected<void> CheckLists(const CompareArguments& options, const std::string& po
       }
     }
   }
+  // A method may have a short name, too.
+  for (const Method method : config.methods) {
+    if (std::count(config.methods.begin(), config.methods.end(), method) > 1) {
+      return UsageError("--methods names {} twice", MethodName(method));
+    }
+  }
   for (const std::string& profile : config.profiles) {
     MapConfig probe = config.map;
     TSDFPP_RETURN_IF_ERROR(probe.SetProfile(profile));

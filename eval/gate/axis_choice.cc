@@ -80,4 +80,30 @@ Expected<std::map<std::string, CellSettings>> ChosenCells(const ExperimentConfig
   return chosen;
 }
 
+ExperimentConfig WithCells(const ExperimentConfig& config, const std::vector<CellSettings>& cells) {
+  ExperimentConfig only = config;
+  only.grids.clear();
+  only.plot.reset();
+  const CellSettings defaults;
+  for (const CellSettings& settings : cells) {
+    ExperimentGrid grid;
+    grid.name = std::to_string(only.grids.size() + 1);
+    for (const Axis& axis : Axes()) {
+      const AxisValue value = axis.get(settings);
+      if (value != axis.get(defaults)) grid.values[axis.name] = {value};
+    }
+    only.grids.push_back(std::move(grid));
+  }
+  return only;
+}
+
+ExperimentConfig WithSeeds(ExperimentConfig config, const std::vector<std::uint64_t>& seeds) {
+  for (ExperimentGrid& grid : config.grids) {
+    auto& values = grid.values["seed"];
+    values.clear();
+    for (const std::uint64_t seed : seeds) values.emplace_back(static_cast<double>(seed));
+  }
+  return config;
+}
+
 }  // namespace tsdfpp

@@ -1,8 +1,10 @@
 // Cells of an experiment, chosen by the values of its axes (docs/gates.md).
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "core/toml_reader.h"
 #include "eval/sweep/experiment.h"
@@ -22,6 +24,12 @@ Expected<AxisChoice> ReadAxisChoice(const toml::table& table, const std::string&
 Expected<std::map<std::string, CellSettings>> ChosenCells(const ExperimentConfig& config,
                                                           AxisChoice choice,
                                                           const AxisChoice& changed);
+
+// The experiment of exactly these cells, without a plot.
+ExperimentConfig WithCells(const ExperimentConfig& config, const std::vector<CellSettings>& cells);
+
+// The experiment with these seeds in place of its own.
+ExperimentConfig WithSeeds(ExperimentConfig config, const std::vector<std::uint64_t>& seeds);
 
 // "method tsdf++, profile close".
 std::string ChoiceText(const AxisChoice& choice);

@@ -1,5 +1,7 @@
 #include "eval/gate/gate_audit.h"
 
+#include <algorithm>
+
 #include "eval/sweep/sweep_metrics.h"
 
 namespace tsdfpp {
@@ -27,6 +29,20 @@ GateData OfSeeds(const GateData& data, const std::set<std::uint64_t>& seeds) {
   return chosen;
 }
 
+// Fresh seeds are no others than the replicates that a gate tells apart. Errors: kUsage.
+Expected<void> CheckSeedsAreReplicates(const GatesConfig& config, const std::string& profile) {
+  for (const Gate& gate : config.gates) {
+    if (!config.IsIn(gate.experiment, profile)) continue;
+    const auto& axes = config.FindExperiment(gate.experiment)->config.replicates;
+    if (std::find(axes.begin(), axes.end(), "seed") != axes.end()) continue;
+    return UsageError(
+        "{}: gate '{}' cannot be audited on other seeds: expected 'seed' among the replicates of "
+        "experiment '{}'",
+        config.file.string(), gate.name, gate.experiment);
+  }
+  return {};
+}
+
 std::string Number(const std::optional<double>& number, const Gate& gate) {
   if (!number) return "-";
   const std::string unit = gate.ratio ? "" : FindMetric(gate.metric)->unit;
@@ -38,6 +54,7 @@ std::string Number(const std::optional<double>& number, const Gate& gate) {
 Expected<std::vector<GateAudit>> AuditGates(const GatesConfig& config, const References& references,
                                             const GateOptions& options, int fresh,
                                             std::uint64_t first_seed) {
+  TSDFPP_RETURN_IF_ERROR(CheckSeedsAreReplicates(config, options.profile));
   TSDFPP_ASSIGN(const GateRun own, RunGates(config, references, options));
   GateOptions other = options;
   for (int i = 0; i < fresh; ++i) {
@@ -58,9 +75,12 @@ Expected<std::vector<GateAudit>> AuditGates(const GatesConfig& config, const Ref
       for (std::size_t k = 0; k < count; ++k) {
         seeds.insert(other.seeds[(trial + k) % other.seeds.size()]);
       }
+      const GateData data = OfSeeds(again.gates[g].data, seeds);
+      const auto reference = found == references.end()
+                                 ? std::nullopt
+                                 : std::optional(ReferenceOfFreshSeeds(found->second, data));
       const Judgement judgement =
-          JudgeGate(gate, OfSeeds(again.gates[g].data, seeds),
-                    found == references.end() ? nullptr : &found->second,
+          JudgeGate(gate, data, reference ? &*reference : nullptr,
                     config.FindExperiment(gate.experiment)->config.statistics);
       ++audit.trials;
       if (judgement.verdict == Verdict::kFail) {

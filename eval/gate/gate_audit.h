@@ -19,7 +19,8 @@ struct GateAudit {
 
 // Runs the gates of the profile on their own seeds, and again on `fresh` others, counted from
 // `first_seed`. A trial takes as many neighbouring fresh seeds as the gate has of its own, the
-// first following the last, so there are `fresh` trials. Errors: those of RunGates.
+// first following the last, so there are `fresh` trials. Errors: those of RunGates;
+// kUsage where an experiment has no replicates by seed.
 Expected<std::vector<GateAudit>> AuditGates(const GatesConfig& config, const References& references,
                                             const GateOptions& options, int fresh,
                                             std::uint64_t first_seed);

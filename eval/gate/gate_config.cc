@@ -164,6 +164,18 @@ void ReadComparison(TomlReader& reader, const toml::table& table, const SweepMet
   }
 }
 
+// Whether frames, map and scoring are the same, the map's settings in whatever words.
+bool IsOneCell(const CellSettings& a, const CellSettings& b) {
+  for (const Axis& axis : Axes()) {
+    if (axis.name == "method") break;  // the others are of the map
+    if (axis.get(a) != axis.get(b)) return false;
+  }
+  if (a.sabotage != b.sabotage) return false;
+  // Settings that do not go together have no map, and get their sentence when they are to be run.
+  return SettingsJson(a) == SettingsJson(b) ||
+         (a.Pipeline() && b.Pipeline() && MapKey(a) == MapKey(b));
+}
+
 // Which cells, and are there enough?
 void CheckCells(TomlReader& reader, const GateExperiment& experiment, const Gate& gate) {
   const auto ours = ChosenCells(experiment.config, gate.where, {});
@@ -184,8 +196,14 @@ void CheckCells(TomlReader& reader, const GateExperiment& experiment, const Gate
     return;
   }
   for (const auto& [replicate, settings] : *ours) {
-    if (!theirs->contains(replicate)) {
+    const auto other = theirs->find(replicate);
+    if (other == theirs->end()) {
       reader.Fault("against", fmt::format("has no cell for {}", replicate));
+    } else if (IsOneCell(settings, other->second)) {
+      reader.Fault("against", fmt::format("({}) leaves the gate's own cells, which never differ "
+                                          "from themselves: expected others",
+                                          ChoiceText(gate.against)));
+      return;
     }
   }
 }
@@ -206,6 +224,7 @@ Expected<Gate> ReadGate(const toml::table& table, const std::string& where,
   TSDFPP_ASSIGN(gate.where, ReadSubChoice(reader, "where"));
   TSDFPP_ASSIGN(gate.against, ReadSubChoice(reader, "against"));
   if (metric != nullptr) ReadComparison(reader, table, *metric, gate);
+  if (experiment != nullptr) gate.frames = experiment->config.frames;
   if (metric != nullptr && experiment != nullptr) CheckCells(reader, *experiment, gate);
   ReadWhy(reader, gate.why);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
@@ -235,6 +254,7 @@ Expected<GateControl> ReadControl(const toml::table& table, const std::string& w
                              "on something wrong prove nothing",
                              control.name));
   }
+  std::set<std::string> methods;
   for (std::string& method : control.methods) {
     CellSettings probe;
     if (auto set = FindAxis("method")->set(probe, method); !set) {
@@ -242,6 +262,9 @@ Expected<GateControl> ReadControl(const toml::table& table, const std::string& w
       continue;
     }
     method = probe.method;
+    if (!methods.insert(method).second) {
+      reader.Fault("methods", fmt::format("holds {} twice, which agrees with itself", method));
+    }
     if (experiment == nullptr) continue;
     if (const auto cells =
             ChosenCells(experiment->config, control.where, {{"method", AxisValue(method)}});

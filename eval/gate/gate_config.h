@@ -29,6 +29,7 @@ struct Gate {
   };
   std::string name;
   std::string experiment;
+  FrameChoice frames;  // the experiment's
   std::string metric;
   AxisChoice where;    // the cells of the experiment that it looks at
   AxisChoice against;  // kPaired: what differs in the others
@@ -67,9 +68,9 @@ struct GatesConfig {
   std::vector<GateSabotage> sabotages;
 
   // Errors: kUsage, one sentence with file, line and key: an unknown key, metric, experiment, axis,
-  // method, gate or sabotage, a bound that nothing can meet or miss, a name that is there twice, a
-  // choice that leaves no cell or cells that differ in more than replicates, a time that is
-  // compared with anything but another of the same run.
+  // method, gate or sabotage, a bound that nothing can meet or miss, cells that are compared with
+  // themselves, a name that is there twice, a choice that leaves no cell or cells that differ in
+  // more than replicates, a time that is compared with anything but another of the same run.
   static Expected<GatesConfig> Load(const std::filesystem::path& file);
   static Expected<GatesConfig> Parse(std::string_view text, const std::filesystem::path& file);
 

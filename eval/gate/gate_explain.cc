@@ -107,10 +107,14 @@ struct Seen {
   std::set<InstanceId> movers;
 };
 
-// Maps the cell's frames up to `last` and evaluates there.
+// Maps the cell's frames up to `last` and evaluates there. Errors: also kData where there is none.
 Expected<Seen> MapAgain(const ExperimentConfig& config, const CellSettings& settings, int last) {
   VariantMaker maker(config.file.parent_path(), config.frames);
   TSDFPP_ASSIGN(const SequenceVariant variant, maker.Make(settings));
+  if (last < variant.frames.front()) {
+    return DataError("{}: no frame up to {} is mapped, the first one is {}", config.file.string(),
+                     last, variant.frames.front());
+  }
   TSDFPP_ASSIGN(VariantSource source, VariantSource::Open(variant));
   Seen seen;
   TSDFPP_ASSIGN(seen.truth, SabotagedTruth(variant.sabotage, source.source(), variant.voxel_m));
@@ -226,7 +230,7 @@ Expected<GateExplanation> ExplainGate(const GateRun& run, const GateOutcome& out
   for (const auto& [replicate, chosen] : *cells) {
     if (replicate == worst.replicate) settings = chosen;
   }
-  settings.sabotage = run.options.sabotage;
+  if (run.options.sabotage != Sabotage::kNone) settings.sabotage = run.options.sabotage;
   TSDFPP_ASSIGN(const Seen seen, MapAgain(config, settings, worst.frame));
   const ObjectScores* object = ObjectBehind(gate.metric, seen.evaluation, seen.movers);
   if (object != nullptr) {

@@ -35,7 +35,9 @@ Measured OtherValue(const Gate& gate, const std::string& replicate, const GatePa
                     const GateReference* reference) {
   if (gate.kind == Gate::Kind::kReference) {
     const auto stored = reference->values.find(replicate);
-    return Measured::Of(stored == reference->values.end() ? MeanValue(*reference) : stored->second);
+    if (stored != reference->values.end()) return Measured::Of(stored->second);
+    return Measured::Undefined(
+        fmt::format("the reference has no value for {}: --update it", replicate));
   }
   if (pair.theirs == nullptr) return Measured::Undefined(fmt::format("{} has no pair", replicate));
   const Measured& theirs = pair.theirs->examined[MetricIndex(gate.metric)];
@@ -70,6 +72,13 @@ Measured ComparedValue(const Gate& gate, const std::string& replicate, const Gat
 }  // namespace
 
 bool IsOfTimes(const Gate& gate) { return FindMetric(gate.metric)->unit == "ms"; }
+
+GateReference ReferenceOfFreshSeeds(GateReference reference, const GateData& data) {
+  if (reference.values.empty()) return reference;  // which is judged as none
+  const double mean = MeanValue(reference);
+  for (const auto& [replicate, pair] : data) reference.values.try_emplace(replicate, mean);
+  return reference;
+}
 
 Judgement JudgeGate(const Gate& gate, const GateData& data, const GateReference* reference,
                     const BootstrapConfig& statistics) {

@@ -20,11 +20,14 @@ using GateData = std::map<std::string, GatePair>;
 // Does it compare times?
 bool IsOfTimes(const Gate& gate);
 
-// The gate's verdict on its cells. `reference` may be null: then a gate that needs one is invalid.
-// A replicate that the reference has not (a fresh seed) is compared with the mean of those it has.
-// Invalid where the metric is undefined for any replicate, or times are not of one run;
-// inconclusive where fewer than kLeastTimedFrames frames were timed. The ratio of `frame_ms` is the
-// median over the frames of a replicate, frame by frame.
+// The reference for an audit: replicates of `data` that it has not (fresh seeds) get the mean of
+// those it has.
+GateReference ReferenceOfFreshSeeds(GateReference reference, const GateData& data);
+
+// The gate's verdict on its cells. `reference` may be null: then a gate that needs one is invalid,
+// as it is where the reference lacks a replicate. Invalid where the metric is undefined for any
+// replicate, or times are not of one run; inconclusive where fewer than kLeastTimedFrames frames
+// were timed. The ratio of `frame_ms` is the median over the frames of a replicate, frame by frame.
 Judgement JudgeGate(const Gate& gate, const GateData& data, const GateReference* reference,
                     const BootstrapConfig& statistics);
 

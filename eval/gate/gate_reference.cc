@@ -73,7 +73,10 @@ double MeanValue(const GateReference& reference) {
 }
 
 std::string QuestionOf(const Gate& gate) {
-  return fmt::format("{}: {} of {}", gate.experiment, gate.metric, ChoiceText(gate.where));
+  const FrameChoice& frames = gate.frames;
+  return fmt::format("{}: {} of {}; frames: scale {}, stride {}, every {}, until {}",
+                     gate.experiment, gate.metric, ChoiceText(gate.where), frames.scale,
+                     frames.stride, frames.every, frames.until);
 }
 
 Expected<References> LoadReferences(const std::filesystem::path& file) {

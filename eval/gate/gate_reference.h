@@ -43,7 +43,8 @@ struct GateReference {
 // The mean of its values, of which there is one at least.
 double MeanValue(const GateReference& reference);
 
-// What a reference is of: experiment, metric and cells. A reference of another question is none.
+// What a reference is of: experiment, metric, cells and frames. A reference of another question is
+// none.
 std::string QuestionOf(const Gate& gate);
 
 using References = std::map<std::string, GateReference>;  // by gate

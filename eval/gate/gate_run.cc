@@ -15,24 +15,6 @@ std::string KeyOf(const std::string& experiment, const CellSettings& settings) {
   return experiment + " " + JsonText(SettingsJson(settings));
 }
 
-// An experiment of exactly these cells.
-ExperimentConfig WithCells(const ExperimentConfig& config, const std::vector<CellSettings>& cells) {
-  ExperimentConfig only = config;
-  only.grids.clear();
-  only.plot.reset();
-  const CellSettings defaults;
-  for (const CellSettings& settings : cells) {
-    ExperimentGrid grid;
-    grid.name = std::to_string(only.grids.size() + 1);
-    for (const Axis& axis : Axes()) {
-      const AxisValue value = axis.get(settings);
-      if (value != axis.get(defaults)) grid.values[axis.name] = {value};
-    }
-    only.grids.push_back(std::move(grid));
-  }
-  return only;
-}
-
 struct PlannedPair {
   CellSettings ours;
   std::optional<CellSettings> theirs;
@@ -81,41 +63,48 @@ struct GatePlan {
   std::vector<PlannedSabotage> sabotages;
 };
 
-PlannedCells CellsOfGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
-                         const std::vector<std::uint64_t>& seeds) {
+// Both choices were checked with the file, but for other seeds, which take the place of one that
+// the gate chose, too. Errors: kUsage, naming the gate, where they leave no cells of one kind.
+Expected<PlannedCells> CellsOfGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
+                                   const std::vector<std::uint64_t>& seeds) {
   ExperimentConfig experiment = config.FindExperiment(gate.experiment)->config;
+  AxisChoice where = gate.where;
+  AxisChoice against = gate.against;
   if (!seeds.empty()) {
-    for (ExperimentGrid& grid : experiment.grids) {
-      auto& values = grid.values["seed"];
-      values.clear();
-      for (const std::uint64_t seed : seeds) values.emplace_back(static_cast<double>(seed));
-    }
+    experiment = WithSeeds(std::move(experiment), seeds);
+    where.erase("seed");
+    against.erase("seed");
   }
+  const auto chosen = [&](const AxisChoice& changed) {
+    return ChosenCells(experiment, where, changed).map_error([&](const Error& error) {
+      return Error{error.kind, fmt::format("{}: gate '{}', with the audit's seeds, {}",
+                                           config.file.string(), gate.name, error.message)};
+    });
+  };
+  const auto sabotaged = [&](CellSettings settings) {
+    if (sabotage != Sabotage::kNone) settings.sabotage = sabotage;
+    return settings;
+  };
   PlannedCells plan;
-  // Both choices were checked with the file.
-  const auto ours = ChosenCells(experiment, gate.where, {});
-  for (const auto& [replicate, settings] : *ours) {
-    plan[replicate].ours = settings;
-    plan[replicate].ours.sabotage = sabotage;
-  }
+  TSDFPP_ASSIGN(const auto ours, chosen({}));
+  for (const auto& [replicate, settings] : ours) plan[replicate].ours = sabotaged(settings);
   if (gate.kind != Gate::Kind::kPaired) return plan;
-  const auto theirs = ChosenCells(experiment, gate.where, gate.against);
-  for (const auto& [replicate, settings] : *theirs) {
-    if (!plan.contains(replicate)) continue;
-    plan[replicate].theirs = settings;
-    plan[replicate].theirs->sabotage = sabotage;
+  TSDFPP_ASSIGN(const auto theirs, chosen(against));
+  for (const auto& [replicate, settings] : theirs) {
+    if (plan.contains(replicate)) plan[replicate].theirs = sabotaged(settings);
   }
   return plan;
 }
 
 // Plans the gate and adds what it needs.
-PlannedGate PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
-                     const std::vector<std::uint64_t>& seeds, Needs& needs) {
-  PlannedGate planned{&gate, CellsOfGate(config, gate, sabotage, seeds)};
+Expected<PlannedGate> PlanGate(const GatesConfig& config, const Gate& gate, Sabotage sabotage,
+                               const std::vector<std::uint64_t>& seeds, Needs& needs) {
+  TSDFPP_ASSIGN(PlannedCells cells, CellsOfGate(config, gate, sabotage, seeds));
+  PlannedGate planned{&gate, std::move(cells)};
   for (const auto& [replicate, pair] : planned.cells) {
     needs.Add(gate.experiment, pair.ours);
     if (pair.theirs) needs.Add(gate.experiment, *pair.theirs);
-    if (IsOfTimes(gate)) needs.AddTimedTogether(gate.experiment, pair);
+    if (pair.theirs && IsOfTimes(gate)) needs.AddTimedTogether(gate.experiment, pair);
   }
   return planned;
 }
@@ -128,7 +117,8 @@ std::map<std::string, CellSettings> CellsOfControl(const GatesConfig& config,
                       {{"method", AxisValue(method)}});
 }
 
-// The controls, gates and sabotages of the profile. Errors: kUsage, it has no gate.
+// The controls, gates and sabotages of the profile. Errors: kUsage, it has no gate; those of
+// CellsOfGate.
 Expected<GatePlan> PlanRun(const GatesConfig& config, const GateOptions& options) {
   GatePlan plan;
   const auto in_profile = [&](const std::string& experiment) {
@@ -144,7 +134,9 @@ Expected<GatePlan> PlanRun(const GatesConfig& config, const GateOptions& options
   }
   for (const Gate& gate : config.gates) {
     if (!options.only.empty() ? gate.name != options.only : !in_profile(gate.experiment)) continue;
-    plan.gates.push_back(PlanGate(config, gate, options.sabotage, options.seeds, plan.needs));
+    TSDFPP_ASSIGN(PlannedGate planned,
+                  PlanGate(config, gate, options.sabotage, options.seeds, plan.needs));
+    plan.gates.push_back(std::move(planned));
   }
   if (plan.gates.empty()) {
     return UsageError("{}: no gate is in profile '{}'", config.file.string(), options.profile);
@@ -156,7 +148,8 @@ Expected<GatePlan> PlanRun(const GatesConfig& config, const GateOptions& options
     for (const std::string& name : sabotage.caught_by) {
       const Gate* gate = config.FindGate(name);
       if (!in_profile(gate->experiment)) continue;
-      planned.gates.push_back(PlanGate(config, *gate, planned.sabotage, {}, plan.needs));
+      TSDFPP_ASSIGN(PlannedGate of_gate, PlanGate(config, *gate, planned.sabotage, {}, plan.needs));
+      planned.gates.push_back(std::move(of_gate));
     }
   }
   return plan;

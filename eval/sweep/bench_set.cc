@@ -1,5 +1,6 @@
 #include "eval/sweep/bench_set.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/files.h"
@@ -42,6 +43,36 @@ Expected<BenchSequence> ReadSequence(const toml::table& table, const std::string
   return sequence;
 }
 
+// What experiments may ask for, a set may have.
+void CheckValues(TomlReader& reader, const BenchSet& set) {
+  if (!(set.scale >= 0.05 && set.scale <= 4)) {
+    reader.Fault("scale", fmt::format("is {}, expected a number from 0.05 to 4", set.scale));
+  }
+  for (const auto& [axis, value] :
+       {std::pair{"voxel_m", set.voxel_m}, std::pair{"trunc_front", set.trunc_front},
+        std::pair{"trunc_back", set.trunc_back}}) {
+    CellSettings probe;
+    if (auto fits = FindAxis(axis)->set(probe, value); !fits) {
+      reader.Fault(axis, fits.error().message);
+    }
+  }
+}
+
+// The scene's own, as an axis has it: with it the scene is the one that was frozen. Errors: kUsage
+// where no axis can have it; those of LoadSceneConfig.
+Expected<AxisValue> SeedOf(const BenchSet& set, const BenchSequence& sequence) {
+  const fs::path file = set.file.parent_path() / sequence.scene;
+  TSDFPP_ASSIGN(const SceneConfig scene, LoadSceneConfig(file));
+  const AxisValue seed = static_cast<double>(scene.seed);
+  CellSettings probe;
+  // A double may be another whole number, where the scene's is above 2^53.
+  if (!FindAxis("seed")->set(probe, seed) || probe.seed != scene.seed) {
+    return UsageError("{}: 'seed' is {}, expected at most 2^53 of a benchmark's scene",
+                      file.string(), scene.seed);
+  }
+  return seed;
+}
+
 }  // namespace
 
 Expected<BenchSet> BenchSet::Load(const fs::path& folder, const std::string& name) {
@@ -73,6 +104,7 @@ Expected<BenchSet> BenchSet::Load(const fs::path& folder, const std::string& nam
       reader.Fault("metrics", fmt::format("holds '{}', which is no metric", metric));
     }
   }
+  CheckValues(reader, set);
   if (set.metrics.empty()) reader.Fault("metrics", "is empty, expected one name at least");
   for (const toml::table* table : reader.Tables("sequence", true)) {
     TSDFPP_ASSIGN(BenchSequence sequence, ReadSequence(*table, where));
@@ -133,13 +165,18 @@ Expected<ExperimentConfig> ExperimentOf(const BenchSet& set,
     if (auto known = FindAxis("method")->set(probe, method); !known) {
       return tl::unexpected(known.error());
     }
+    if (std::find(names.begin(), names.end(), AxisValue(probe.method)) != names.end()) {
+      return UsageError("method {} is named twice", probe.method);
+    }
     names.emplace_back(probe.method);
   }
   if (names.empty()) return UsageError("no method is named, expected one at least");
   config.baseline = std::get<std::string>(names.front());
   for (const BenchSequence& sequence : set.sequences) {
+    TSDFPP_ASSIGN(const AxisValue seed, SeedOf(set, sequence));
     config.grids.push_back({sequence.name,
                             {{"scene", {sequence.scene}},
+                             {"seed", {seed}},
                              {"method", names},
                              {"voxel_m", {set.voxel_m}},
                              {"trunc_front", {set.trunc_front}},

@@ -31,7 +31,8 @@ struct BenchSet {
   std::vector<std::string> metrics;
   std::vector<BenchSequence> sequences;
 
-  // Reads `folder`/`name`/set.toml. Errors: kUsage, with file, line and key; naming the sets there
+  // Reads `folder`/`name`/set.toml. Errors: kUsage, with file, line and key, also where a value is
+  // out of its axis's range; naming the sets there
   // are where there is none of this name.
   static Expected<BenchSet> Load(const std::filesystem::path& folder, const std::string& name);
 };
@@ -42,7 +43,9 @@ Expected<BenchSequence> HashSequence(const BenchSet& set, const BenchSequence& s
 // Errors: kData, naming the first sequence that is not what was frozen, with both hashes.
 Expected<void> CheckFrozen(const BenchSet& set);
 
-// The set as an experiment of these methods.
+// The set as an experiment of these methods, each scene with its own seed. Errors: kUsage, a method
+// that is unknown or, in whatever words, there twice; a seed that no axis can have; those of
+// scenes.
 Expected<ExperimentConfig> ExperimentOf(const BenchSet& set,
                                         const std::vector<std::string>& methods);
 

@@ -1,5 +1,8 @@
 #include "eval/sweep/cell.h"
 
+#include <fmt/ranges.h>
+
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -32,14 +35,104 @@ nlohmann::json Named(const std::vector<Measured>& values) {
   return named;
 }
 
+// Sums of areas in another order may make a share that is whole a little more than 1.
+constexpr double kRounding = 1e-6;
+
+// Throws what says why, as the next ones do, where it is no value that the metric can have.
+Measured ValueFromJson(const nlohmann::json& value, const SweepMetric& metric) {
+  if (!value.is_number()) {
+    if (!value.at("value").is_null()) {
+      throw std::out_of_range(fmt::format("{} is neither a number nor null", metric.name));
+    }
+    return Measured::Undefined(value.at("why"));
+  }
+  const double number = value.get<double>();
+  const std::optional<double> most = MostOf(metric);
+  if (!std::isfinite(number) || number < 0 || (most && number > *most + kRounding)) {
+    throw std::out_of_range(fmt::format("{} is {}", metric.name, JsonShown(value)));
+  }
+  return Measured::Of(number);
+}
+
 std::vector<Measured> FromNamed(const nlohmann::json& named, std::size_t count) {
   std::vector<Measured> values;
   for (std::size_t i = 0; i < count; ++i) {
-    const nlohmann::json& value = named.at(SweepMetrics()[i].name);
-    values.push_back(value.is_number() ? Measured::Of(value.get<double>())
-                                       : Measured::Undefined(value.at("why")));
+    const SweepMetric& metric = SweepMetrics()[i];
+    values.push_back(ValueFromJson(named.at(metric.name), metric));
   }
   return values;
+}
+
+// Cells of one key may have settings in other words, such as another name of the scene: what was
+// noted must stand for the same.
+void CheckSettings(const nlohmann::json& noted, const CellSettings& settings) {
+  if (noted == SettingsJson(settings)) return;
+  const auto read = SettingsFromJson(noted);
+  if (!read) throw std::out_of_range(read.error().message);
+  const bool same = read->seed == settings.seed && read->fuse_until == settings.fuse_until &&
+                    read->object_error == settings.object_error &&
+                    read->sabotage == settings.sabotage && read->Pipeline() &&
+                    MapKey(*read) == MapKey(settings);
+  if (!same) throw std::out_of_range("settings are of another cell");
+}
+
+// The evaluated frames, which are to be those of the cell.
+std::vector<CellFrame> FramesFromJson(const nlohmann::json& list, const Cell& cell) {
+  std::vector<CellFrame> frames;
+  std::vector<int> numbers;
+  for (const nlohmann::json& entry : list) {
+    CellFrame frame{FrameFromJson(entry.at("frame")), entry.at("examined"),
+                    FromNamed(entry.at("scores"), EvaluationMetricCount()), entry.at("map_digest")};
+    if (frame.examined != (frame.frame == cell.examined)) {
+      throw std::out_of_range(fmt::format("frame {} is{} the examined one, expected {}",
+                                          frame.frame, frame.examined ? "" : " not",
+                                          cell.examined));
+    }
+    numbers.push_back(frame.frame);
+    frames.push_back(std::move(frame));
+  }
+  if (numbers != cell.evaluated) {
+    throw std::out_of_range(fmt::format("frames {} are evaluated, expected {}",
+                                        fmt::join(numbers, " "), fmt::join(cell.evaluated, " ")));
+  }
+  return frames;
+}
+
+// Says the examined frame what the cell says of it?
+void CheckExamined(const CellResult& result) {
+  for (const CellFrame& frame : result.frames) {
+    if (!frame.examined) continue;
+    for (std::size_t m = 0; m < frame.values.size(); ++m) {
+      const Measured& whole = result.examined[m];
+      if (frame.values[m].value == whole.value && frame.values[m].why_not == whole.why_not)
+        continue;
+      throw std::out_of_range(fmt::format("{} is not what it is at frame {}, the examined one",
+                                          SweepMetrics()[m].name, frame.frame));
+    }
+  }
+}
+
+// Of each frame used.
+std::map<int, std::string> ImagesFromJson(const nlohmann::json& images, const Cell& cell) {
+  if (images.size() != cell.frames.size()) {
+    throw std::out_of_range(
+        fmt::format("{} frames have images, expected {}", images.size(), cell.frames.size()));
+  }
+  std::map<int, std::string> digests;
+  for (const int frame : cell.frames) digests[frame] = images.at(std::to_string(frame));
+  return digests;
+}
+
+std::vector<double> FrameTimesFromJson(const nlohmann::json& list, const Cell& cell) {
+  std::vector<double> times_ms = list.get<std::vector<double>>();
+  if (times_ms.size() != cell.frames.size()) {
+    throw std::out_of_range(
+        fmt::format("{} frames have times, expected {}", times_ms.size(), cell.frames.size()));
+  }
+  for (const double ms : times_ms) {
+    if (!(ms >= 0)) throw std::out_of_range(fmt::format("a frame's time is {}", ms));
+  }
+  return times_ms;
 }
 
 }  // namespace
@@ -63,7 +156,8 @@ Cell MakeCell(const CellSettings& settings, const SequenceVariant& variant,
   std::string key =
       fmt::format("tsdfpp cell {}\nmap {}\n{}", kCellSchema, MapKey(settings), frames);
   std::string id = HashText(key);
-  return {settings, std::move(key), std::move(id), HashText(frames)};
+  return {settings,       std::move(key),    std::move(id),   HashText(frames),
+          variant.frames, variant.evaluated, variant.examined};
 }
 
 std::string ImageDigest(const Frame& frame) {
@@ -115,23 +209,23 @@ Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell) {
     if (json.at("schema") != kCellSchema || json.at("key") != cell.key) {
       return DataError("cell {}: is of another program or of other settings", cell.id);
     }
-    CellResult result;
-    for (const nlohmann::json& entry : json.at("frames")) {
-      result.frames.push_back({FrameFromJson(entry.at("frame")), entry.at("examined"),
-                               FromNamed(entry.at("scores"), EvaluationMetricCount()),
-                               entry.at("map_digest")});
+    if (json.at("id") != cell.id || json.at("sequence") != cell.sequence) {
+      return DataError("cell {}: has the id {} and the sequence {}, expected its own", cell.id,
+                       JsonShown(json.at("id")), JsonShown(json.at("sequence")));
     }
+    CheckSettings(json.at("settings"), cell.settings);
+    CellResult result;
+    result.frames = FramesFromJson(json.at("frames"), cell);
     result.examined = FromNamed(json.at("examined"), SweepMetrics().size());
+    CheckExamined(result);
     result.evaluation = json.at("evaluation");
     for (const nlohmann::json& id : json.at("removed"))
       result.removed.push_back(ObjectFromJson(id));
     const nlohmann::json& times = json.at("times");
     result.times = times.at("steps");
-    result.frame_ms = times.at("frame_ms").get<std::vector<double>>();
+    result.frame_ms = FrameTimesFromJson(times.at("frame_ms"), cell);
     result.timed_in = times.at("run");
-    for (const auto& [frame, digest] : json.at("images").items()) {
-      result.image_digests[std::stoi(frame)] = digest;
-    }
+    result.image_digests = ImagesFromJson(json.at("images"), cell);
     return result;
   } catch (const std::exception& error) {
     return DataError("cell {}: a field is missing or wrong ({})", cell.id,

@@ -21,6 +21,10 @@ struct Cell {
   std::string key;
   std::string id;        // HashText(key)
   std::string sequence;  // HashText of the part of the key that is about frames
+  // Of the variant: the frames used, those evaluated, and the one examined.
+  std::vector<int> frames{};
+  std::vector<int> evaluated{};
+  int examined = 0;
 };
 
 // `program` and `renderer`: what makes the frames and the figures.
@@ -58,7 +62,9 @@ int FrameFromJson(const nlohmann::json& value);
 InstanceId ObjectFromJson(const nlohmann::json& value);
 
 nlohmann::json CellToJson(const Cell& cell, const CellResult& result);
-// Errors: kData, in a sentence: not JSON, another schema, a field that is missing or wrong.
+// Errors: kData, in a sentence: not JSON, another schema, a field that is missing or wrong, and
+// what no run of this cell can have said: other frames, settings of another map, a figure out of
+// its metric's range or other than the examined frame's.
 Expected<CellResult> CellFromJson(const std::string& text, const Cell& cell);
 
 // A folder with a file a cell, each whole or not there.

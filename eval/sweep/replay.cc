@@ -59,6 +59,15 @@ void ReadSequence(const json& sequence, SequenceVariant& variant) {
   }
   variant.evaluated = FramesOf(sequence.at("evaluated"));
   variant.examined = FrameFromJson(sequence.at("examined"));
+  // Of another frame there would be no map to compare.
+  if (!std::includes(variant.frames.begin(), variant.frames.end(), variant.evaluated.begin(),
+                     variant.evaluated.end())) {
+    throw std::out_of_range("'evaluated' has frames that are not among 'frames'");
+  }
+  if (!variant.IsEvaluated(variant.examined)) {
+    throw std::out_of_range(
+        fmt::format("'examined' is {}, which is not among 'evaluated'", variant.examined));
+  }
   variant.fuse_until = FrameFromJson(sequence.at("fuse_until"));
   CellSettings probe;
   const json& error = sequence.at("object_error");

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
@@ -123,6 +125,103 @@ TEST_F(GateCommand, FromTheFirstReferencesToAFailure) {
   EXPECT_EQ(explained.exit_code, 0);
   EXPECT_NE(explained.out.find("object car"), std::string::npos) << explained.out;
   EXPECT_NE(explained.out.find("\nvalue: "), std::string::npos) << explained.out;
+}
+
+// An edited cell is no figure of a gate: it is run anew.
+TEST_F(GateCommand, AnEditedCellIsRunAgain) {
+  const std::string gates = kGates;
+  const std::size_t from = gates.find("[[gate]]\nname = \"as-before\"");
+  Write("gates.toml", gates.substr(0, from));
+  const auto before = Gate({"--json"});
+  ASSERT_EQ(before.exit_code, 0) << before.out << before.err;
+  const auto edit_all = [&](const std::function<void(nlohmann::json&)>& edit) {
+    for (const auto& file :
+         std::filesystem::directory_iterator(folder_.path() / "out" / "tiny" / "cells")) {
+      nlohmann::json cell = nlohmann::json::parse(ReadFile(file.path()).value());
+      edit(cell);
+      ASSERT_TRUE(WriteFile(file.path(), cell.dump()));
+    }
+  };
+  const auto mean = [](const test::CommandOutput& output) {
+    return nlohmann::json::parse(output.out)["gates"][0]["mean"];
+  };
+  edit_all([](nlohmann::json& cell) {
+    cell["frames"] = nlohmann::json::array();
+    cell["examined"]["movers_completion"] = 0.01;
+  });
+  const auto explained = Gate({"--explain", "completion"});
+  EXPECT_EQ(explained.exit_code, 0) << explained.out << explained.err;
+  EXPECT_NE(explained.out.find("completion is pass"), std::string::npos) << explained.out;
+  edit_all([](nlohmann::json& cell) { cell["examined"]["movers_completion"] = 5.0; });
+  const auto after = Gate({"--json"});
+  EXPECT_EQ(after.exit_code, 0) << after.out << after.err;
+  EXPECT_EQ(mean(after), mean(before));
+}
+
+// A gate may look at cells that the experiment breaks itself.
+TEST_F(GateCommand, TheAxisSabotageIsAskedFor) {
+  std::string experiment = File("tiny.toml");
+  const std::string methods = "[\"tsdf\", \"tsdf++\"]";
+  experiment.replace(experiment.find(methods), methods.size(),
+                     "\"tsdf++\"\nsabotage = [\"none\", \"frozen-object\"]");
+  Write("tiny.toml", experiment);
+  const std::string head = std::string(kGates).substr(0, std::string(kGates).find("[[control]]"));
+  const auto gate = [](const std::string& name, const std::string& choice) {
+    return fmt::format(R"([[gate]]
+name = "{}"
+experiment = "tiny"
+metric = "movers_completion"
+{}
+min = 0.01
+confidence = 1
+why = "to be seen"
+)",
+                       name, choice);
+  };
+  Write("gates.toml", head + gate("healthy", "where = { sabotage = \"none\" }") +
+                          gate("frozen", "where = { sabotage = \"frozen-object\" }") +
+                          gate("pair",
+                               "where = { sabotage = \"none\" }\n"
+                               "against = { sabotage = \"frozen-object\" }"));
+  const auto ran = Gate({"--json"});
+  const auto of = nlohmann::json::parse(ran.out)["gates"];
+  const double healthy = of[0]["mean"];
+  const double frozen = of[1]["mean"];
+  EXPECT_GT(healthy, frozen + 0.01) << ran.out;
+  EXPECT_NEAR(of[2]["mean"].get<double>(), healthy - frozen, 1e-12);
+}
+
+// An audit takes other seeds, also in place of one that a gate chose among several.
+TEST_F(GateCommand, AnAuditTakesItsOwnSeeds) {
+  std::string experiment = File("tiny.toml");
+  experiment.replace(experiment.find("seed = 1"), 8, "seed = [1, 2]");
+  experiment.replace(experiment.find("stride = 8"), 10, "stride = 16");
+  Write("tiny.toml", experiment);
+  const std::string gates = std::string(kGates).substr(0, std::string(kGates).find("[[control]]")) +
+                            R"([[gate]]
+name = "one-seed"
+experiment = "tiny"
+metric = "movers_completion"
+where = { method = "tsdf++", seed = 1 }
+min = 0.01
+confidence = 1
+why = "it is seen"
+)";
+  Write("gates.toml", gates);
+  const auto audit = Gate({"--audit", "--json"});
+  ASSERT_EQ(audit.exit_code, 0) << audit.out << audit.err;
+  const auto json = nlohmann::json::parse(audit.out);
+  EXPECT_EQ(json[0]["trials"], 20);
+  EXPECT_EQ(json[0]["inconclusive"], 0);
+  // Where seeds are no replicates, other seeds are other cells.
+  experiment.replace(experiment.find("replicates = [\"seed\"]"), 21, "replicates = [\"scene\"]");
+  Write("tiny.toml", experiment);
+  const auto refused = Gate({"--audit"});
+  EXPECT_EQ(refused.exit_code, 2) << refused.err;
+  EXPECT_NE(refused.err.find("gate 'one-seed' cannot be audited on other seeds: expected 'seed' "
+                             "among the replicates of experiment 'tiny'"),
+            std::string::npos)
+      << refused.err;
 }
 
 TEST_F(GateCommand, AControlThatFailsMakesAllInvalid) {

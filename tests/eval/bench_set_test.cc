@@ -3,8 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <set>
+
 #include "core/files.h"
 #include "eval/sweep/bench_result.h"
+#include "sequence/sequence_json.h"
+#include "sim/load_scene.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/tiny_scene.h"
@@ -12,6 +17,7 @@
 namespace tsdfpp {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kSets = TSDFPP_SOURCE_DIR "/eval/bench-sets";
@@ -74,6 +80,66 @@ TEST(BenchSetV1, IsAsFrozen) {
   EXPECT_TRUE(frozen.has_value()) << frozen.error().message;
 }
 
+// The scenes that are run are the ones whose hashes were compared, their seeds too.
+TEST(BenchSetV1, RunsTheScenesThatAreFrozen) {
+  const auto set = BenchSet::Load(kSets, "v1");
+  ASSERT_TRUE(set.has_value()) << set.error().message;
+  const auto config = ExperimentOf(*set, {"tsdf"});
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto cells = CellsOf(*config);
+  ASSERT_EQ(cells.size(), set->sequences.size());
+  std::set<std::uint64_t> seeds;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const CellSettings& settings = cells[i].settings;
+    const auto scene = LoadSceneConfig(set->file.parent_path() / settings.scene, settings.seed);
+    ASSERT_TRUE(scene.has_value()) << scene.error().message;
+    EXPECT_EQ(HashText(SceneToToml(*scene)), set->sequences[i].scene_hash) << cells[i].grid;
+    seeds.insert(settings.seed);
+  }
+  EXPECT_TRUE(seeds.contains(101)) << "of random-101";
+}
+
+TEST_F(SmallSet, EachSceneHasItsOwnSeed) {
+  ASSERT_TRUE(WriteFile(folder_ / "sets/s/b.toml", "seed = 7\n" + test::TinyScene(5)).has_value());
+  const auto config = ExperimentOf(set_, {"tsdf"});
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto cells = CellsOf(*config);
+  ASSERT_EQ(cells.size(), 2U);
+  EXPECT_EQ(cells[0].settings.seed, 1U);
+  EXPECT_EQ(cells[1].settings.seed, 7U);
+  // No number of an experiment is that exact.
+  ASSERT_TRUE(WriteFile(folder_ / "sets/s/b.toml", "seed = 9007199254740993\n" + test::TinyScene(5))
+                  .has_value());
+  const auto above = ExperimentOf(set_, {"tsdf"});
+  ASSERT_FALSE(above.has_value());
+  EXPECT_EQ(above.error().kind, ErrorKind::kUsage);
+  EXPECT_NE(above.error().message.find("b.toml: 'seed' is 9007199254740993, expected at most 2^53"),
+            std::string::npos)
+      << above.error().message;
+}
+
+TEST_F(SmallSet, ValuesThatNoMapHasAreRefused) {
+  const fs::path file = folder_ / "sets/s/set.toml";
+  const std::string good = ReadFile(file).value();
+  const std::vector<std::array<std::string, 3>> cases{
+      {"voxel_m = 0.02", "voxel_m = 5.0", ":3: 'voxel_m' holds 5, expected a number from 0.0005"},
+      {"voxel_m = 0.02", "voxel_m = 1e-9", ":3: 'voxel_m' holds 1e-09, expected a number"},
+      {"trunc_front = 10", "trunc_front = 0.5",
+       ":4: 'trunc_front' holds 0.5, expected a number from 1 to 100"},
+      {"trunc_back = 3", "trunc_back = 101", ":5: 'trunc_back' holds 101, expected a number"},
+      {"scale = 1", "scale = 0", ":2: 'scale' is 0, expected a number from 0.05 to 4"}};
+  for (const auto& [old, text, sentence] : cases) {
+    std::string changed = good;
+    changed.replace(changed.find(old), old.size(), text);
+    ASSERT_TRUE(WriteFile(file, changed).has_value());
+    const auto set = BenchSet::Load(folder_ / "sets", "s");
+    ASSERT_FALSE(set.has_value()) << text;
+    EXPECT_EQ(set.error().kind, ErrorKind::kUsage);
+    EXPECT_NE(set.error().message.find("set.toml" + sentence), std::string::npos)
+        << set.error().message;
+  }
+}
+
 TEST_F(SmallSet, WhatIsNotAsFrozenIsNamed) {
   EXPECT_TRUE(CheckFrozen(set_).has_value());
   // The same text with a space in a comment is the same scene; a car that drives otherwise is not.
@@ -101,6 +167,7 @@ TEST_F(SmallSet, TheExperimentHasItsSettings) {
   EXPECT_EQ(cells[1].settings.trunc_back, 3);
   EXPECT_FALSE(ExperimentOf(set_, {"kinfu"}).has_value());
   EXPECT_FALSE(ExperimentOf(set_, {}).has_value());
+  EXPECT_FALSE(ExperimentOf(set_, {"anchored", "tsdf", "tsdf++/anchored"}).has_value());
 }
 
 TEST_F(SmallSet, ALeaderboardIsBestFirst) {

@@ -270,29 +270,6 @@ TEST(Experiment, ACellIsNamedAfterAllThatDeterminesIt) {
   EXPECT_EQ(MakeCell(renamed, variant, "p", "r").id, cell.id);
 }
 
-TEST(Experiment, ACellComesBackFromItsFile) {
-  SequenceVariant variant;
-  variant.scene_text = "scene";
-  const Cell cell = MakeCell({}, variant, "p", "r");
-  CellResult result;
-  for (std::size_t m = 0; m < SweepMetrics().size(); ++m) {
-    result.examined.push_back(m % 3 == 0 ? Measured::Undefined("why " + SweepMetrics()[m].name)
-                                         : Measured::Of(0.1 * static_cast<double>(m) / 3));
-  }
-  result.frames.push_back({4, true, result.examined, "abc"});
-  result.frames.back().values.resize(EvaluationMetricCount());
-  result.removed = {1, 7};
-  result.image_digests = {{2, "x"}, {4, "y"}};
-  const std::string text = CellToJson(cell, result).dump();
-  const auto back = CellFromJson(text, cell);
-  ASSERT_TRUE(back.has_value()) << back.error().message;
-  EXPECT_EQ(CellToJson(cell, *back).dump(), text);
-  // Not of another key, not half of it.
-  EXPECT_FALSE(CellFromJson(text, MakeCell({}, variant, "q", "r")).has_value());
-  EXPECT_FALSE(CellFromJson(text.substr(0, text.size() / 2), cell).has_value());
-  EXPECT_FALSE(CellFromJson("{}", cell).has_value());
-}
-
 // Two methods on three seeds, one value of one method undefined: means over what is there, pairs
 // where both are; checked by hand.
 TEST(Experiment, ComparesPairByPair) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "eval/gate/gate_reference.h"
 #include "eval/sweep/sabotage.h"
 #include "tests/core/temp_folder.h"
 
@@ -167,10 +168,57 @@ TEST_F(GateConfigTest, WrongFilesGetASentenceWithFileAndLine) {
   begins("min = 0.9\n", "", "gates.toml:6: 'control.name' is 'agree', but there is neither min");
   begins("methods = [\"tsdf\", \"tsdf++\"]", "methods = [\"tsdf\", \"volumes\"]",
          "gates.toml:10: 'control.methods' (method volumes, profile close) leaves no cell");
+  begins("methods = [\"tsdf\", \"tsdf++\"]", "methods = [\"tsdf\", \"tsdf\"]",
+         "gates.toml:10: 'control.methods' holds tsdf twice, which agrees with itself");
+  begins("against = { method = \"tsdf\" }", "against = { method = \"tsdf++\" }",
+         "gates.toml:26: 'gate.against' (method tsdf++) leaves the gate's own cells");
   begins("name = \"frozen-object\"", "name = \"none\"",
          "gates.toml:39: 'sabotage.name' is 'none', which breaks nothing");
   EXPECT_NE(ErrorOf("[[sabotage]]", "[[sabotages]]").find("'sabotages' is not a known key"),
             std::string::npos);
+}
+
+// Other words for the same cells: a method's short name, and a setting that the method has not.
+TEST_F(GateConfigTest, NothingIsComparedWithItselfInOtherWords) {
+  std::string experiment = kExperiment;
+  const std::string methods = "\"tsdf++\"]";
+  experiment.replace(experiment.find(methods), methods.size(),
+                     "\"tsdf++\", \"tsdf++/anchored\"]\nvote_band = [50, 100]");
+  ASSERT_TRUE(WriteFile(folder_.path() / "small.toml", experiment));
+  const std::string head = std::string(kGates).substr(0, std::string(kGates).find("[[control]]"));
+  const auto error = [&](const std::string& text) {
+    const auto parsed = Parse(head + text);
+    return parsed ? "no error" : parsed.error().message;
+  };
+  const std::string control = R"([[control]]
+name = "agree"
+experiment = "small"
+metric = "visible_completion"
+where = { profile = "close", vote_band = 50 }
+methods = ["anchored", "tsdf++/anchored"]
+spread = 0.01
+min = 0.9
+why = "they are one"
+)";
+  EXPECT_NE(error(control).find("'control.methods' holds tsdf++/anchored twice"), std::string::npos)
+      << error(control);
+  const auto gate = [](const std::string& method) {
+    return fmt::format(R"([[gate]]
+name = "pays"
+experiment = "small"
+metric = "visible_completion"
+where = {{ method = "{}", profile = "close", vote_band = 50 }}
+against = {{ vote_band = 100 }}
+min = -0.01
+why = "not worse"
+)",
+                       method);
+  };
+  EXPECT_NE(
+      error(gate("tsdf++")).find("'gate.against' (vote_band 100) leaves the gate's own cells"),
+      std::string::npos)
+      << error(gate("tsdf++"));
+  EXPECT_EQ(error(gate("tsdf")), "no error");
 }
 
 TEST_F(GateConfigTest, AWrongExperimentIsNamedByItsOwnFile) {
@@ -210,6 +258,24 @@ TEST(OwnGates, EverySabotageAndEveryBaselineHasAGate) {
     for (const char* profile : {"paper", "close"}) {
       EXPECT_TRUE(two_sided(experiment, "ghost_area_cm2", "tsdf++/anchored", profile))
           << experiment << " " << profile;
+    }
+  }
+}
+
+// A reference of another question is none: the frames of an experiment may not change without it.
+TEST(OwnGates, ReferencesAreOfTheQuestionsThatGatesAsk) {
+  const auto config =
+      GatesConfig::Load(std::filesystem::path(TSDFPP_SOURCE_DIR) / "results" / "gates.toml");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto references = LoadReferences(config->references);
+  ASSERT_TRUE(references.has_value()) << references.error().message;
+  for (const Gate& gate : config->gates) {
+    if (gate.kind != Gate::Kind::kReference) continue;
+    ASSERT_TRUE(references->contains(gate.name)) << gate.name;
+    EXPECT_EQ(references->at(gate.name).question, QuestionOf(gate)) << gate.name;
+    const auto cells = ChosenCells(config->FindExperiment(gate.experiment)->config, gate.where, {});
+    for (const auto& [replicate, settings] : *cells) {
+      EXPECT_TRUE(references->at(gate.name).values.contains(replicate)) << gate.name << replicate;
     }
   }
 }

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <deque>
+
 #include "core/files.h"
+#include "eval/gate/gate_explain.h"
 #include "eval/gate/gate_report.h"
 #include "eval/gate/gate_times.h"
 #include "eval/report/report_gates.h"
@@ -138,15 +141,37 @@ TEST_F(GateRunTest, ReferencesAreTwoSided) {
   EXPECT_EQ(verdict({0.55, 0.75, 0.65}), Verdict::kFail) << "an improvement is to be explained";
 }
 
-TEST_F(GateRunTest, FreshSeedsAreComparedWithTheMean) {
+TEST_F(GateRunTest, FreshSeedsOfAnAuditAreComparedWithTheMean) {
   const Gate gate = Of(Gate::Kind::kReference, {-0.05, 0.05});
   const GateReference reference = ReferenceOf(gate, {0.5, 0.7});
   GateData data;
   data["seed=101;"] = {Cell(0.59), nullptr};
   data["seed=102;"] = {Cell(0.61), nullptr};
-  const Judgement judgement = JudgeGate(gate, data, &reference, kStatistics);
+  const GateReference fresh = ReferenceOfFreshSeeds(reference, data);
+  const Judgement judgement = JudgeGate(gate, data, &fresh, kStatistics);
   EXPECT_EQ(judgement.verdict, Verdict::kPass);
   EXPECT_NEAR(*judgement.mean.value, 0, 1e-12);
+  EXPECT_EQ(fresh.values.at("seed=1;"), 0.5);
+  EXPECT_TRUE(ReferenceOfFreshSeeds({}, data).values.empty());
+}
+
+// The mean of others is no reference of a seed: it would hide what the seed does.
+TEST_F(GateRunTest, ASeedThatTheReferenceLacksIsInvalid) {
+  const Gate gate = Of(Gate::Kind::kReference, {-0.3, 0.3});
+  const GateReference reference = ReferenceOf(gate, {0.5, 0.7});
+  const Judgement judgement = JudgeGate(gate, Data({0.5, 0.7, 0.6}), &reference, kStatistics);
+  EXPECT_EQ(judgement.verdict, Verdict::kInvalid);
+  EXPECT_EQ(judgement.why, "the reference has no value for seed=3;: --update it");
+}
+
+TEST_F(GateRunTest, AReferenceOfOtherFramesIsInvalid) {
+  Gate gate = Of(Gate::Kind::kReference, {-0.1, 0.1});
+  const GateReference reference = ReferenceOf(gate, {0.5, 0.6});
+  EXPECT_EQ(JudgeGate(gate, Data({0.5, 0.6}), &reference, kStatistics).verdict, Verdict::kPass);
+  gate.frames.stride = 2;
+  const Judgement judgement = JudgeGate(gate, Data({0.5, 0.6}), &reference, kStatistics);
+  EXPECT_EQ(judgement.verdict, Verdict::kInvalid);
+  EXPECT_NE(judgement.why.find("of another question"), std::string::npos) << judgement.why;
 }
 
 TEST_F(GateRunTest, MissingDataIsInvalid) {
@@ -166,6 +191,49 @@ TEST_F(GateRunTest, MissingDataIsInvalid) {
   of_another.question = "small: ghost_area_cm2 of method tsdf";
   EXPECT_EQ(JudgeGate(relative, Data({0.5, 0.6}), &of_another, kStatistics).verdict,
             Verdict::kInvalid);
+}
+
+// A cell that names no examined frame leaves frame 0 to be explained, which no scene has.
+TEST_F(GateRunTest, WithoutAFrameThereIsASentenceAndNoPicture) {
+  const test::TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder.path() / "small.toml", fmt::format(R"(name = "small"
+question = "?"
+metrics = ["{0}"]
+replicates = ["seed"]
+[[grid]]
+scene = "{1}/scenes/mini.toml"
+seed = 1
+method = "tsdf"
+)",
+                                                                  kMetric, TSDFPP_SOURCE_DIR)));
+  const auto config = GatesConfig::Parse(fmt::format(R"([[experiment]]
+name = "small"
+file = "small.toml"
+profiles = ["quick"]
+[[gate]]
+name = "g"
+experiment = "small"
+metric = "{}"
+min = 0.9
+confidence = 1
+why = "so"
+)",
+                                                     kMetric),
+                                         folder.path() / "gates.toml");
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  GateRun run;
+  run.config = *config;
+  GateOutcome outcome;
+  outcome.gate = config->gates.front();
+  outcome.data = Data({0.5});
+  cells_.back().frames.clear();
+  outcome.judgement = JudgeGate(outcome.gate, outcome.data, nullptr, kStatistics);
+  const auto explained = ExplainGate(run, outcome, {}, folder.path());
+  ASSERT_FALSE(explained.has_value());
+  EXPECT_EQ(explained.error().kind, ErrorKind::kData);
+  EXPECT_NE(explained.error().message.find("small.toml: no frame up to 0 is mapped"),
+            std::string::npos)
+      << explained.error().message;
 }
 
 TEST(GateEnvironmentTest, BytesAreExpectedOfTheSameRendererMujocoAndProcessorOnly) {

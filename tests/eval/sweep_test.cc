@@ -170,6 +170,12 @@ TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
   EXPECT_EQ(RunSweep(file, "one").at("run_now"), 1);
   EXPECT_EQ(Timeless(fs::path("one/cells") / first), before);
   EXPECT_EQ(Bytes(fs::path("one/cells") / last), kept);
+  // An edited one is made again as well.
+  json edited = json::parse(Bytes(fs::path("one/cells") / first));
+  edited["examined"]["visible_completion"] = 0.123;
+  ASSERT_TRUE(WriteFile(folder_ / "one" / "cells" / first, edited.dump()).has_value());
+  EXPECT_EQ(RunSweep(file, "one").at("run_now"), 1);
+  EXPECT_EQ(Timeless(fs::path("one/cells") / first), before);
   // A larger experiment adds what is new.
   EXPECT_EQ(RunSweep(Experiment("method = [\"tsdf\", \"open3d/3\"]\nseed = [1, 2]\n"
                                 "voxel_m = [0.02, 0.03]",
@@ -366,6 +372,10 @@ TEST_F(Sweep, AnEditedResultIsNotReplayed) {
         s["frames"] = {1, 3, 1000000};
       }),
       in_sequence([](json& s) { s["evaluated"] = json::array(); }),
+      in_sequence([](json& s) {
+        s["evaluated"] = {0, 7};
+      }),
+      in_sequence([](json& s) { s["examined"] = 8; }),
       in_sequence([](json& s) { s["object_error"] = 1e308; }),
       in_sequence([](json& s) { s["fuse_until"] = -1; }),
       said(all,
@@ -385,7 +395,10 @@ TEST_F(Sweep, AnEditedResultIsNotReplayed) {
     EXPECT_NE(sentence.find("a field is missing or wrong"), std::string::npos) << sentence;
   }
   // One frame has no step.
-  const std::string single = in_sequence([](json& s) { s["frames"] = {2}; });
+  const std::string single = in_sequence([](json& s) {
+    s["frames"] = s["evaluated"] = {2};
+    s["examined"] = 2;
+  });
   EXPECT_TRUE(single.starts_with("2 tsdfpp: ")) << single;
   EXPECT_NE(single.find("is not among the 1 that it used, 2 to 2"), std::string::npos) << single;
 }

@@ -240,11 +240,19 @@ def metrics():
     return names[:first_cost], names[first_cost:]
 
 
+# Those of a cell of which nothing was asked.
+SETTINGS = {
+    "scene": "", "seed": 1, "sensor": "scene", "noise": 1, "mask_faults": 0, "camera_error": 0, "object_error": 0,
+    "speed": 1, "objects": 0, "fuse_until": 0, "method": "tsdf++", "profile": "close", "trunc_front": 0, "trunc_back": 0,
+    "voxel_m": 0.01, "layers": 0, "poses": "gt", "segmentation": "gt", "mask_repair": "off", "resampling": "all",
+    "moved_voxels": "all", "removed_voxels": "free", "vote_band": 100, "sabotage": "none"}
+
+
 def cell():
     of_evaluations, of_runs = metrics()
     scores = {name: 0.5 for name in of_evaluations}
     scores["seam_share"] = {"value": None, "why": "no seam"}
-    return {"schema": 2, "id": "0123456789abcdef", "sequence": "sequence", "key": "key", "settings": {},
+    return {"schema": 2, "id": "0123456789abcdef", "sequence": "sequence", "key": "key", "settings": SETTINGS,
             "examined": {**scores, **{name: 1.5 for name in of_runs}}, "removed": [1],
             "frames": [{"frame": 8, "examined": True, "scores": scores, "map_digest": "00ff"}], "evaluation": {},
             "times": {"run": "r", "frame_ms": [1.0, 2.5], "steps": None}, "images": {"1": "00ff", "8": "ff00"}}

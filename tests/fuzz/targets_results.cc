@@ -50,7 +50,7 @@ bool ReadGatesJson(std::string_view input) {
 }
 
 bool ReadCell(std::string_view input) {
-  const Cell cell{{}, "key", "0123456789abcdef", "sequence"};
+  const Cell cell{{}, "key", "0123456789abcdef", "sequence", {1, 8}, {8}, 8};
   const auto result = CellFromJson(std::string(input), cell);
   if (!Accepted(result, cell.id)) return false;
   const auto again = CellFromJson(JsonText(CellToJson(cell, *result)), cell);
