@@ -87,6 +87,9 @@ std::vector<Finding> CheckTrajectories(const fs::path& folder, const SequenceRec
     }
   };
   check(cofusion::kCameraTrajectory, true);
+  if (record.hashes.contains(cofusion::kSensedCameraTrajectory)) {
+    check(cofusion::kSensedCameraTrajectory, true);
+  }
   for (const ObjectInfo& object : info.objects) {
     if (object.id != kBackground) check(cofusion::TrajectoryFile(object), false);
     if (!record.hashes.contains(cofusion::ModelFile(object))) {

@@ -12,8 +12,9 @@ namespace tsdfpp {
 // Hashes, files that are missing or that nobody listed, and for every frame its three images.
 std::vector<Finding> CheckFiles(const std::filesystem::path& folder, const SequenceRecord& record);
 
-// Every frame has a camera pose, no pose is for a frame that there is not, every object but the
-// background has a pose at least once, every object has a model.
+// Every frame has a camera pose, and a sensed one where these are listed; no pose is for
+// a frame that there is not, every object but the background has a pose at least once, every object
+// has a model.
 std::vector<Finding> CheckTrajectories(const std::filesystem::path& folder,
                                        const SequenceRecord& record);
 

@@ -230,6 +230,20 @@ TEST_F(Certification, FindsDamageThatTheHashesDoNotShow) {
   EXPECT_TRUE(Named(Findings()).contains({"files", cofusion::kCameraTrajectory, 4}));
 }
 
+// What a drifting camera thinks of itself has a line a frame, too.
+TEST_F(Certification, FindsSensedPosesThatLackFrames) {
+  auto trajectory = ReadTrajectory(set_ / cofusion::kCameraTrajectory);
+  ASSERT_TRUE(trajectory.has_value());
+  const std::string file = cofusion::kSensedCameraTrajectory;
+  Replace(file, TrajectoryToText(*trajectory, "camera"));
+  EXPECT_EQ(Named(Findings()), Names{});
+  const Pose pose = trajectory->at(4);
+  trajectory->erase(4);
+  trajectory->emplace(99, pose);
+  Replace(file, TrajectoryToText(*trajectory, "camera"));
+  EXPECT_EQ(Named(Findings()), (Names{{"files", file, 4}, {"files", file, 99}}));
+}
+
 // A scene that cannot be composed again proves nothing.
 TEST_F(Certification, FindsADamagedScene) {
   const std::string scene = Bytes(cofusion::kScene);
