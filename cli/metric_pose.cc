@@ -106,7 +106,7 @@ struct PoseInputs {
   std::vector<Eigen::Vector3f> points;  // of these
   TimedPoses truth;
   TimedPoses estimate;
-  std::vector<std::string> remarks;  // of the files of poses
+  std::vector<std::string> remarks;  // of the files
 };
 
 Expected<PoseInputs> ReadInputs(const MetricPoseArguments& options) {
@@ -118,7 +118,8 @@ Expected<PoseInputs> ReadInputs(const MetricPoseArguments& options) {
     TSDFPP_ASSIGN(const Pose symmetry, SymmetryFromText(word));
     inputs.symmetries.push_back(symmetry);
   }
-  TSDFPP_ASSIGN(const TriangleMesh model, ReadSurfaceFile(options.model, options.scale));
+  TSDFPP_ASSIGN(const TriangleMesh model,
+                ReadSurfaceFile(options.model, options.scale, inputs.remarks));
   if (model.vertices.empty()) return DataError("{}: holds no vertices", options.model);
   inputs.model_points = model.vertices.size();
   inputs.points = Thinned(model.vertices, options.most_points);
