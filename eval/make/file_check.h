@@ -6,6 +6,7 @@
 
 #include "eval/make/frame_check.h"
 #include "sequence/sequence_json.h"
+#include "sim/config/scene_config.h"
 
 namespace tsdfpp {
 
@@ -17,5 +18,11 @@ std::vector<Finding> CheckFiles(const std::filesystem::path& folder, const Seque
 // has a model.
 std::vector<Finding> CheckTrajectories(const std::filesystem::path& folder,
                                        const SequenceRecord& record);
+
+// Where sequence.json is not what the scene in scene.toml makes, or has a certificate that no sound
+// sequence gets. `of_scene` is what the scene says of itself.
+std::vector<Finding> CheckRecord(const SequenceRecord& record, const SceneConfig& scene,
+                                 const SequenceInfo& of_scene);
+std::vector<Finding> CheckCertificate(const SequenceRecord& record);
 
 }  // namespace tsdfpp
