@@ -167,13 +167,15 @@ std::array<Measured, 6> ErrorsOfPose(const PoseInputs& inputs, const Pose& T_est
           Measured::Of(RotationErrors_rad(pair)[0] * 180 / std::numbers::pi)};
 }
 
-// Compares each true pose with the estimate nearest in time.
+// Compares each true pose with the estimate nearest in time, where no other true pose is nearer to
+// that: an estimate counts once.
 PoseErrors MeasurePoses(const PoseInputs& inputs, const MetricPoseArguments& options) {
   PoseErrors errors;
   Pose C = Pose::Identity();  // from the true object frame to the estimate's
   for (const auto& [stamp_s, T_true] : inputs.truth) {
     const auto nearest = NearestInTime(inputs.estimate, stamp_s);
-    if (std::abs(nearest->first - stamp_s) > options.max_difference_s) {
+    if (std::abs(nearest->first - stamp_s) > options.max_difference_s ||
+        NearestInTime(inputs.truth, nearest->first)->first != stamp_s) {
       errors.AddMissing();
       continue;
     }

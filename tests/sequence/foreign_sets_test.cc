@@ -54,5 +54,28 @@ TEST(ForeignSets, ScannetTakesAGivenCameraForBothImages) {
   }
 }
 
+// Frames that end early are said to.
+TEST(ForeignSets, ColoursWithoutDepthAreSaid) {
+  const TempFolder folder;
+  BoxSource source;
+  test::WriteScannet(source, folder / "scannet");
+  ASSERT_TRUE(ExportSequence(source, DatasetFormat::kSevenScenes, folder / "scenes").has_value());
+  const auto notes_of = [&](const fs::path& set) {
+    SequenceNotes notes;
+    const auto read = OpenSequence(set, {}, &notes);
+    EXPECT_TRUE(read.has_value()) << read.error().message;
+    return notes;
+  };
+  const std::string words = "colour images have no depth image and are left out";
+  EXPECT_FALSE(NotesSay(notes_of(folder / "scannet"), words));
+  EXPECT_FALSE(NotesSay(notes_of(folder / "scenes"), words));
+  for (const char* stem : {"40", "50"}) {
+    ASSERT_TRUE(fs::remove(folder / "scannet" / "depth" / (std::string(stem) + ".png")));
+  }
+  ASSERT_TRUE(fs::remove(folder / "scenes" / "frame-000005.depth.png"));
+  EXPECT_TRUE(NotesSay(notes_of(folder / "scannet"), "color: 2 of 6 " + words));
+  EXPECT_TRUE(NotesSay(notes_of(folder / "scenes"), "scenes: 1 of 6 " + words));
+}
+
 }  // namespace
 }  // namespace tsdfpp
