@@ -224,7 +224,7 @@ class CofusionSource : public FrameSource {
       if (file.starts_with(std::string(cofusion::kModels) + "/")) expected_models_.push_back(file);
       if (file.starts_with(std::string(cofusion::kMask) + "/")) has_masks_ = true;
       if (file.starts_with(std::string(cofusion::kSensedDepth) + "/")) sensed_depth_ = true;
-      if (file == cofusion::SensedMaskFile(info_.first_index)) sensed_masks_ = true;
+      if (file.starts_with(std::string(cofusion::kSensedMask) + "/Mask")) sensed_masks_ = true;
       if (file == cofusion::kSensedCameraTrajectory) {
         TSDFPP_ASSIGN(sensed_camera_, ReadTrajectory(folder_ / file));
       }

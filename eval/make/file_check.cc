@@ -21,6 +21,12 @@ Finding FileFinding(const std::string& file, std::string sentence, int frame = -
   return {"files", file, frame, std::move(sentence)};
 }
 
+// Is there a listed file that begins so?
+bool ListsAny(const SequenceRecord& record, const std::string& prefix) {
+  const auto at = record.hashes.lower_bound(prefix);
+  return at != record.hashes.end() && at->first.starts_with(prefix);
+}
+
 std::string TextOf(const std::optional<RevealPlan>& plan) {
   if (!plan) return "none";
   return fmt::format("frame {} without objects {}", plan->frame, fmt::join(plan->removed, ", "));
@@ -67,9 +73,15 @@ std::vector<Finding> CheckFiles(const fs::path& folder, const SequenceRecord& re
     findings.push_back(FileFinding(file, "is not listed in sequence.json"));
   }
   const SequenceInfo& info = record.info;
+  // A sensor with faults made an image of every frame, or of none.
+  const bool depths = ListsAny(record, std::string(cofusion::kSensedDepth) + "/Depth");
+  const bool masks = ListsAny(record, std::string(cofusion::kSensedMask) + "/Mask");
   for (int index = info.first_index; index < info.first_index + info.frame_count; ++index) {
-    for (const std::string& file :
-         {cofusion::ColourFile(index), cofusion::DepthFile(index), cofusion::MaskFile(index)}) {
+    std::vector<std::string> files{cofusion::ColourFile(index), cofusion::DepthFile(index),
+                                   cofusion::MaskFile(index)};
+    if (depths) files.push_back(cofusion::SensedDepthFile(index));
+    if (masks) files.push_back(cofusion::SensedMaskFile(index));
+    for (const std::string& file : files) {
       if (!record.hashes.contains(file)) {
         findings.push_back(
             FileFinding(file, "a frame's image is not listed in sequence.json", index));

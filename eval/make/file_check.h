@@ -10,7 +10,8 @@
 
 namespace tsdfpp {
 
-// Hashes, files that are missing or that nobody listed, and for every frame its three images.
+// Hashes, files that are missing or that nobody listed, and for every frame its three images
+// (and what a sensor made of depth and mask, where it did).
 std::vector<Finding> CheckFiles(const std::filesystem::path& folder, const SequenceRecord& record);
 
 // Every frame has a camera pose, and a sensed one where these are listed; no pose is for

@@ -231,8 +231,8 @@ TEST_F(Certification, FindsDamageThatTheHashesDoNotShow) {
   EXPECT_TRUE(Named(Findings()).contains({"files", cofusion::kCameraTrajectory, 4}));
 }
 
-// What a drifting camera thinks of itself has a line a frame, too.
-TEST_F(Certification, FindsSensedPosesThatLackFrames) {
+// What a sensor made of the frames is there for each of them, too.
+TEST_F(Certification, FindsFramesThatWhatWasSensedLacks) {
   auto trajectory = ReadTrajectory(set_ / cofusion::kCameraTrajectory);
   ASSERT_TRUE(trajectory.has_value());
   const std::string file = cofusion::kSensedCameraTrajectory;
@@ -243,6 +243,11 @@ TEST_F(Certification, FindsSensedPosesThatLackFrames) {
   trajectory->emplace(99, pose);
   Replace(file, TrajectoryToText(*trajectory, "camera"));
   EXPECT_EQ(Named(Findings()), (Names{{"files", file, 4}, {"files", file, 99}}));
+  SetUpAgain();
+  for (const int i : {1, 2, 3, 4, 6}) {
+    Replace(cofusion::SensedMaskFile(i), Bytes(cofusion::MaskFile(i)));
+  }
+  EXPECT_EQ(Named(Findings()), (Names{{"files", cofusion::SensedMaskFile(5), 5}}));
 }
 
 // What sequence.json says is what its scene says, and its certificate is a sound one's.

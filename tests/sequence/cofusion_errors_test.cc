@@ -213,10 +213,9 @@ void TakeSizeAway(const fs::path& set) {
   ASSERT_TRUE(WriteFile(set / "sequence.json", json).has_value());
 }
 
-// A set whose sensor says where it thinks that the camera is.
-auto SensedCamera(const std::string& text) {
+// A set with one more file, which is listed.
+auto Listed(const std::string& file, const std::string& text) {
   return [=](const fs::path& set) {
-    const std::string file = "trajectories/sensed-cam-0.txt";
     ASSERT_TRUE(WriteFile(set / file, text).has_value());
     auto record = ReadSequenceJson(set / "sequence.json");
     ASSERT_TRUE(record.has_value());
@@ -225,10 +224,12 @@ auto SensedCamera(const std::string& text) {
   };
 }
 
-TEST(CofusionErrors, OurOwnSet) {
-  // The true pose never stands in for a sensed one.
-  const std::string no_sensed = "@/trajectories/sensed-cam-0.txt: no camera pose for frame 1";
+// Whose sensor says where it thinks that the camera is.
+auto SensedCamera(const std::string& text) { return Listed("trajectories/sensed-cam-0.txt", text); }
 
+TEST(CofusionErrors, OurOwnSet) {
+  // The truth never stands in for what was sensed.
+  const std::string no_sensed = "@/trajectories/sensed-cam-0.txt: no camera pose for frame 1";
   const Case cases[] = {
       {[](const fs::path&) {}, ""},
       {Text("sequence.json", "{"), "@/sequence.json: not a JSON object"},
@@ -243,6 +244,8 @@ TEST(CofusionErrors, OurOwnSet) {
       {SensedCamera("1 0 0 0 0 0 0 1\n"), ""},
       {SensedCamera("2 0 0 0 0 0 0 1\n"), no_sensed},
       {SensedCamera(""), no_sensed},
+      {Listed("mask_noise/Mask0002.png", ""), "@/mask_noise/Mask0001.png: no such image"},
+      {Listed("mask_noise/segments.csv", ""), ""},
       {Remove("colour/Color0001.png"), "@/colour/Color0001.png: no such image"},
       {Remove("mask_id"), "@/mask_id/Mask0001.png: no such image"},
       {Remove("models/car-2.ply"),
