@@ -55,6 +55,9 @@ Expected<CommandResult> RunEvaluateCommand(const EvaluateArguments& options, boo
   if (result.trajectories) {
     for (const std::string& remark : result.trajectories->remarks) spdlog::warn("{}", remark);
   }
+  if (result.masks) {
+    for (const std::string& remark : result.masks->remarks) spdlog::warn("{}", remark);
+  }
   return CommandResult{ToJson(result), EvaluateTable(result)};
 }
 

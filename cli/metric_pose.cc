@@ -106,7 +106,7 @@ struct PoseInputs {
   std::vector<Eigen::Vector3f> points;  // of these
   TimedPoses truth;
   TimedPoses estimate;
-  std::vector<std::string> remarks;  // of the files of poses
+  std::vector<std::string> remarks;  // of the files
 };
 
 Expected<PoseInputs> ReadInputs(const MetricPoseArguments& options) {
@@ -118,7 +118,8 @@ Expected<PoseInputs> ReadInputs(const MetricPoseArguments& options) {
     TSDFPP_ASSIGN(const Pose symmetry, SymmetryFromText(word));
     inputs.symmetries.push_back(symmetry);
   }
-  TSDFPP_ASSIGN(const TriangleMesh model, ReadSurfaceFile(options.model, options.scale));
+  TSDFPP_ASSIGN(const TriangleMesh model,
+                ReadSurfaceFile(options.model, options.scale, inputs.remarks));
   if (model.vertices.empty()) return DataError("{}: holds no vertices", options.model);
   inputs.model_points = model.vertices.size();
   inputs.points = Thinned(model.vertices, options.most_points);
@@ -166,13 +167,15 @@ std::array<Measured, 6> ErrorsOfPose(const PoseInputs& inputs, const Pose& T_est
           Measured::Of(RotationErrors_rad(pair)[0] * 180 / std::numbers::pi)};
 }
 
-// Compares each true pose with the estimate nearest in time.
+// Compares each true pose with the estimate nearest in time, where no other true pose is nearer to
+// that: an estimate counts once.
 PoseErrors MeasurePoses(const PoseInputs& inputs, const MetricPoseArguments& options) {
   PoseErrors errors;
   Pose C = Pose::Identity();  // from the true object frame to the estimate's
   for (const auto& [stamp_s, T_true] : inputs.truth) {
     const auto nearest = NearestInTime(inputs.estimate, stamp_s);
-    if (std::abs(nearest->first - stamp_s) > options.max_difference_s) {
+    if (std::abs(nearest->first - stamp_s) > options.max_difference_s ||
+        NearestInTime(inputs.truth, nearest->first)->first != stamp_s) {
       errors.AddMissing();
       continue;
     }

@@ -103,12 +103,15 @@ Expected<CommandResult> RunSurface(const MetricSurfaceArguments& options, bool s
   SurfaceComparisonConfig config = options.config;
   TSDFPP_ASSIGN(config.thresholds_m, PositiveNumbers(options.taus, "--tau"));
   std::sort(config.thresholds_m.begin(), config.thresholds_m.end());
+  std::vector<std::string> remarks;  // of the files
   TSDFPP_ASSIGN(const TriangleMesh reconstruction,
-                ReadSurfaceFile(options.reconstruction, options.scale));
-  TSDFPP_ASSIGN(const TriangleMesh truth, ReadSurfaceFile(options.truth, options.truth_scale));
-  TSDFPP_ASSIGN(const SurfaceComparison result,
+                ReadSurfaceFile(options.reconstruction, options.scale, remarks));
+  TSDFPP_ASSIGN(const TriangleMesh truth,
+                ReadSurfaceFile(options.truth, options.truth_scale, remarks));
+  TSDFPP_ASSIGN(SurfaceComparison result,
                 CompareSurfaces(reconstruction, options.reconstruction, truth, options.truth,
                                 scale_is_given, config));
+  result.remarks.insert(result.remarks.begin(), remarks.begin(), remarks.end());
   for (const std::string& remark : result.remarks) spdlog::warn("{}", remark);
   nlohmann::json json = ToJson(result, config);
   json["reconstruction"] = options.reconstruction;

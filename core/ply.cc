@@ -1,11 +1,12 @@
 #include "core/ply.h"
 
+#include <algorithm>
 #include <bit>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "core/farthest.h"
@@ -14,6 +15,7 @@
 #include "core/one_line.h"
 #include "core/plain_name.h"
 #include "core/ply_header.h"
+#include "core/polygon.h"
 
 namespace tsdfpp {
 namespace {
@@ -57,12 +59,30 @@ std::string PlyBytes(const TriangleMesh& mesh, const std::vector<std::string>& r
   return bytes;
 }
 
-// Reads scalars from the body, one after the other; Ok() turns false past the end.
+// Reads scalars from the body, one after the other; Ok() turns false past the end. Text has a line
+// an element.
 class Body {
  public:
   Body(std::string_view bytes, bool ascii) : bytes_(bytes), ascii_(ascii) {}
 
   bool Ok() const { return ok_; }
+  // Is it not Ok() because a line has other numbers than the header says?
+  bool IsBadLine() const { return bad_line_; }
+
+  void BeginElement() {
+    if (ascii_) Skip(kBlanksAndEnds);
+  }
+  void EndElement() {
+    if (!ascii_ || !ok_) return;
+    Skip(kBlanks);
+    if (at_ < bytes_.size() && bytes_[at_] != '\n') bad_line_ = true;
+    ok_ = !bad_line_;
+  }
+  // Behind the last element, where text may have blank lines.
+  bool IsAtEnd() {
+    if (ascii_) Skip(kBlanksAndEnds);
+    return at_ == bytes_.size();
+  }
 
   double Read(PlyScalar type) {
     if (ascii_) return ReadAscii();
@@ -110,8 +130,21 @@ class Body {
     return static_cast<double>(value);
   }
 
+  static constexpr std::string_view kBlanks = " \t\r\v\f";
+  static constexpr std::string_view kBlanksAndEnds = " \t\r\v\f\n";
+
+  void Skip(std::string_view what) {
+    at_ = std::min(bytes_.find_first_not_of(what, at_), bytes_.size());
+  }
+
   double ReadAscii() {
-    while (at_ < bytes_.size() && std::isspace(static_cast<unsigned char>(bytes_[at_])) != 0) ++at_;
+    if (!ok_) return 0;
+    Skip(kBlanks);
+    if (at_ < bytes_.size() && bytes_[at_] == '\n') {
+      bad_line_ = true;
+      ok_ = false;
+      return 0;
+    }
     double value = 0;
     const auto [next, status] =
         std::from_chars(bytes_.data() + at_, bytes_.data() + bytes_.size(), value);
@@ -124,6 +157,7 @@ class Body {
   bool ascii_;
   std::size_t at_ = 0;
   bool ok_ = true;
+  bool bad_line_ = false;
 };
 
 constexpr std::uint32_t kMostOfAList = std::numeric_limits<std::int32_t>::max();
@@ -132,6 +166,7 @@ struct Parsed {
   TriangleMesh mesh;
   std::vector<std::string> regions;
   std::vector<std::uint16_t> face_region;
+  FaceCutter cutter;
 };
 
 void ReadVertex(const PlyElement& element, Body& body, TriangleMesh& mesh) {
@@ -171,12 +206,34 @@ void SkipElement(const PlyElement& element, Body& body) {
   }
 }
 
-bool ReadFace(const PlyElement& element, Body& body, Parsed& parsed) {
+Expected<void> AddFace(const std::vector<std::uint32_t>& polygon, std::optional<InstanceId> id,
+                       std::uint16_t region, Parsed& parsed) {
+  if (polygon.size() < 3) return DataError(" has {} corners, expected 3 at least", polygon.size());
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    parsed.mesh.triangles.push_back({a, b, c});
+    if (id) parsed.mesh.face_ids.push_back(*id);
+    if (!parsed.regions.empty()) parsed.face_region.push_back(region);
+  };
+  if (polygon.size() == 3) {
+    add(polygon[0], polygon[1], polygon[2]);
+    return {};
+  }
+  std::vector<Eigen::Vector3d> corners;
+  corners.reserve(polygon.size());
+  for (const std::uint32_t v : polygon) corners.push_back(parsed.mesh.vertices[v].cast<double>());
+  const auto triangles = parsed.cutter.Cut(corners);
+  if (!triangles) return DataError(": {}", triangles.error().message);
+  for (const auto& [a, b, c] : *triangles) add(polygon[a], polygon[b], polygon[c]);
+  return {};
+}
+
+// Errors stand behind the face's number. Where the body is not Ok() afterwards nothing is added.
+Expected<void> ReadFace(const PlyElement& element, Body& body, Parsed& parsed) {
+  constexpr const char* kNotThere = " names a vertex or region that the file does not have";
   constexpr std::uint32_t kMostOfAnId = std::numeric_limits<InstanceId>::max();
   std::vector<std::uint32_t> polygon;
-  InstanceId id = 0;
+  std::optional<InstanceId> id;
   std::uint16_t region = 0;
-  bool has_id = false;
   for (const PlyProperty& property : element.properties) {
     const std::uint32_t count =
         property.is_list ? body.ReadWhole(property.count_type, kMostOfAList) : 1;
@@ -184,13 +241,13 @@ bool ReadFace(const PlyElement& element, Body& body, Parsed& parsed) {
       if (property.name == "vertex_indices" || property.name == "vertex_index") {
         const double value = body.Read(property.type);
         const bool whole = value == std::floor(value);
+        if (!body.Ok()) return {};
         if (!(whole && value >= 0 && value < static_cast<double>(parsed.mesh.vertices.size()))) {
-          return false;
+          return DataError("{}", kNotThere);
         }
         polygon.push_back(static_cast<std::uint32_t>(value));
       } else if (property.name == "object_id") {
         id = static_cast<InstanceId>(body.ReadWhole(property.type, kMostOfAnId));
-        has_id = true;
       } else if (property.name == "region") {
         region = static_cast<std::uint16_t>(body.ReadWhole(property.type, kMostOfAnId));
       } else {
@@ -198,13 +255,11 @@ bool ReadFace(const PlyElement& element, Body& body, Parsed& parsed) {
       }
     }
   }
-  if (!parsed.regions.empty() && region >= parsed.regions.size()) return false;
-  for (std::size_t i = 2; i < polygon.size(); ++i) {
-    parsed.mesh.triangles.push_back({polygon[0], polygon[i - 1], polygon[i]});
-    if (has_id) parsed.mesh.face_ids.push_back(id);
-    if (!parsed.regions.empty()) parsed.face_region.push_back(region);
+  if (!body.Ok()) return {};
+  if (!parsed.regions.empty() && region >= parsed.regions.size()) {
+    return DataError("{}", kNotThere);
   }
-  return true;
+  return AddFace(polygon, id, region, parsed);
 }
 
 Expected<Parsed> Parse(const std::filesystem::path& path) {
@@ -221,13 +276,18 @@ Expected<Parsed> Parse(const std::filesystem::path& path) {
                        element.count, Quoted(element.name));
     }
     for (std::size_t i = 0; i < element.count && body.Ok(); ++i) {
+      body.BeginElement();
       if (element.name == "vertex") {
         ReadVertex(element, body, parsed.mesh);
       } else if (element.name != "face") {
         SkipElement(element, body);
-      } else if (!ReadFace(element, body, parsed) && body.Ok()) {
-        return DataError("{}: face {} names a vertex or region that the file does not have", file,
-                         i);
+      } else if (const auto face = ReadFace(element, body, parsed); !face) {
+        return DataError("{}: face {}{}", file, i, face.error().message);
+      }
+      body.EndElement();
+      if (body.IsBadLine()) {
+        return DataError("{}: {} {}: its line has more or fewer numbers than the header says", file,
+                         Quoted(element.name), i);
       }
     }
   }
@@ -236,6 +296,9 @@ Expected<Parsed> Parse(const std::filesystem::path& path) {
         "{}: the file ends, or holds something unreadable, before its header's counts are "
         "reached",
         file);
+  if (!body.IsAtEnd()) {
+    return DataError("{}: the file holds more than its header counts", file);
+  }
   // Of several elements called so, some may lack what others have.
   if (parsed.mesh.colours.size() != parsed.mesh.vertices.size()) parsed.mesh.colours.clear();
   if (parsed.mesh.face_ids.size() != parsed.mesh.triangles.size()) parsed.mesh.face_ids.clear();

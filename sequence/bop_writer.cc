@@ -1,4 +1,5 @@
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/files.h"
 #include "core/json_text.h"
@@ -50,11 +51,7 @@ Json BoxOf(const cv::Mat& mask, int left, int top) {
 class BopWriter : public DatasetWriter {
  public:
   BopWriter(const SequenceInfo& info, fs::path folder, std::vector<TrueModel> models)
-      : info_(info), folder_(std::move(folder)), models_(std::move(models)) {
-    for (const ObjectInfo& object : info.objects) {
-      if (object.id != kBackground) without_pose_[object.id] = 0;
-    }
-  }
+      : info_(info), folder_(std::move(folder)), models_(std::move(models)) {}
 
   double depth_units_per_m() const override { return kBopExportUnits; }
 
@@ -89,10 +86,17 @@ class BopWriter : public DatasetWriter {
       TSDFPP_RETURN_IF_ERROR(AddMasks(frame, units, id, T_CO, place, infos_[key]));
       ++place;
     }
-    if (!frame.mask.empty()) {
-      for (auto& [id, frames] : without_pose_) {
-        if (!frame.T_WO.contains(id) && cv::countNonZero(frame.mask == id) > 0) ++frames;
-      }
+    if (frame.mask.empty()) return {};
+    // Of what the sequence does not list, too.
+    std::set<InstanceId> ids;
+    InstanceId last = kBackground;
+    for (const InstanceId id : cv::Mat_<InstanceId>(frame.mask)) {
+      if (id != last) ids.insert(id);
+      last = id;
+    }
+    for (const InstanceId id : ids) {
+      const bool is_object = id != kBackground && id != kNoInstance;
+      if (is_object && !frame.T_WO.contains(id)) ++without_pose_[id];
     }
     return {};
   }
@@ -112,7 +116,6 @@ class BopWriter : public DatasetWriter {
     TSDFPP_RETURN_IF_ERROR(WriteFile(InScene(bop::kTruthInfo), JsonText(infos_, 1) + "\n"));
     TSDFPP_RETURN_IF_ERROR(WriteModels());
     for (const auto& [id, frames] : without_pose_) {
-      if (frames == 0) continue;
       report.left_out.push_back(
           fmt::format("the mask of object {} on {} frames, where it has no pose", id, frames));
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -88,13 +89,13 @@ class CofusionSource : public FrameSource {
   const SequenceInfo& info() const override { return info_; }
 
   Expected<Frame> Read(int index) override {
-    return ReadFrame(index, sensed_depth_, sensed_masks_, sensed_camera_);
+    return ReadFrame(index, sensed_depth_, sensed_masks_, sensed_camera_.has_value());
   }
 
   bool IsSensed() const override {
-    return sensed_depth_ || sensed_masks_ || !sensed_camera_.empty();
+    return sensed_depth_ || sensed_masks_ || sensed_camera_.has_value();
   }
-  Expected<Frame> ReadTrue(int index) override { return ReadFrame(index, false, false, {}); }
+  Expected<Frame> ReadTrue(int index) override { return ReadFrame(index, false, false, false); }
 
   bool HasTruth() const override {
     const fs::path models = folder_ / cofusion::kModels;
@@ -144,7 +145,7 @@ class CofusionSource : public FrameSource {
 
  private:
   Expected<Frame> ReadFrame(int index, bool sensed_depth, bool sensed_mask,
-                            const Trajectory& sensed_camera) const {
+                            bool sensed_camera) const {
     const int last = info_.first_index + info_.frame_count - 1;
     if (index < info_.first_index || index > last) {
       return UsageError("frame {} is out of range, {} has frames {} to {}", index, info_.name,
@@ -164,15 +165,17 @@ class CofusionSource : public FrameSource {
                                                                 : cofusion::MaskFile(index)),
                                          size));
     }
-    const auto camera = camera_.find(index);
-    if (camera == camera_.end()) {
+    // A sensed camera without a pose is never given the true one.
+    const Trajectory& cameras = sensed_camera ? *sensed_camera_ : camera_;
+    const auto camera = cameras.find(index);
+    if (camera == cameras.end()) {
       return DataError("{}: no camera pose for frame {}",
-                       (folder_ / cofusion::kCameraTrajectory).string(), index);
+                       (folder_ / (sensed_camera ? cofusion::kSensedCameraTrajectory
+                                                 : cofusion::kCameraTrajectory))
+                           .string(),
+                       index);
     }
     frame.T_WC = camera->second;
-    if (const auto sensed = sensed_camera.find(index); sensed != sensed_camera.end()) {
-      frame.T_WC = sensed->second;
-    }
     for (const auto& [id, trajectory] : objects_) {
       if (const auto pose = trajectory.find(index); pose != trajectory.end()) {
         frame.T_WO.emplace(id, pose->second);
@@ -221,7 +224,7 @@ class CofusionSource : public FrameSource {
       if (file.starts_with(std::string(cofusion::kModels) + "/")) expected_models_.push_back(file);
       if (file.starts_with(std::string(cofusion::kMask) + "/")) has_masks_ = true;
       if (file.starts_with(std::string(cofusion::kSensedDepth) + "/")) sensed_depth_ = true;
-      if (file == cofusion::SensedMaskFile(info_.first_index)) sensed_masks_ = true;
+      if (file.starts_with(std::string(cofusion::kSensedMask) + "/Mask")) sensed_masks_ = true;
       if (file == cofusion::kSensedCameraTrajectory) {
         TSDFPP_ASSIGN(sensed_camera_, ReadTrajectory(folder_ / file));
       }
@@ -268,7 +271,7 @@ class CofusionSource : public FrameSource {
   bool sensed_depth_ = false;
   bool sensed_masks_ = false;
   Trajectory camera_;
-  Trajectory sensed_camera_;  // empty where it is the true one
+  std::optional<Trajectory> sensed_camera_;  // where the set lists one
   std::map<InstanceId, Trajectory> objects_;
   std::vector<ObjectInfo> found_;             // of the trajectories
   std::vector<std::string> expected_models_;  // of sequence.json

@@ -129,6 +129,22 @@ Expected<void> SetSizes(FileSequence& sequence) {
   return {};
 }
 
+// A camera that was asked for is that of the whole frame: colours that are another camera's on disk
+// are then taken as they are, which they can be where both images have one size.
+Expected<void> UseOneCamera(FileSequence& sequence) {
+  const FrameFiles& first = sequence.frames.front();
+  TSDFPP_ASSIGN(const cv::Mat colour, ReadColour(first.colour, {}));
+  if (colour.cols != first.camera.width || colour.rows != first.camera.height) {
+    return UsageError(
+        "{}: a camera was given for depth images of {}x{}, but {} is {}x{}, of a camera of its "
+        "own: expected the cameras on disk, or colours of the depth images' size",
+        sequence.name, first.camera.width, first.camera.height, first.colour.string(), colour.cols,
+        colour.rows);
+  }
+  sequence.colour_camera.reset();
+  return {};
+}
+
 }  // namespace
 
 double RateOf(const std::vector<double>& times_s) {
@@ -227,6 +243,9 @@ Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
   if (options.intrinsics && options.intrinsics->width > 0)
     sequence.size_source = "as was asked for";
   TSDFPP_RETURN_IF_ERROR(SetSizes(sequence));
+  if (options.intrinsics && sequence.colour_camera) {
+    TSDFPP_RETURN_IF_ERROR(UseOneCamera(sequence));
+  }
   for (const FrameFiles& frame : frames) {
     TSDFPP_RETURN_IF_ERROR(
         CheckCamera(frame.camera, fmt::format("{}, frame {}", sequence.name, frame.number)));

@@ -58,7 +58,8 @@ struct FileSequence {
 // else 0, 1, 2...; time_s begins with 0. The camera's missing size is that of the first depth image
 // and holds for all frames. Errors: kData where there is no frame, or two of a number, the first
 // depth image cannot be read, a camera is implausible (sequence/plausibility.h); kUsage where
-// intrinsics with a negative fy meet objects.
+// intrinsics with a negative fy meet objects, or where intrinsics were given and the colours are
+// those of another camera, of another size.
 Expected<std::unique_ptr<DatasetSource>> MakeFileSource(FileSequence sequence,
                                                         const SequenceOptions& options,
                                                         SequenceNotes& notes);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "sequence/dataset_readers.h"
 #include "sequence/image_files.h"
@@ -34,6 +35,28 @@ Expected<std::vector<std::pair<int, std::string>>> DepthStems(const fs::path& fo
   std::sort(stems.begin(), stems.end());
   if (stems.empty()) return DataError("{}: no image named 0.png or so", folder.string());
   return stems;
+}
+
+// Colour images without a depth image, which has the same number, are left out.
+Expected<void> SayColoursWithoutDepth(const fs::path& folder,
+                                      const std::vector<std::pair<int, std::string>>& depths,
+                                      SequenceNotes& notes) {
+  std::set<std::string> stems;
+  for (const auto& [number, stem] : depths) stems.insert(stem);
+  TSDFPP_ASSIGN(const auto names, NamesIn(folder));
+  int colours = 0;
+  int lost = 0;
+  for (const std::string& name : names) {
+    const std::string stem = fs::path(name).stem().string();
+    if (!ParseWholeNumber(stem) || !(name.ends_with(".jpg") || name.ends_with(".png"))) continue;
+    ++colours;
+    lost += stems.contains(stem) ? 0 : 1;
+  }
+  if (lost > 0) {
+    notes.push_back(fmt::format("{}: {} of {} colour images have no depth image and are left out",
+                                folder.string(), lost, colours));
+  }
+  return {};
 }
 
 // The depth camera, ScanNet's own where none is written; the colour camera goes into `sequence`.
@@ -97,6 +120,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenScannet(const fs::path& folder,
   sequence.size_source = "ScanNet's default camera";
   TSDFPP_ASSIGN(const Intrinsics camera, ReadCameras(folder, options, sequence, notes));
   TSDFPP_ASSIGN(const auto stems, DepthStems(folder / "depth"));
+  TSDFPP_RETURN_IF_ERROR(SayColoursWithoutDepth(folder / "color", stems, notes));
 
   std::error_code code;
   sequence.has_masks = fs::is_directory(folder / "instance-filt", code);

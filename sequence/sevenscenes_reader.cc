@@ -34,10 +34,15 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
         fmt::format("{}: no camera-intrinsics.txt, 585 585 320 240 is taken", sequence.name));
   }
   int masks = 0;
+  int colours = 0;
   bool has_labels = false;
   TSDFPP_ASSIGN(const auto names, NamesIn(folder));
   for (const std::string& name : names) {
     has_labels |= name.ends_with(".label.png");
+    colours += cofusion::NumberOf(name, "frame-", ".color.png") ||
+                       cofusion::NumberOf(name, "frame-", ".color.jpg")
+                   ? 1
+                   : 0;
     const auto number = cofusion::NumberOf(name, "frame-", ".depth.png");
     if (!number) continue;
     const std::string stem = name.substr(0, name.size() - std::string(".depth.png").size());
@@ -55,6 +60,11 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
   }
   if (sequence.frames.empty()) {
     return DataError("{}: no image named frame-000000.depth.png or so", folder.string());
+  }
+  // Every depth image has its colours.
+  if (const int lost = colours - static_cast<int>(sequence.frames.size()); lost > 0) {
+    notes.push_back(fmt::format("{}: {} of {} colour images have no depth image and are left out",
+                                folder.string(), lost, colours));
   }
   sequence.has_masks = masks > 0;
   for (FrameFiles& frame : sequence.frames) {

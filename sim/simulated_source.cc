@@ -22,16 +22,15 @@ Frame TrueFrame(const SensedFrame& sensed) {
 
 }  // namespace
 
-SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& options,
-                                 SceneMotion motion, CompiledScene scene)
-    : config_(config), options_(options), motion_(std::move(motion)), scene_(std::move(scene)) {
-  info_.name = config.name;
-  info_.intrinsics = config.intrinsics;
-  info_.first_index = kFirstFrame;
-  info_.frame_count = config.frames;
-  info_.rate_hz = config.rate_hz;
-  info_.objects = scene_.objects();
-  info_.mask_ids_are_objects = !DrawsEveryId(config.sensor.masks);
+SequenceInfo SequenceInfoOf(const SceneConfig& config, const CompiledScene& scene) {
+  SequenceInfo info;
+  info.name = config.name;
+  info.intrinsics = config.intrinsics;
+  info.first_index = kFirstFrame;
+  info.frame_count = config.frames;
+  info.rate_hz = config.rate_hz;
+  info.objects = scene.objects();
+  info.mask_ids_are_objects = !DrawsEveryId(config.sensor.masks);
   if (config.experiment) {
     RevealPlan plan;
     plan.frame = config.experiment->reveal_frame;
@@ -41,9 +40,18 @@ SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& op
       plan.removed.push_back(object->id);
     }
     std::sort(plan.removed.begin(), plan.removed.end());
-    info_.reveal = std::move(plan);
+    info.reveal = std::move(plan);
   }
+  return info;
 }
+
+SimulatedSource::SimulatedSource(const SceneConfig& config, const SimOptions& options,
+                                 SceneMotion motion, CompiledScene scene)
+    : config_(config),
+      options_(options),
+      motion_(std::move(motion)),
+      scene_(std::move(scene)),
+      info_(SequenceInfoOf(config_, scene_)) {}
 
 Expected<std::unique_ptr<SimulatedSource>> SimulatedSource::Open(const SceneConfig& config,
                                                                  const SimOptions& options) {

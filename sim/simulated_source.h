@@ -23,6 +23,9 @@ struct SimOptions {
   std::filesystem::path poses{};
 };
 
+// What a sequence of the scene says of itself.
+SequenceInfo SequenceInfoOf(const SceneConfig& config, const CompiledScene& scene);
+
 // What a sensor saw, and what there was.
 struct SensedFrame {
   Frame frame;

@@ -209,7 +209,7 @@ std::string Headline(const CompareResult& result) {
   const int frame = result.reveal_frame.value_or(result.last_frame);
   std::string text;
   for (const auto& run : result.runs) {
-    const ObjectScores& table = Examined(result, *run).objects.front();
+    const ObjectScores& table = TableOf(Examined(result, *run));
     const auto& preserved = table.preserved;
     if (!preserved.preservation_behind_other.value) continue;
     text += fmt::format(

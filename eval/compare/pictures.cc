@@ -9,6 +9,7 @@
 #include "core/files.h"
 #include "eval/picture/draw_scene.h"
 #include "eval/picture/record_images.h"
+#include "eval/score/evaluation_columns.h"
 
 namespace tsdfpp {
 namespace {
@@ -109,11 +110,12 @@ Expected<void> PictureMaker::Take(const void* run, const Evaluation& evaluation,
   if (frame.index != ExaminedFrame()) return {};
   after_removal_[run] = DrawScene(evaluation.revealed, frame.intrinsics, frame.T_WC, scale);
   cv::Mat table = DrawTable(*result_.truth, evaluation.table_reconstructed, kTablePixel_m);
-  const Measured& hole = evaluation.objects.front().preserved.hole_area_cm2;
-  const std::string text =
-      hole.value ? fmt::format("hole {:.0f} of {:.0f} cm2 hidden", *hole.value,
-                               evaluation.objects.front().preserved.behind_other_area_cm2)
-                 : "nothing hidden";
+  const PreservationScores& preserved = TableOf(evaluation).preserved;
+  const Measured& hole = preserved.hole_area_cm2;
+  const std::string text = hole.value ? fmt::format("hole {:.0f} of {:.0f} cm2 hidden", *hole.value,
+                                                    preserved.behind_other_area_cm2)
+                           : KnowsBackground(evaluation) ? "nothing hidden"
+                                                         : kNoTrueBackground;
   if (table.empty())
     table = cv::Mat(1, static_cast<int>(kCellWidth), CV_8UC3, cv::Scalar(255, 255, 255));
   cv::copyMakeBorder(table, table, 0, 26, 0, 0, cv::BORDER_CONSTANT, cv::Scalar(255, 255, 255));

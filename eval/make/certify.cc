@@ -23,6 +23,7 @@
 #include "sim/render/ray_scene.h"
 #include "sim/scene/scene_builder.h"
 #include "sim/scene/scene_inputs.h"
+#include "sim/simulated_source.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -108,9 +109,9 @@ Expected<void> CheckInside(const SceneConfig& config, const fs::path& folder) {
   return {};
 }
 
-// Composes the scene again and compares what comes out with the models on disk.
-void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
-                CertifyResult& result) {
+// Composes the scene again and compares what comes out with the models and the record on disk.
+void CheckScene(const fs::path& folder, const SequenceRecord& record,
+                const std::vector<TrueModel>& models, CertifyResult& result) {
   if (!IsThere(folder / cofusion::kScene)) {
     result.notes.emplace_back("scene.toml is not there: the scene was not composed again");
     return;
@@ -125,6 +126,8 @@ void CheckScene(const fs::path& folder, const std::vector<TrueModel>& models,
                                "the scene cannot be composed again: " + scene.error().message});
     return;
   }
+  const auto of_record = CheckRecord(record, *config, SequenceInfoOf(*config, *scene));
+  result.findings.insert(result.findings.end(), of_record.begin(), of_record.end());
   for (const TrueModel& composed : scene->TrueModels()) {
     const auto on_disk = std::find_if(
         models.begin(), models.end(),
@@ -308,6 +311,8 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
   result.findings = CheckFiles(folder, record);
   const auto paths = CheckTrajectories(folder, record);
   result.findings.insert(result.findings.end(), paths.begin(), paths.end());
+  const auto faults = CheckCertificate(record);
+  result.findings.insert(result.findings.end(), faults.begin(), faults.end());
   const auto give_up = [&](const Error& error) {
     result.findings.push_back({"files", "", -1, error.message});
     return result;
@@ -327,7 +332,7 @@ Expected<CertifyResult> Certify(const fs::path& folder, const CertifyOptions& op
   }
   const SequenceInfo& info = record.info;
   result.ray_frames = SpreadFrames(info.first_index, info.frame_count, options.ray_share);
-  CheckScene(folder, *models, result);
+  CheckScene(folder, record, *models, result);
   Certifier certifier(options, **source, std::move(*models), std::move(lines), has_visibility,
                       std::move(rays));
   Gather(certifier.CheckFrames({result.ray_frames.begin(), result.ray_frames.end()}), result);

@@ -44,7 +44,9 @@ struct CertifyResult {
 // - rays, on a share of the frames: depth within kRayLimit_m of mj_ray at the models, and the same
 // id,
 //   where sim/render/ray_scene.h says that they must agree.
-// - scene: scene.toml, composed again, has the models of models/ to the last bit.
+// - scene: scene.toml, composed again, has the models of models/ to the last bit, and sequence.json
+//   says what it says (name, frames, rate, reveal, objects, seed, sensor).
+// - certificate: one that sequence.json has is of all frames and counts no faults.
 // The exact images are checked (depth_original, mask_id, gt-cam-0), not what a sensor made of them.
 // The result does not depend on the number of threads.
 // Errors: kUsage where there is no such folder; kData where it is not a sequence of ours at all, or

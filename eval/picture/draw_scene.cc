@@ -56,6 +56,7 @@ cv::Mat DrawScene(const TriangleMesh& scene_W, const Intrinsics& intrinsics, con
 
 cv::Mat DrawTable(const SceneTruth& truth, const Selection& reconstructed, double pixel_m) {
   const SeenTracker& tracker = truth.trackers().front();
+  if (tracker.id() != kBackground) return {};
   const SampleSet& samples = tracker.samples_O();
   const std::vector<std::string>& regions = truth.surface(0).model().regions;
   // The top alone: what faces up and is as high as the highest.

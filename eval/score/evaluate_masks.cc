@@ -78,13 +78,23 @@ Expected<void> MaskEvaluator::Observe(const Frame& frame) {
   return {};
 }
 
-Expected<MaskEvaluation> MaskEvaluator::Result(const std::vector<ObjectInfo>& objects,
+Expected<MaskEvaluation> MaskEvaluator::Result(const SequenceInfo& info,
+                                               const std::vector<ObjectInfo>& objects,
                                                MatchMode mode) const {
   if (observed_ == 0) {
     return DataError("{}: none of its images is of a frame that was evaluated", folder_.string());
   }
   MaskEvaluation out;
   out.images = observed_;
+  const int last = info.first_index + info.frame_count - 1;
+  const auto strangers = std::count_if(images_.begin(), images_.end(), [&](const auto& image) {
+    return image.first < info.first_index || image.first > last;
+  });
+  if (strangers > 0) {
+    out.remarks.push_back(
+        fmt::format("{}: {} images are of no frame of the sequence, which has {} to {}: left out",
+                    folder_.string(), strangers, info.first_index, last));
+  }
   std::map<int, std::pair<std::int64_t, InstanceId>> most;  // of each predicted id
   for (const auto& [pair, pixels] : pairs_) {
     auto& [best, object] = most.try_emplace(pair.second, 0, kNoInstance).first->second;
@@ -127,6 +137,7 @@ Expected<MaskEvaluation> MaskEvaluator::Result(const std::vector<ObjectInfo>& ob
 
 nlohmann::json ToJson(const MaskEvaluation& evaluation) {
   nlohmann::json json{{"images", evaluation.images},
+                      {"remarks", evaluation.remarks},
                       {"mean_iou", ToJson(evaluation.mean_iou)},
                       {"pq", ToJson(evaluation.quality.pq)},
                       {"sq", ToJson(evaluation.quality.sq)},

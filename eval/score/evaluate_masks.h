@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/frame_source.h"
 #include "core/types.h"
 #include "eval/score/mesh_matching.h"
 #include "metrics/segmentation.h"
@@ -21,6 +22,7 @@ struct MaskEvaluation {
   Measured mean_iou;                    // of these
   // Segments matched without regard to their ids (IoU above 1/2), all of one class.
   PanopticQuality quality;
+  std::vector<std::string> remarks;  // sentences on what was left out
 };
 
 // Compares images of ids, 0 the background, with the frames' true masks.
@@ -34,9 +36,11 @@ class MaskEvaluator {
   // image cannot be read or has another size than the true mask.
   Expected<void> Observe(const Frame& frame);
 
-  // With kNames ids are the sequence's objects where it has them; else an id is the object with
-  // which it shares most pixels. Errors: kData where no frame had an image.
-  Expected<MaskEvaluation> Result(const std::vector<ObjectInfo>& objects, MatchMode mode) const;
+  // Images of frames that the sequence `info` does not have are remarked on. With kNames ids are
+  // the sequence's objects where it has them; else an id is the object with which it shares most
+  // pixels. Errors: kData where no frame had an image.
+  Expected<MaskEvaluation> Result(const SequenceInfo& info, const std::vector<ObjectInfo>& objects,
+                                  MatchMode mode) const;
 
  private:
   std::filesystem::path folder_;

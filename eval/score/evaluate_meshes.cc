@@ -141,7 +141,7 @@ Expected<EvaluateResult> RunEvaluate(FrameSource& source, const EvaluateConfig& 
                                        truth.trajectories(), camera));
   }
   if (masks) {
-    TSDFPP_ASSIGN(result.masks, masks->Result(names, config.match));
+    TSDFPP_ASSIGN(result.masks, masks->Result(result.info, names, config.match));
   }
   return result;
 }
@@ -182,8 +182,9 @@ std::string EvaluateTable(const EvaluateResult& result) {
     }
     if (result.trajectories->camera_m) {
       text +=
-          fmt::format("trajectory of the camera: ATE {:.4f} m, rotation {:.2f} deg\n",
-                      result.trajectories->camera_m->rmse, result.trajectories->camera_deg->rmse);
+          fmt::format("trajectory of the camera: {} frames, ATE {:.4f} m, rotation {:.2f} deg\n",
+                      result.trajectories->camera_frames, result.trajectories->camera_m->rmse,
+                      result.trajectories->camera_deg->rmse);
     }
   }
   if (result.masks) {

@@ -79,6 +79,7 @@ Expected<void> ScoreCamera(const fs::path& file, const Trajectory& estimate,
   if (const auto errors = PoseErrorsOf(pairs)) {
     out.camera_m = errors->translation_m;
     out.camera_deg = errors->rotation_deg;
+    out.camera_frames = pairs.size();
   }
   return {};
 }
@@ -148,7 +149,8 @@ Expected<TrajectoryEvaluation> EvaluateTrajectories(const fs::path& folder,
 }
 
 nlohmann::json ToJson(const TrajectoryEvaluation& evaluation) {
-  nlohmann::json json{{"camera_translation_m", SummaryJson(evaluation.camera_m)},
+  nlohmann::json json{{"camera_frames", evaluation.camera_frames},
+                      {"camera_translation_m", SummaryJson(evaluation.camera_m)},
                       {"camera_rotation_deg", SummaryJson(evaluation.camera_deg)},
                       {"objects", nlohmann::json::object()},
                       {"remarks", evaluation.remarks}};

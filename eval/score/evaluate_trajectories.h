@@ -16,7 +16,8 @@ namespace tsdfpp {
 
 struct TrajectoryEvaluation {
   std::map<InstanceId, ObjectTrajectoryScores> objects;
-  // Of the camera where the folder has one, nothing aligned.
+  // Of the camera where the folder has one, nothing aligned, over the common frames.
+  std::size_t camera_frames = 0;
   std::optional<ErrorSummary> camera_m;
   std::optional<ErrorSummary> camera_deg;
   std::vector<std::string> remarks;

@@ -357,17 +357,20 @@ nlohmann::json ToJson(const Evaluation& evaluation) {
   for (const auto& [id, share] : evaluation.sanity.by_object) {
     sanity["objects"][std::to_string(id)] = ToJson(share);
   }
+  const auto of_ghosts = [&](const Measured& area) {
+    return ToJson(KnowsBackground(evaluation) ? area : Measured::Undefined(kNoTrueBackground));
+  };
   return {{"frame", evaluation.frame},
           {"labelled", evaluation.labelled},
           {"objects", objects},
           {"visible_completion", ToJson(evaluation.visible_completion)},
-          {"ghost_area_m2", evaluation.ghost_area_m2},
-          {"ghost_error_m2", evaluation.ghost_error_m2},
-          {"ghost_share", ToJson(evaluation.ghost_share)},
-          {"revealed_ghost_area_m2", ToJson(evaluation.revealed_ghost_area_m2)},
-          {"revealed_ghost_error_m2", ToJson(evaluation.revealed_ghost_error_m2)},
-          {"revealed_unseen_area_m2", ToJson(evaluation.revealed_unseen_area_m2)},
-          {"revealed_unseen_error_m2", ToJson(evaluation.revealed_unseen_error_m2)},
+          {"ghost_area_m2", of_ghosts(Measured::Of(evaluation.ghost_area_m2))},
+          {"ghost_error_m2", of_ghosts(Measured::Of(evaluation.ghost_error_m2))},
+          {"ghost_share", of_ghosts(evaluation.ghost_share)},
+          {"revealed_ghost_area_m2", of_ghosts(evaluation.revealed_ghost_area_m2)},
+          {"revealed_ghost_error_m2", of_ghosts(evaluation.revealed_ghost_error_m2)},
+          {"revealed_unseen_area_m2", of_ghosts(evaluation.revealed_unseen_area_m2)},
+          {"revealed_unseen_error_m2", of_ghosts(evaluation.revealed_unseen_error_m2)},
           {"sanity", sanity},
           {"seams",
            {{"beside_objects", ToJson(evaluation.seams.beside_objects)},

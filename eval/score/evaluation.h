@@ -55,7 +55,7 @@ std::set<std::set<InstanceId>> RemovalsOf(const std::set<InstanceId>& movers);
 struct Evaluation {
   int frame = 0;
   bool labelled = true;               // as SceneMeshes; else purity and ghosts after are undefined
-  std::vector<ObjectScores> objects;  // background first
+  std::vector<ObjectScores> objects;  // background first, where the truth has one
   Measured visible_completion;        // all regions and objects, by area
   double ghost_area_m2 = 0;           // of the visible scene, in observed free space
   double ghost_error_m2 = 0;          // its standard error, of sampling alone; so below
@@ -74,6 +74,13 @@ struct Evaluation {
   double mesh_s = 0;              // making `scene`
   double evaluate_s = 0;          // all the rest but the removals' copies and meshes
 };
+
+// Where no true background is known (others' sets have models of objects alone) there are no
+// figures of the table, and none of ghosts: what lies on the true table is no ghost.
+inline constexpr const char* kNoTrueBackground = "no true background is known";
+inline bool KnowsBackground(const Evaluation& evaluation) {
+  return !evaluation.objects.empty() && evaluation.objects.front().info.id == kBackground;
+}
 
 // `movers` are the objects that the experiment removes; `meshes` has all of RemovalsOf(movers) that
 // are not empty. `names` are the objects in the order of the trackers. `mesh_s` stays 0.

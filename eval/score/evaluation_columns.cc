@@ -32,7 +32,30 @@ Measured LeastSanity(const Evaluation& evaluation) {
 
 Measured Cm2(const Measured& m2) { return m2.value ? Measured::Of(kCm2PerM2 * *m2.value) : m2; }
 
+// An area that the true surfaces do not account for.
+Measured GhostCm2(const Evaluation& evaluation, const Measured& m2) {
+  return KnowsBackground(evaluation) ? Cm2(m2) : Measured::Undefined(kNoTrueBackground);
+}
+
+ObjectScores Unknown() {
+  const Measured undefined = Measured::Undefined(kNoTrueBackground);
+  ObjectScores scores;
+  scores.preserved.preservation_behind_other = undefined;
+  scores.preserved.retention_behind_other = undefined;
+  scores.preserved.hole_area_cm2 = undefined;
+  for (HiddenScores& hidden : scores.preserved.by_cause) hidden.any_label = undefined;
+  scores.visible_completion = undefined;
+  scores.accuracy.distance.rmse_m = undefined;
+  scores.label_purity = undefined;
+  return scores;
+}
+
 }  // namespace
+
+const ObjectScores& TableOf(const Evaluation& evaluation) {
+  static const ObjectScores unknown = Unknown();
+  return KnowsBackground(evaluation) ? evaluation.objects.front() : unknown;
+}
 
 std::string ColumnText(const EvaluationColumn& column, const Movers& movers,
                        const Evaluation& evaluation) {
@@ -52,7 +75,7 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "occlusion preservation: share, by area, of the table's samples hidden "
        "behind another object that are reconstructed after the removal",
        [](const Movers&, const Evaluation& e) {
-         return e.objects.front().preserved.preservation_behind_other;
+         return TableOf(e).preserved.preservation_behind_other;
        }},
       {"retention",
        "table_retention_behind_other",
@@ -65,16 +88,14 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "forgetting from never having mapped; above 1 where the map gained. Empty "
        "until such samples exist",
        [](const Movers&, const Evaluation& e) {
-         return e.objects.front().preserved.retention_behind_other;
+         return TableOf(e).preserved.retention_behind_other;
        },
        {},
        true},
       {"hole cm2", "table_hole_area_cm2", "hole in the table", "cm²", Better::kLower, 0,
        "area of the table hidden behind another object x the share of it that is "
        "not kept",
-       [](const Movers&, const Evaluation& e) {
-         return e.objects.front().preserved.hole_area_cm2;
-       }},
+       [](const Movers&, const Evaluation& e) { return TableOf(e).preserved.hole_area_cm2; }},
       {"visible", "visible_completion", "visible completion", "", Better::kHigher, 3,
        "share of all that is seen and visible now that the visible scene, "
        "nothing removed, has",
@@ -83,31 +104,33 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        3,
        "share of the table that is seen and visible now and that the visible "
        "scene, nothing removed, has",
-       [](const Movers&, const Evaluation& e) { return e.objects.front().visible_completion; }},
+       [](const Movers&, const Evaluation& e) { return TableOf(e).visible_completion; }},
       {"movers", "movers_completion", "completion of the moving objects", "", Better::kHigher, 3,
        "completion of the moving objects over all that was seen of them, mean", MoversCompletion},
       {"ghost cm2", "ghost_area_cm2", "ghost area", "cm²", Better::kLower, 0,
        "reconstructed area farther than tau from every current true surface, "
        "outside the solids, in space that was seen to be free "
        "(`metrics/ghosts.h`)",
-       [](const Movers&, const Evaluation& e) { return Measured::Of(kCm2PerM2 * e.ghost_area_m2); },
-       [](const Evaluation& e) { return Measured::Of(kCm2PerM2 * e.ghost_error_m2); }},
+       [](const Movers&, const Evaluation& e) {
+         return GhostCm2(e, Measured::Of(e.ghost_area_m2));
+       },
+       [](const Evaluation& e) { return GhostCm2(e, Measured::Of(e.ghost_error_m2)); }},
       {"ghost after", "revealed_ghost_area_cm2", "ghost area after the removal", "cm²",
        Better::kLower, 0,
        "reconstructed area after the removal, farther than tau from every current "
        "true surface, outside the solids, in space that is known to be free: seen "
        "so, or where a removed object was (in its solid or within tau of its "
        "surface, at its last pose)",
-       [](const Movers&, const Evaluation& e) { return Cm2(e.revealed_ghost_area_m2); },
-       [](const Evaluation& e) { return Cm2(e.revealed_ghost_error_m2); }},
+       [](const Movers&, const Evaluation& e) { return GhostCm2(e, e.revealed_ghost_area_m2); },
+       [](const Evaluation& e) { return GhostCm2(e, e.revealed_ghost_error_m2); }},
       {"unseen after", "revealed_unseen_area_cm2", "surface in unseen space after the removal",
        "cm²", Better::kLower, 0,
        "reconstructed area after the removal, farther than tau from every current "
        "true surface, outside the solids, in the space that is not known to be "
        "free: behind things, outside all images, or where something moved away unseen. In truth "
        "nothing is there, but nobody has seen that, so no map can know",
-       [](const Movers&, const Evaluation& e) { return Cm2(e.revealed_unseen_area_m2); },
-       [](const Evaluation& e) { return Cm2(e.revealed_unseen_error_m2); }},
+       [](const Movers&, const Evaluation& e) { return GhostCm2(e, e.revealed_unseen_area_m2); },
+       [](const Evaluation& e) { return GhostCm2(e, e.revealed_unseen_error_m2); }},
       {"sane", "sanity_all", "right pixels", "", Better::kHigher, 3,
        "share of mapped pixels for which the visible scene, cast from the "
        "camera, has the true depth within a voxel and the true id; pixels "
@@ -148,14 +171,14 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "share of the hidden table that is kept, with faces of any label: surface "
        "that was kept under another object's name counts",
        [](const Movers&, const Evaluation& e) {
-         return e.objects.front().preserved.by_cause.front().any_label;
+         return TableOf(e).preserved.by_cause.front().any_label;
        }},
       {"purity", "table_label_purity", "purity of the table", "", Better::kHigher, 3,
        "share, after the removal, of the area that the map calls background "
        "whose nearest true surface is the background's; the truth keeps all "
        "that the world has, so the crust of a removed car under the table's "
        "name is impure",
-       [](const Movers&, const Evaluation& e) { return e.objects.front().label_purity; }},
+       [](const Movers&, const Evaluation& e) { return TableOf(e).label_purity; }},
   };
   return columns;
 }

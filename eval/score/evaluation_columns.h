@@ -43,6 +43,10 @@ struct EvaluationColumn {
 
 const std::vector<EvaluationColumn>& EvaluationColumns();
 
+// The scores of the background, which are those of the table; all undefined where no true
+// background is known.
+const ObjectScores& TableOf(const Evaluation& evaluation);
+
 // What a table shows of a column: "58", or "58 ±0.6" where there is an error; "-" where undefined.
 std::string ColumnText(const EvaluationColumn& column, const std::set<InstanceId>& movers,
                        const Evaluation& evaluation);

@@ -96,7 +96,7 @@ void AddPart(TriangleMesh mesh, const ScenePart& whole, LoadedScene& scene) {
 // One file. `scene_file`: it holds a scene, whatever its name.
 Expected<void> AddFile(const fs::path& path, bool scene_file, double scale, LoadedScene& scene,
                        std::vector<std::string>& remarks) {
-  TSDFPP_ASSIGN(std::vector<NamedMesh> parts, ReadSurfaceParts(path, scale));
+  TSDFPP_ASSIGN(std::vector<NamedMesh> parts, ReadSurfaceParts(path, scale, remarks));
   const std::string file = path.filename().string();
   for (NamedMesh& part : parts) {
     if (part.mesh.triangles.empty()) {

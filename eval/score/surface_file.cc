@@ -34,7 +34,8 @@ bool IsSurfaceFile(const std::filesystem::path& path) {
   return ending == ".ply" || ending == ".obj" || ending == ".stl" || ending == ".glb";
 }
 
-Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& path, double scale) {
+Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& path, double scale,
+                                                  std::vector<std::string>& remarks) {
   const std::string ending = EndingOf(path);
   std::vector<NamedMesh> parts;
   if (ending == ".ply") {
@@ -46,6 +47,7 @@ Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& p
     TSDFPP_ASSIGN(const std::string bytes, ReadFile(path));
     TSDFPP_ASSIGN(const RawMesh raw,
                   ending == ".obj" ? ReadObj(path, bytes, Materials::kSkip) : ReadStl(path, bytes));
+    remarks.insert(remarks.end(), raw.remarks.begin(), raw.remarks.end());
     parts.emplace_back();
     parts.front().mesh = MeshOf(raw);
   } else {
@@ -65,8 +67,9 @@ Expected<std::vector<NamedMesh>> ReadSurfaceParts(const std::filesystem::path& p
   return parts;
 }
 
-Expected<TriangleMesh> ReadSurfaceFile(const std::filesystem::path& path, double scale) {
-  TSDFPP_ASSIGN(std::vector<NamedMesh> parts, ReadSurfaceParts(path, scale));
+Expected<TriangleMesh> ReadSurfaceFile(const std::filesystem::path& path, double scale,
+                                       std::vector<std::string>& remarks) {
+  TSDFPP_ASSIGN(std::vector<NamedMesh> parts, ReadSurfaceParts(path, scale, remarks));
   TriangleMesh mesh;
   for (NamedMesh& part : parts) {
     if (parts.size() == 1) return std::move(part.mesh);

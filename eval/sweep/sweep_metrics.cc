@@ -28,7 +28,7 @@ Measured MoversAccuracy(const Evaluation& evaluation, const std::set<InstanceId>
 }
 
 Measured TableAccuracy(const Evaluation& evaluation, const std::set<InstanceId>&, const RunCosts&) {
-  const Measured& rmse_m = evaluation.objects.front().accuracy.distance.rmse_m;
+  const Measured& rmse_m = TableOf(evaluation).accuracy.distance.rmse_m;
   return rmse_m.value ? Measured::Of(1e3 * *rmse_m.value) : rmse_m;
 }
 

@@ -3,19 +3,14 @@
 #include <set>
 #include <string>
 
+#include "core/polygon.h"
 #include "sim/models/mesh_files.h"
 #include "sim/models/obj_materials.h"
-#include "sim/models/profile_shapes.h"
 #include "sim/models/text_scanner.h"
 
 namespace tsdfpp {
 namespace {
 
-// Cutting a face that is not convex takes time with its cube.
-constexpr std::size_t kMostConcaveCorners = 400;
-// Of all such faces together, the sum of the cubes of their corners: some seconds.
-constexpr std::size_t kMostConcaveWork =
-    20 * kMostConcaveCorners * kMostConcaveCorners * kMostConcaveCorners;
 // Pictures repeat, but not that often.
 constexpr double kMostTexcoord = 1e4;
 
@@ -50,7 +45,7 @@ class ObjReader {
   ObjMaterials materials_;
   int material_ = kNoMaterial;
   std::size_t not_faces_ = 0;
-  std::size_t concave_work_ = 0;
+  FaceCutter cutter_;
 };
 
 Expected<double> ObjReader::ReadNumber(std::string_view word) {
@@ -143,39 +138,12 @@ Expected<void> ObjReader::AddTriangle(const Corner& a, const Corner& b, const Co
 }
 
 Expected<void> ObjReader::CutFace(const std::vector<Corner>& corners) {
-  const std::size_t n = corners.size();
-  const auto at = [&](std::size_t i) -> const Eigen::Vector3d& {
-    return mesh_.vertices[corners[i % n].vertex];
-  };
-  // Newell's normal, of twice the area's length.
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < n; ++i) normal += (at(i) - at(0)).cross(at(i + 1) - at(0));
-  bool convex = true;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Eigen::Vector3d turn = (at(i + 1) - at(i)).cross(at(i + 2) - at(i + 1));
-    convex = convex && turn.dot(normal) >= 0;
-  }
-  if (convex || n == 3) {
-    for (std::size_t i = 2; i < n; ++i) {
-      TSDFPP_RETURN_IF_ERROR(AddTriangle(corners[0], corners[i - 1], corners[i]));
-    }
-    return {};
-  }
-  if (n > kMostConcaveCorners) {
-    return DataError("{}: line {}: a face that is not convex has {} corners, expected {} at most",
-                     file_, line_, n, kMostConcaveCorners);
-  }
-  concave_work_ += n * n * n;
-  if (concave_work_ > kMostConcaveWork) {
-    return DataError(
-        "{}: line {}: its faces that are not convex take too long to cut, expected triangles",
-        file_, line_);
-  }
-  const Eigen::Vector3d u = normal.unitOrthogonal();
-  const Eigen::Vector3d v = normal.normalized().cross(u);
-  std::vector<Eigen::Vector2d> flat;
-  for (std::size_t i = 0; i < n; ++i) flat.emplace_back(u.dot(at(i)), v.dot(at(i)));
-  for (const auto& [a, b, c] : CutPolygon(flat)) {
+  std::vector<Eigen::Vector3d> at;
+  at.reserve(corners.size());
+  for (const Corner& corner : corners) at.push_back(mesh_.vertices[corner.vertex]);
+  const auto triangles = cutter_.Cut(at);
+  if (!triangles) return DataError("{}: line {}: {}", file_, line_, triangles.error().message);
+  for (const auto& [a, b, c] : *triangles) {
     TSDFPP_RETURN_IF_ERROR(AddTriangle(corners[a], corners[b], corners[c]));
   }
   return {};
@@ -200,7 +168,8 @@ Expected<void> ObjReader::ReadLine(std::string_view line) {
   static const std::set<std::string_view> kKnown{"vn", "vp", "o", "g", "s"};
   if (words[0] == "v") return ReadVertex(words);
   if (words[0] == "vt") return ReadTexcoord(words);
-  if (words[0] == "f") return ReadFace(words);
+  // Old files have "fo", which is the same.
+  if (words[0] == "f" || words[0] == "fo") return ReadFace(words);
   if (words[0] == "usemtl") {
     material_ = materials_.Named(RestOf(line, words[0]));
   } else if (words[0] == "mtllib") {

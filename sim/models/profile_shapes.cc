@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <utility>
+
+#include "core/polygon.h"
 
 namespace tsdfpp {
 namespace {
@@ -12,19 +13,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr int kBevelSteps = 3;  // polygon steps of a rounded rim
 constexpr int kRimSteps = 6;    // of a vessel's rim, half around
-
-double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
-// Twice the area, positive when counter-clockwise.
-double TwiceArea(const std::vector<Eigen::Vector2d>& polygon) {
-  double sum = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    sum += Cross(polygon[i], polygon[(i + 1) % polygon.size()]);
-  }
-  return sum;
-}
 
 // The polygon moved inwards by `distance`, corners mitred.
 std::vector<Eigen::Vector2d> Inset(const std::vector<Eigen::Vector2d>& polygon, double distance) {
@@ -42,53 +30,6 @@ std::vector<Eigen::Vector2d> Inset(const std::vector<Eigen::Vector2d>& polygon, 
 }
 
 }  // namespace
-
-std::vector<std::array<std::uint32_t, 3>> CutPolygon(const std::vector<Eigen::Vector2d>& polygon) {
-  const double sign = TwiceArea(polygon) < 0 ? -1 : 1;
-  std::vector<std::uint32_t> left(polygon.size());
-  std::iota(left.begin(), left.end(), 0U);
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  const auto is_ear = [&](std::size_t i) {
-    const std::size_t n = left.size();
-    const std::uint32_t ia = left[(i + n - 1) % n];
-    const std::uint32_t ib = left[i];
-    const std::uint32_t ic = left[(i + 1) % n];
-    const Eigen::Vector2d& a = polygon[ia];
-    const Eigen::Vector2d& b = polygon[ib];
-    const Eigen::Vector2d& c = polygon[ic];
-    if (!(sign * Cross(b - a, c - a) > 0)) return false;
-    return std::none_of(left.begin(), left.end(), [&](std::uint32_t k) {
-      if (k == ia || k == ib || k == ic) return false;
-      const Eigen::Vector2d& p = polygon[k];
-      if (p == a || p == b || p == c) return false;  // a vertex there twice
-      return sign * Cross(b - a, p - a) >= 0 && sign * Cross(c - b, p - b) >= 0 &&
-             sign * Cross(a - c, p - c) >= 0;
-    });
-  };
-  while (left.size() > 3) {
-    const std::size_t n = left.size();
-    // Of all ears the one that is widest open, which avoids slivers.
-    std::size_t best = n;
-    double best_cosine = 2;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (!is_ear(i)) continue;
-      const Eigen::Vector2d before = polygon[left[(i + n - 1) % n]] - polygon[left[i]];
-      const Eigen::Vector2d after = polygon[left[(i + 1) % n]] - polygon[left[i]];
-      const double cosine = std::abs(before.normalized().dot(after.normalized()));
-      if (cosine < best_cosine) {
-        best = i;
-        best_cosine = cosine;
-      }
-    }
-    if (best == n) break;
-    triangles.push_back({left[(best + n - 1) % n], left[best], left[(best + 1) % n]});
-    left.erase(left.begin() + static_cast<std::ptrdiff_t>(best));
-  }
-  for (std::size_t i = 2; i < left.size(); ++i) {
-    triangles.push_back({left[0], left[i - 1], left[i]});
-  }
-  return triangles;
-}
 
 Shape MakePrism(const std::vector<Eigen::Vector2d>& polygon_xz, double half_width, double bevel) {
   const auto n = static_cast<std::uint32_t>(polygon_xz.size());

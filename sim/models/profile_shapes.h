@@ -10,11 +10,6 @@
 
 namespace tsdfpp {
 
-// Cuts a polygon that does not cross itself into triangles (ear clipping), oriented like the
-// polygon (either way round). Where no ear is left, which only a polygon that crosses itself can
-// do, the rest is fanned.
-std::vector<std::array<std::uint32_t, 3>> CutPolygon(const std::vector<Eigen::Vector2d>& polygon);
-
 // MakeExtrusion for any polygon (x, z) that does not cross itself, counter-clockwise seen from -y.
 // `bevel` is to be smaller than half of the narrowest place.
 Shape MakePrism(const std::vector<Eigen::Vector2d>& polygon_xz, double half_width, double bevel);

@@ -89,6 +89,7 @@ Expected<RawMesh> ReadAscii(const std::string& file, std::string_view text) {
     }
   }
   if (!ended) return DataError("{}: the file is cut off: it has no endsolid", file);
+  if (corner != 0) return DataError("{}: the last facet has no endfacet", file);
   return mesh;
 }
 
@@ -101,16 +102,16 @@ Expected<RawMesh> ReadStl(const std::filesystem::path& path, std::string_view by
   if (bytes.size() >= kHeader) std::memcpy(&count, bytes.data() + kHeader - 4, 4);
   const std::size_t needed = kHeader + kRecord * static_cast<std::size_t>(count);
   // Some binary files begin with "solid" all the same; their length gives them away.
-  const bool is_binary =
-      bytes.size() >= kHeader && (bytes.size() == needed || (!says_ascii && bytes.size() > needed));
+  const bool is_binary = bytes.size() >= kHeader && bytes.size() == needed;
   if (is_binary) return ReadBinary(file, bytes, count);
   if (says_ascii) return ReadAscii(file, bytes);
   if (bytes.size() < kHeader) {
     return DataError("{}: not an STL file: it has {} bytes, a binary one has {} at least", file,
                      bytes.size(), kHeader);
   }
-  return DataError("{}: the binary STL file is cut off: {} triangles need {} bytes, it has {}",
-                   file, count, needed, bytes.size());
+  return DataError("{}: the binary STL file {}: {} triangles need {} bytes, it has {}", file,
+                   bytes.size() < needed ? "is cut off" : "holds more than it counts", count,
+                   needed, bytes.size());
 }
 
 }  // namespace tsdfpp

@@ -244,6 +244,13 @@ TEST_F(Metric, PoseAnchorsAndRefuses) {
   EXPECT_NEAR(anchored["mean"]["ADD_m"], 0.05, 1e-6);
   EXPECT_NEAR(anchored["max"]["ADD_m"], 0.1, 1e-6);
   EXPECT_TRUE(anchored["mean"]["MSPD_px"]["value"].is_null());
+  // One estimate finds one true pose, the nearest in time.
+  const std::string close = Write("close.txt",
+                                  "1.992 0 0 0 0 0 0 1\n1.996 0 0 0 0 0 0 1\n"
+                                  "2 0 0 0 0 0 0 1\n");
+  const auto once = Json({"pose", model, close, Write("one.txt", "1.997 0 0.1 0 0 0 0 1\n")});
+  EXPECT_EQ(once["found"], 1);
+  EXPECT_EQ(once["frames"][0]["t"], 1.996);
   ExpectError({"pose", model, truth, Write("late.txt", "9 0 0 0 0 0 0 1\n")}, kData, {"late.txt"});
   ExpectError({"pose", WriteMesh("none.ply", {}), truth, estimate}, kData, {"none.ply"});
   ExpectError({"pose", model, truth, estimate, "--camera", "1,2,3"}, kUsage, {"--camera"});

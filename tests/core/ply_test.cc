@@ -152,6 +152,8 @@ TEST(Ply, MalformedFilesAreNamed) {
   const std::string points = "0 0 0\n1 0 0\n0 1 0\n";
   const std::string short_file =
       "the file ends, or holds something unreadable, before its header's counts are reached";
+  const std::string bad_line = ": its line has more or fewer numbers than the header says";
+  const std::string too_long = "the file holds more than its header counts";
   const std::string bad_face = "face 0 names a vertex or region that the file does not have";
   const struct {
     std::string text;
@@ -191,7 +193,18 @@ TEST(Ply, MalformedFilesAreNamed) {
       {vertices + faces + "end_header\n" + points + "3 0 nan 2\n", bad_face},
       {vertices + faces + "end_header\n" + points + "-3 0 1 2\n", short_file},
       {vertices + faces + "end_header\n" + points + "nan 0 1 2\n", short_file},
-      {vertices + faces + "end_header\n" + points + "3 0 1\n", short_file},
+      {vertices + faces + "end_header\n" + points + "3 0 1", short_file},
+      // A line an element, with the numbers that the header says, and nothing after them.
+      {vertices + faces + "end_header\n" + points + "3 0 1\n", "'face' 0" + bad_line},
+      {vertices + faces + "end_header\n" + points + "3 0 1 2 1\n", "'face' 0" + bad_line},
+      {vertices + "end_header\n0 0 0\n1 0 0 1\n0 1 0\n", "'vertex' 1" + bad_line},
+      {vertices + "end_header\n0 0 0\n1 0\n0 1 0\n", "'vertex' 1" + bad_line},
+      {vertices + faces + "end_header\n" + points + "3 0 1 2\n3 0 2 1\n", too_long},
+      {vertices + "end_header\n" + points + "\n 1\n", too_long},
+      {vertices + faces + "end_header\n" + points + "2 0 1\n",
+       "face 0 has 2 corners, expected 3 at least"},
+      {vertices + faces + "end_header\n" + points + "0\n",
+       "face 0 has 0 corners, expected 3 at least"},
       {vertices + faces + "property int object_id\nend_header\n" + points + "3 0 1 2 70000\n",
        short_file},
       {"ply\ncomment region 1 floor\n" + vertices.substr(4) + "end_header\n" + points,
@@ -207,6 +220,29 @@ TEST(Ply, MalformedFilesAreNamed) {
     EXPECT_EQ(mesh.error().kind, ErrorKind::kData);
     EXPECT_EQ(mesh.error().message, (folder / "bad.ply").string() + ": " + sentence) << text;
   }
+}
+
+// An arrowhead: a fan from its first corner would lie over the notch.
+TEST(Ply, FacesThatAreNotConvexAreCut) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "a.ply",
+                        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                        "property float y\nproperty float z\nelement face 1\n"
+                        "property list uchar int vertex_indices\nproperty ushort object_id\n"
+                        "end_header\n0 0 1\n2 2 1\n0 1 1\n-2 2 1\n\n4 1 2 3 0 7\n\n \n")
+                  .has_value());
+  const auto mesh = ReadPly(folder / "a.ply");
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  ASSERT_EQ(mesh->triangles.size(), 2U);
+  EXPECT_EQ(mesh->face_ids, (std::vector<InstanceId>{7, 7}));
+  float area = 0;
+  for (const auto& [a, b, c] : mesh->triangles) {
+    const Eigen::Vector3f normal =
+        (mesh->vertices[b] - mesh->vertices[a]).cross(mesh->vertices[c] - mesh->vertices[a]);
+    EXPECT_GT(normal.z(), 0);
+    area += normal.norm() / 2;
+  }
+  EXPECT_NEAR(area, 2, 1e-6);
 }
 
 // An id a face or none: whoever reads them looks at the id of every face.
@@ -234,6 +270,17 @@ TEST(Ply, CutBinaryFilesAreErrors) {
     ASSERT_TRUE(WriteFile(folder / "cut.ply", bytes.substr(0, size)).has_value());
     EXPECT_FALSE(ReadPly(folder / "cut.ply").has_value()) << size;
   }
+}
+
+TEST(Ply, BinaryFilesEndWhereTheirHeaderSays) {
+  const TempFolder folder;
+  ASSERT_TRUE(WritePly(folder / "m.ply", SomeMesh()).has_value());
+  const std::string bytes = ReadFile(folder / "m.ply").value();
+  ASSERT_TRUE(WriteFile(folder / "long.ply", bytes + bytes.back()).has_value());
+  const auto mesh = ReadPly(folder / "long.ply");
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().message,
+            (folder / "long.ply").string() + ": the file holds more than its header counts");
 }
 
 TEST(Ply, UnwritableFileIsTheEnvironmentsFault) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <set>
 
 #include "core/files.h"
@@ -228,6 +229,67 @@ TEST_F(Certification, FindsDamageThatTheHashesDoNotShow) {
   trajectory->erase(4);
   Replace(cofusion::kCameraTrajectory, TrajectoryToText(*trajectory, "camera"));
   EXPECT_TRUE(Named(Findings()).contains({"files", cofusion::kCameraTrajectory, 4}));
+}
+
+// What a sensor made of the frames is there for each of them, too.
+TEST_F(Certification, FindsFramesThatWhatWasSensedLacks) {
+  auto trajectory = ReadTrajectory(set_ / cofusion::kCameraTrajectory);
+  ASSERT_TRUE(trajectory.has_value());
+  const std::string file = cofusion::kSensedCameraTrajectory;
+  Replace(file, TrajectoryToText(*trajectory, "camera"));
+  EXPECT_EQ(Named(Findings()), Names{});
+  const Pose pose = trajectory->at(4);
+  trajectory->erase(4);
+  trajectory->emplace(99, pose);
+  Replace(file, TrajectoryToText(*trajectory, "camera"));
+  EXPECT_EQ(Named(Findings()), (Names{{"files", file, 4}, {"files", file, 99}}));
+  SetUpAgain();
+  for (const int i : {1, 2, 3, 4, 6}) {
+    Replace(cofusion::SensedMaskFile(i), Bytes(cofusion::MaskFile(i)));
+  }
+  EXPECT_EQ(Named(Findings()), (Names{{"files", cofusion::SensedMaskFile(5), 5}}));
+}
+
+// What sequence.json says is what its scene says, and its certificate is a sound one's.
+TEST_F(Certification, FindsARecordThatIsNotTheScenes) {
+  const struct {
+    std::function<void(SequenceRecord&)> change;
+    std::string check;
+    std::string sentence;
+  } cases[] = {
+      {[](SequenceRecord& r) { r.info.name = "other"; }, "scene",
+       "'scene' is other, scene.toml says tiny"},
+      {[](SequenceRecord& r) { r.info.rate_hz = 30; }, "scene",
+       "'rate_hz' is 30, scene.toml says 10"},
+      {[](SequenceRecord& r) {
+         r.info.reveal = RevealPlan{4, {1}};
+       },
+       "scene", "'reveal' is frame 4 without objects 1, scene.toml says none"},
+      {[](SequenceRecord& r) { r.info.mask_ids_are_objects = false; }, "scene",
+       "'mask_ids' is frame, scene.toml says objects"},
+      {[](SequenceRecord& r) { r.generator.seed = 5; }, "scene", "'seed' is 5, scene.toml says 1"},
+      {[](SequenceRecord& r) { r.generator.sensor = "kinect"; }, "scene",
+       "'sensor' is kinect, scene.toml says exact"},
+      {[](SequenceRecord& r) { r.info.objects.back().semantic_class = "bus"; }, "scene",
+       "object 2 is 'mug' of class 'bus', scene.toml says 'mug' of class 'mug'"},
+      {[](SequenceRecord& r) { r.certificate->wrong_ids = 7; }, "certificate",
+       "its certificate says 7 wrong ids, expected none"},
+      {[](SequenceRecord& r) { r.certificate->model.violations = 3; }, "certificate",
+       "its certificate says 3 pixels beyond the limits, expected none"},
+      {[](SequenceRecord& r) { r.certificate->frames = 2; }, "certificate",
+       "its certificate says 2 frames, the sequence has 6"},
+  };
+  const SequenceRecord sound = ReadSequenceJson(set_ / cofusion::kSequence).value();
+  for (const auto& [change, check, sentence] : cases) {
+    SequenceRecord record = sound;
+    change(record);
+    ASSERT_TRUE(WriteFile(set_ / cofusion::kSequence, SequenceToJson(record)).has_value());
+    const auto findings = Findings();
+    ASSERT_EQ(findings.size(), 1U) << sentence;
+    EXPECT_EQ(findings[0].check, check);
+    EXPECT_EQ(findings[0].subject, cofusion::kSequence);
+    EXPECT_EQ(findings[0].sentence, sentence);
+  }
 }
 
 // A scene that cannot be composed again proves nothing.

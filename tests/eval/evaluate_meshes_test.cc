@@ -320,6 +320,7 @@ TEST(EvaluateMeshes, TrajectoriesAreAnchoredOnce) {
   result = Evaluated(config);
   EXPECT_NEAR(result.trajectories->camera_m->rmse, kShift_m, 1e-8);
   EXPECT_NEAR(result.trajectories->camera_deg->rmse, 0, 1e-6);
+  EXPECT_NE(EvaluateTable(result).find("of the camera: 6 frames, ATE 0.0300 m"), std::string::npos);
 
   ASSERT_TRUE(WriteFile(folder / "t/poses-8.txt", right).has_value());
   EXPECT_NE(ErrorOf(config).message.find("is of object 8, as is"), std::string::npos);
@@ -346,6 +347,10 @@ TEST(EvaluateMeshes, MasksAreComparedUnderTheirOwnIds) {
   EXPECT_EQ(result.masks->images, 4);
   EXPECT_EQ(result.masks->mean_iou.value, 1.0);
   EXPECT_EQ(result.masks->quality.pq.value, 1.0);
+  EXPECT_TRUE(result.masks->remarks.empty());
+  fs::copy(folder / "own/Mask0002.png", folder / "own/Mask0017.png");
+  EXPECT_TRUE(Evaluated(config).masks->remarks.at(0).ends_with(
+      "1 images are of no frame of the sequence, which has 0 to 5: left out"));
   config.masks = folder / "others";
   result = Evaluated(config);
   EXPECT_EQ(result.masks->iou.at(kLeft).value, 0.0);

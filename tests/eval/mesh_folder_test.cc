@@ -32,6 +32,19 @@ using test::Scores;
 using test::TempFolder;
 using test::TruthMeshes;
 
+// What a file has beside faces may be surface, too.
+TEST(MeshFolder, SaysWhichLinesOfAnObjAreLeftOut) {
+  const TempFolder folder;
+  ASSERT_TRUE(WriteFile(folder / "scene.obj",
+                        "v 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\nsurf 0 1 0 1 1 2 3\nend\n")
+                  .has_value());
+  const auto meshes = ReadMeshFolder(folder.path(), 0, true, 1);
+  ASSERT_TRUE(meshes.has_value()) << meshes.error().message;
+  ASSERT_EQ(meshes->remarks.size(), 1U);
+  EXPECT_EQ(meshes->remarks[0], (folder / "scene.obj").string() +
+                                    ": 2 lines are no vertices, faces or materials: left out");
+}
+
 TEST(MeshFolder, EveryFormatAndUnitGivesTheSameScores) {
   const TempFolder folder;
   BoxSource source;

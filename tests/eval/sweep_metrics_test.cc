@@ -62,6 +62,53 @@ TEST(SweepMetrics, TheMoversDistanceIsOfThoseThatAreThere) {
   EXPECT_EQ(off_mm().why_not, "the mesh has no labels");
 }
 
+TEST(SweepMetrics, TheTablesDistanceIsOfTheBackgroundAlone) {
+  Evaluation evaluation;
+  evaluation.objects.resize(1);
+  evaluation.objects[0].accuracy.distance.rmse_m = Measured::Of(0.001);
+  const auto off_mm = [&] {
+    return MeasureAll(evaluation, {}, RunCosts{})[MetricIndex("table_accuracy_rmse_mm")];
+  };
+  EXPECT_EQ(off_mm().value, 1.0);
+  evaluation.objects[0].info.id = 1;
+  EXPECT_EQ(off_mm().value, std::nullopt);
+  EXPECT_EQ(off_mm().why_not, "no true background is known");
+}
+
+// The first object of others' sets is no table.
+TEST(SweepMetrics, HaveNoTableAndNoGhostsWithoutATrueBackground) {
+  Evaluation evaluation;
+  ObjectScores& car = evaluation.objects.emplace_back();
+  car.info.id = 1;
+  car.preserved.completion = Measured::Of(0.5);
+  car.preserved.preservation_behind_other = Measured::Of(0.6);
+  car.preserved.retention_behind_other = Measured::Of(0.6);
+  car.preserved.hole_area_cm2 = Measured::Of(7);
+  for (auto& cause : car.preserved.by_cause) cause.any_label = Measured::Of(0.6);
+  car.visible_completion = Measured::Of(0.8);
+  car.label_purity = Measured::Of(0.9);
+  evaluation.ghost_area_m2 = 0.01;
+  evaluation.revealed_ghost_area_m2 = Measured::Of(0.01);
+  evaluation.revealed_unseen_area_m2 = Measured::Of(0.01);
+  int undefined = 0;
+  for (const EvaluationColumn& column : EvaluationColumns()) {
+    if (!column.csv.starts_with("table_") && column.csv.find("ghost") == std::string::npos &&
+        column.csv.find("unseen") == std::string::npos) {
+      continue;
+    }
+    const Measured measured = column.value({}, evaluation);
+    EXPECT_EQ(measured.value, std::nullopt) << column.csv;
+    EXPECT_EQ(measured.why_not, "no true background is known") << column.csv;
+    ++undefined;
+  }
+  EXPECT_EQ(undefined, 9);
+  const std::vector<Measured> all = MeasureAll(evaluation, {1}, RunCosts{});
+  EXPECT_EQ(all[MetricIndex("movers_completion")].value, 0.5);
+  const auto json = ToJson(evaluation);
+  EXPECT_EQ(json["objects"][0]["hole_area_cm2"], 7.0);
+  EXPECT_EQ(json["ghost_area_m2"]["why"], "no true background is known");
+}
+
 TEST(SweepMetrics, ThePageIsMadeOfIt) {
   const std::string page = ReadFile(TSDFPP_SOURCE_DIR "/docs/metrics.md").value();
   EXPECT_NE(page.find(MetricsMarkdown()), std::string::npos)

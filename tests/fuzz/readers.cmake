@@ -30,6 +30,7 @@ function(tsdfpp_add_readers target)
       plain_name.cc
       ply.cc
       ply_header.cc
+      polygon.cc
       pose_text.cc
       quiet_stderr.cc
       toml_reader.cc)

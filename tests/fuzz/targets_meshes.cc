@@ -39,7 +39,8 @@ bool IsSame(const TriangleMesh& a, const TriangleMesh& b) {
 
 // As a surface that is scored, and as a model in a scene.
 bool ReadAsSurface(const fs::path& path) {
-  const auto mesh = ReadSurfaceFile(path, 1.0);
+  std::vector<std::string> remarks;
+  const auto mesh = ReadSurfaceFile(path, 1.0, remarks);
   if (!Accepted(mesh, path.string())) return false;
   CheckMesh(*mesh);
   Require(IsFinite(*mesh), "a surface with a position that is not finite");

@@ -213,7 +213,23 @@ void TakeSizeAway(const fs::path& set) {
   ASSERT_TRUE(WriteFile(set / "sequence.json", json).has_value());
 }
 
+// A set with one more file, which is listed.
+auto Listed(const std::string& file, const std::string& text) {
+  return [=](const fs::path& set) {
+    ASSERT_TRUE(WriteFile(set / file, text).has_value());
+    auto record = ReadSequenceJson(set / "sequence.json");
+    ASSERT_TRUE(record.has_value());
+    record->hashes[file] = HashText(text);
+    ASSERT_TRUE(WriteFile(set / "sequence.json", SequenceToJson(*record)).has_value());
+  };
+}
+
+// Whose sensor says where it thinks that the camera is.
+auto SensedCamera(const std::string& text) { return Listed("trajectories/sensed-cam-0.txt", text); }
+
 TEST(CofusionErrors, OurOwnSet) {
+  // The truth never stands in for what was sensed.
+  const std::string no_sensed = "@/trajectories/sensed-cam-0.txt: no camera pose for frame 1";
   const Case cases[] = {
       {[](const fs::path&) {}, ""},
       {Text("sequence.json", "{"), "@/sequence.json: not a JSON object"},
@@ -225,6 +241,11 @@ TEST(CofusionErrors, OurOwnSet) {
        "from 2 to 16384)"},
       {Text("trajectories/gt-boat-9.txt", ""),
        "@/trajectories/gt-boat-9.txt: object 9 is not listed in sequence.json"},
+      {SensedCamera("1 0 0 0 0 0 0 1\n"), ""},
+      {SensedCamera("2 0 0 0 0 0 0 1\n"), no_sensed},
+      {SensedCamera(""), no_sensed},
+      {Listed("mask_noise/Mask0002.png", ""), "@/mask_noise/Mask0001.png: no such image"},
+      {Listed("mask_noise/segments.csv", ""), ""},
       {Remove("colour/Color0001.png"), "@/colour/Color0001.png: no such image"},
       {Remove("mask_id"), "@/mask_id/Mask0001.png: no such image"},
       {Remove("models/car-2.ply"),

@@ -173,6 +173,8 @@ TEST(ExportRoundTrip, Bop) {
                 {0, "background", "background"}, {1, "toy-truck", "truck"}, {2, "car", ""}}));
   EXPECT_TRUE(Says(report.left_out, "the mask of object 2 on 1 frames"));
   EXPECT_TRUE(Says(report.left_out, "the mask of object 7 on 4 frames"));
+  EXPECT_TRUE(Says(report.left_out, "the mask of object 255 on 4 frames")) << "it is not listed";
+  EXPECT_FALSE(Says(report.left_out, "the mask of object 0 "));
   const auto models = read->Truth().value();
   ASSERT_EQ(models.size(), 3U);
   for (std::size_t m = 0; m < 3; ++m) {

@@ -78,6 +78,13 @@ std::vector<Broken> Corpus() {
       {"text.stl", std::string(200, 'a'), data, "the binary STL file is cut off"},
       {"cut.stl", BinaryStl("x", 12).substr(0, 400), data,
        "is cut off: 12 triangles need 684 bytes, it has 400"},
+      {"long.stl", BinaryStl("x", 12) + "\n", data,
+       "the binary STL file holds more than it counts: 12 triangles need 684 bytes, it has 685"},
+      {"fewer.stl", BinaryStl("x", 11), data, "11 triangles need 634 bytes, it has 684"},
+      {"ascii_open.stl",
+       "solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendfacet\nfacet\nvertex 0 0 0\n"
+       "vertex 1 0 0\nvertex 1 1 0\nendsolid\n",
+       data, "the last facet has no endfacet"},
       {"count.stl", BinaryStl("x", 4000000000U), data, "4000000000 triangles need 200000000084"},
       {"none.stl", BinaryStl("x", 0).substr(0, 84), data, "is empty: 0 vertices and no face"},
       {"inf.stl", infinite, data, "triangle 0 has a corner that is not finite"},

@@ -66,6 +66,8 @@ TEST_F(MeshImport, EveryFormatGivesTheSameCube) {
   for (const auto& [name, bytes] : std::vector<std::pair<std::string, std::string>>{
            {"a.obj", kCube},
            {"b.obj", back},
+           {"old.obj", std::string(kCorners) +
+                           "fo 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nfo 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"},
            {"c.stl", BinaryStl("cube", 12)},
            {"d.stl", BinaryStl("solid in name only", 12)},
            {"e.STL", AsciiStl()}}) {
