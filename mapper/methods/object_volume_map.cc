@@ -144,6 +144,13 @@ Expected<void> ObjectVolumeMap::Load(const Sections& sections) {
   return MovesValues() ? CheckWorldLattices(volumes_) : CheckOwnLattices(volumes_);
 }
 
+std::optional<Pose> ObjectVolumeMap::LastPose(InstanceId id) const {
+  const auto of = volumes_.find(id);
+  if (of == volumes_.end()) return std::nullopt;
+  const ObjectVolume& volume = of->second;
+  return volume.T_WO;
+}
+
 Fault ObjectVolumeMap::FindVolumeFault(bool with_covers, std::size_t& blocks) const {
   for (const auto& [id, volume] : volumes_) {
     const bool with_cover = with_covers && volume.lattice_is_world;

@@ -185,4 +185,9 @@ Expected<void> SingleFieldMap::Load(const Sections& sections) {
   return {};
 }
 
+std::optional<Pose> SingleFieldMap::LastPose(InstanceId id) const {
+  const auto pose = T_WO_.find(id);
+  return pose == T_WO_.end() ? std::nullopt : std::optional<Pose>(pose->second);
+}
+
 }  // namespace tsdfpp
