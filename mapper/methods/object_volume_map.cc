@@ -99,7 +99,7 @@ std::vector<Eigen::Vector3i> ObjectVolumeMap::ObservedVoxels(InstanceId id) cons
 
 std::vector<Listing> ObjectVolumeMap::ListAt(const Eigen::Vector3i& voxel) const {
   const GlobalIndex* index = Index();
-  if (index == nullptr) return {};
+  if (index == nullptr || !CanBeStored(ToIndex3(voxel))) return {};
   return index->ListedAt(ToIndex3(voxel));
 }
 
