@@ -177,7 +177,12 @@ Expected<void> CheckStart(const MapArguments& options, const MapStart& start,
   if (!removed.empty() && !start.mask_remark.empty() && options.load.empty()) {
     return UsageError("--remove {} has nothing to remove: {}", options.remove, start.mask_remark);
   }
-  return options.save.empty() ? Expected<void>{} : CheckCanBeSaved(start.pipeline->map());
+  if (options.save.empty()) return {};
+  if (start.last > kGreatestSavedFrame) {
+    return UsageError("--save '{}': the last frame to map is {}, expected at most {} (--until)",
+                      options.save, start.last, kGreatestSavedFrame);
+  }
+  return CheckCanBeSaved(start.pipeline->map());
 }
 
 void LogStart(const MapStart& start) {

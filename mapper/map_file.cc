@@ -13,7 +13,6 @@ namespace {
 
 constexpr const char* kConfigSection = "CONF";
 constexpr const char* kRunSection = "RUN ";
-constexpr int kGreatestFrame = 1'000'000'000;  // what users of the number can add to
 
 void PutText(std::string_view text, std::string& bytes) {
   PutBytes(static_cast<std::uint32_t>(text.size()), bytes);
@@ -93,8 +92,9 @@ Expected<void> CheckRun(const MappedRun& run, const std::vector<InstanceId>& map
   TSDFPP_RETURN_IF_ERROR(CheckLabel(run.sequence, "the sequence's name"));
   if (!run.poses.empty()) TSDFPP_RETURN_IF_ERROR(CheckLabel(run.poses, "the source of poses"));
   TSDFPP_RETURN_IF_ERROR(CheckObjects(run.objects, "its list"));
-  if (run.last_frame < -1 || run.last_frame > kGreatestFrame) {
-    return DataError("its last frame is {}, expected -1 to {}", run.last_frame, kGreatestFrame);
+  if (run.last_frame < -1 || run.last_frame > kGreatestSavedFrame) {
+    return DataError("its last frame is {}, expected -1 to {}", run.last_frame,
+                     kGreatestSavedFrame);
   }
   std::set<InstanceId> listed;
   for (const ObjectInfo& object : run.objects) listed.insert(object.id);

@@ -14,6 +14,9 @@
 
 namespace tsdfpp {
 
+// The greatest number of a frame that a file's run has: one that its users can add to.
+inline constexpr int kGreatestSavedFrame = 1'000'000'000;
+
 // What a run of the pipeline knows beside its map: needed to continue it, and to name the objects.
 struct MappedRun {
   std::string sequence;             // its name

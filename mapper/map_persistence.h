@@ -2,7 +2,10 @@
 // of it (MapRepresentation::persistence); to save a map and to load one, mapper/map_file.h.
 #pragma once
 
+#include <optional>
+
 #include "core/error.h"
+#include "core/types.h"
 #include "mapper/store/section_file.h"
 
 namespace tsdfpp {
@@ -18,6 +21,9 @@ class MapPersistence {
   // MakeMap made it; `sections` have the names that Save() gives them. Errors: kData, a fragment
   // that says what no map can hold; the map is then unusable.
   virtual Expected<void> Load(const Sections& sections) = 0;
+
+  // T_WO that the object was given last, which is kept, too; nothing where there was none.
+  virtual std::optional<Pose> LastPose(InstanceId id) const = 0;
 };
 
 }  // namespace tsdfpp

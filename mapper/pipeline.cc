@@ -8,6 +8,7 @@
 #include "mapper/associate/given_ids.h"
 #include "mapper/associate/mask_repair.h"
 #include "mapper/associate/voxel_votes.h"
+#include "mapper/map_persistence.h"
 #include "mapper/map_reach.h"
 #include "mapper/track/camera_tracker.h"
 #include "mapper/track/frozen_pixels.h"
@@ -167,7 +168,11 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
   for (const auto& [id, poses] : trajectories_) {
     // One that was lost is nowhere.
     if (lost_ != nullptr && !ModelOf(*map_, id)) continue;
-    if (!poses.empty()) T_WO_[id] = poses.rbegin()->second;
+    if (poses.empty()) continue;
+    // Frame numbers may have gone back: the map knows which pose was the last one.
+    const MapPersistence* kept = std::as_const(*map_).persistence();
+    const std::optional<Pose> last = kept == nullptr ? std::nullopt : kept->LastPose(id);
+    T_WO_[id] = last.value_or(poses.rbegin()->second);
   }
 }
 

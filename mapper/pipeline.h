@@ -82,7 +82,8 @@ class Pipeline {
   Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects);
 
   // Goes on from a map, which must have the config's method and settings, and T_WO of its objects
-  // by frame (mapper/map_file.h). With votes `born` are the objects of the map.
+  // by frame (mapper/map_file.h); where an object is, the map says, if it can. With votes `born`
+  // are the objects of the map.
   Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& objects,
            std::unique_ptr<MapRepresentation> map,
            std::map<InstanceId, std::map<int, Pose>> trajectories,

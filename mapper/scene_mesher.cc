@@ -1,9 +1,9 @@
 #include "mapper/scene_mesher.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "mapper/block_surfaces.h"
@@ -20,11 +20,15 @@ std::optional<SurfacesInBlocks> SurfacesOf(const MapRepresentation& map) {
   return surfaces->Surfaces();
 }
 
-// The triangles of one id.
-TriangleMesh FacesOf(const TriangleMesh& scene, InstanceId id) {
-  std::vector<std::uint8_t> keep(scene.triangles.size());
-  for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = scene.face_ids[i] == id ? 1 : 0;
-  return KeepFaces(scene, keep);
+std::size_t BytesOf(const MeshesById& meshes) {
+  std::size_t bytes = 0;
+  for (const auto& [id, mesh] : meshes) {
+    bytes += mesh.vertices.size() * sizeof(mesh.vertices[0]) +
+             mesh.colours.size() * sizeof(mesh.colours[0]) +
+             mesh.triangles.size() * sizeof(mesh.triangles[0]) +
+             mesh.face_ids.size() * sizeof(mesh.face_ids[0]);
+  }
+  return bytes;
 }
 
 bool SameMeshes(const TriangleMesh& a, const TriangleMesh& b) {
@@ -42,7 +46,8 @@ struct SceneMesher::Kept {
   std::optional<Method> method;
   VolumeMeshes volumes;
   FieldMesh field;
-  std::map<InstanceId, TriangleMesh> told;  // of a map without blocks
+  std::optional<MeshesById> field_by_id;  // its scene's, once asked for, until it changes
+  MeshesById told;                        // of a map without blocks
 };
 
 SceneMesher::SceneMesher() : kept_(std::make_unique<Kept>()) {}
@@ -60,7 +65,10 @@ MeshWork SceneMesher::Update(const MapRepresentation& map) {
   const auto surfaces = SurfacesOf(map);
   if (!surfaces) return {};
   if (surfaces->field) {
-    return kept_->field.Update(*surfaces->field, static_cast<float>(surfaces->voxel_m));
+    const MeshWork work =
+        kept_->field.Update(*surfaces->field, static_cast<float>(surfaces->voxel_m));
+    if (work.changed > 0 || work.remade > 0) kept_->field_by_id.reset();
+    return work;
   }
   return kept_->volumes.Update(*surfaces->objects, surfaces->voxel_m);
 }
@@ -78,7 +86,11 @@ TriangleMesh SceneMesher::ObjectMesh(const MapRepresentation& map, InstanceId id
   const auto surfaces = SurfacesOf(map);
   if (!surfaces) return map.ObjectMesh(id);
   if (surfaces->objects) return kept_->volumes.Object(*surfaces->objects, surfaces->voxel_m, id);
-  TriangleMesh mesh = FacesOf(SceneMesh(map), id);
+  Update(map);
+  if (!kept_->field_by_id) kept_->field_by_id = SplitByIds(kept_->field.Scene());
+  const auto found = kept_->field_by_id->find(id);
+  if (found == kept_->field_by_id->end()) return {};
+  TriangleMesh mesh = found->second;
   mesh.face_ids.clear();
   return mesh;
 }
@@ -92,12 +104,10 @@ SceneChanges SceneMesher::TakeSceneChanges(const MapRepresentation& map) {
 }
 
 std::vector<ScenePiece> SceneMesher::Kept::TakeWholeObjects(const MapRepresentation& map) {
-  const TriangleMesh scene = map.SceneMesh();
-  std::set<InstanceId> ids(scene.face_ids.begin(), scene.face_ids.end());
-  for (const auto& [id, mesh] : told) ids.insert(id);
+  MeshesById scene = SplitByIds(map.SceneMesh());
+  for (const auto& [id, mesh] : told) scene.try_emplace(id);  // without triangles, if it is gone
   std::vector<ScenePiece> parts;
-  for (const InstanceId id : ids) {
-    TriangleMesh mesh = FacesOf(scene, id);
+  for (auto& [id, mesh] : scene) {
     const auto before = told.find(id);
     if (before != told.end() && SameMeshes(before->second, mesh)) continue;
     parts.push_back({id, {}, mesh});
@@ -111,14 +121,8 @@ std::vector<ScenePiece> SceneMesher::Kept::TakeWholeObjects(const MapRepresentat
 }
 
 std::size_t SceneMesher::Bytes() const {
-  std::size_t bytes = kept_->volumes.Bytes() + kept_->field.Bytes();
-  for (const auto& [id, mesh] : kept_->told) {
-    bytes += mesh.vertices.size() * sizeof(mesh.vertices[0]) +
-             mesh.colours.size() * sizeof(mesh.colours[0]) +
-             mesh.triangles.size() * sizeof(mesh.triangles[0]) +
-             mesh.face_ids.size() * sizeof(mesh.face_ids[0]);
-  }
-  return bytes;
+  const std::size_t by_id = kept_->field_by_id ? BytesOf(*kept_->field_by_id) : 0;
+  return kept_->volumes.Bytes() + kept_->field.Bytes() + by_id + BytesOf(kept_->told);
 }
 
 TriangleMesh AllObjectsMesh(const MapRepresentation& map) {

@@ -120,7 +120,9 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
       candidate.first = frame_;
     }
     if (may_begin[s]) candidate.seen.push_back(frame_);
-    while (candidate.seen.front() <= frame_ - config_.confirm_window) candidate.seen.pop_front();
+    while (!candidate.seen.empty() && candidate.seen.front() <= frame_ - config_.confirm_window) {
+      candidate.seen.pop_front();
+    }
     if (may_begin[s] && static_cast<int>(candidate.seen.size()) >= config_.confirm_frames &&
         (!is_held[s] || frame_ - candidate.first >= config_.hold_frames)) {
       candidacies[s] = Candidacy::kIsConfirmed;

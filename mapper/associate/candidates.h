@@ -1,6 +1,7 @@
 // Segments that no object of the map claims, until they have been there long enough to be one.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -35,7 +36,8 @@ class Candidates {
   // waits on, and are not counted. Says what each is. It is confirmed where it and its candidate
   // were there, with min_points or more, in confirm_frames of the last confirm_window frames, but
   // if it is held, not in the hold_frames frames from that on in which it was first there.
-  // Who is confirmed is a candidate no longer, and who cannot be any more is forgotten. A candidate
+  // Who is confirmed is a candidate no longer, and who cannot be any more is forgotten: whom the
+  // next frame's window does not reach back to, but for who was there in this frame. A candidate
   // is one segment of a frame at most: pairs with the greatest overlap (that share times the share
   // of the candidate's cells that are near the segment's) are made first, and of a segment's only
   // the kMostPairs greatest are looked at. While there are kMostCandidates, no segment becomes a
@@ -65,9 +67,11 @@ class Candidates {
     std::size_t candidate = 0;
   };
   static bool OverlapsMore(const Pair& a, const Pair& b) { return a.overlap > b.overlap; }
-  // Whether the next frame's window does not reach back to it.
+  // Whether the next frame's window does not reach back to it. A window of one frame reaches back
+  // to none: it is then over where this frame did not show it.
   bool IsOver(const Candidate& candidate) const {
-    return candidate.seen.back() <= frame_ - config_.confirm_window + 1;
+    const int window = std::max(config_.confirm_window, 2);
+    return candidate.seen.empty() || candidate.seen.back() <= frame_ - window + 1;
   }
   std::vector<Index3> CellsOf(const std::vector<Eigen::Vector3d>& points_W) const;
   // The candidates that a segment can be, at most kMostPairs; `index` has all cells, sorted.

@@ -1,29 +1,38 @@
 #include "mapper/mesh/mesh_tools.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace tsdfpp {
 
-// The triangles for which keep[i] is set, and the vertices they use.
-TriangleMesh KeepFaces(const TriangleMesh& mesh, const std::vector<std::uint8_t>& keep) {
-  TriangleMesh kept;
-  constexpr std::uint32_t kUnused = ~0U;
-  std::vector<std::uint32_t> renamed(mesh.vertices.size(), kUnused);
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    if (keep[i] == 0) continue;
-    for (const std::uint32_t v : mesh.triangles[i]) renamed[v] = 0;
+MeshesById SplitByIds(const TriangleMesh& scene) {
+  std::map<InstanceId, std::vector<std::size_t>> faces;
+  for (std::size_t i = 0; i < scene.triangles.size(); ++i) faces[scene.face_ids[i]].push_back(i);
+  MeshesById meshes;
+  std::vector<std::size_t> used_by(scene.vertices.size());  // 1 and up, in the order of ids
+  std::vector<std::uint32_t> renamed(scene.vertices.size());
+  for (const auto& [id, of] : faces) {
+    TriangleMesh& mesh = meshes[id];
+    const std::size_t user = meshes.size();
+    std::vector<std::uint32_t> used;
+    for (const std::size_t i : of) {
+      for (const std::uint32_t v : scene.triangles[i]) {
+        if (std::exchange(used_by[v], user) != user) used.push_back(v);
+      }
+    }
+    std::sort(used.begin(), used.end());
+    for (const std::uint32_t v : used) {
+      renamed[v] = static_cast<std::uint32_t>(mesh.vertices.size());
+      mesh.vertices.push_back(scene.vertices[v]);
+      if (!scene.colours.empty()) mesh.colours.push_back(scene.colours[v]);
+    }
+    for (const std::size_t i : of) {
+      const auto& [a, b, c] = scene.triangles[i];
+      mesh.triangles.push_back({renamed[a], renamed[b], renamed[c]});
+    }
+    mesh.face_ids.assign(of.size(), id);
   }
-  for (std::size_t v = 0; v < renamed.size(); ++v) {
-    if (renamed[v] == kUnused) continue;
-    renamed[v] = static_cast<std::uint32_t>(kept.vertices.size());
-    kept.vertices.push_back(mesh.vertices[v]);
-    if (!mesh.colours.empty()) kept.colours.push_back(mesh.colours[v]);
-  }
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    if (keep[i] == 0) continue;
-    const auto& t = mesh.triangles[i];
-    kept.triangles.push_back({renamed[t[0]], renamed[t[1]], renamed[t[2]]});
-    if (!mesh.face_ids.empty()) kept.face_ids.push_back(mesh.face_ids[i]);
-  }
-  return kept;
+  return meshes;
 }
 
 void Append(TriangleMesh& scene, const TriangleMesh& mesh, InstanceId id) {

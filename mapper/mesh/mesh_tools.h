@@ -1,16 +1,17 @@
 // Small operations on triangle meshes.
 #pragma once
 
-#include <cstdint>
-#include <vector>
+#include <map>
 
 #include "core/types.h"
 #include "mapper/volume/block_grid.h"
 
 namespace tsdfpp {
 
-// The triangles for which keep[i] is not 0, with the vertices that they use, in order.
-TriangleMesh KeepFaces(const TriangleMesh& mesh, const std::vector<std::uint8_t>& keep);
+using MeshesById = std::map<InstanceId, TriangleMesh>;
+// The triangles of each id with the vertices that they use, in order; with face ids. Costs what the
+// scene's triangles do, however many ids there are.
+MeshesById SplitByIds(const TriangleMesh& scene);
 // Appends a coloured mesh without face ids as faces of `id`.
 void Append(TriangleMesh& scene, const TriangleMesh& mesh, InstanceId id);
 // The voxel whose centre is nearest to a point, along an axis; both in metres.

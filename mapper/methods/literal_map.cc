@@ -77,6 +77,7 @@ std::vector<RaySurface> LiteralMap::CastRays(const Intrinsics& camera, const Pos
 }
 
 std::vector<Listing> LiteralMap::ListAt(const Eigen::Vector3i& voxel) const {
+  if (!CanBeStored(ToIndex3(voxel))) return {};
   return index_.ListedAt(ToIndex3(voxel));
 }
 

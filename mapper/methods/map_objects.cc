@@ -27,12 +27,10 @@ Expected<void> CheckRename(InstanceId from, bool from_is_known, InstanceId to, b
 }
 
 TsdfGrid InWorldLattice(const TsdfGrid& volume, const Pose& T_WL, const MapConfig& config) {
-  if (!SameNumbers(T_WL, Pose::Identity())) {
-    return ResampleGrid(volume, T_WL, config.voxel_m, config.back(), config.resampling);
-  }
   TsdfGrid copy = volume;
   for (const auto& entry : copy.entries()) entry.block->UpdateMasks(config.back());
-  return copy;
+  if (SameNumbers(T_WL, Pose::Identity())) return copy;
+  return ResampleGrid(copy, T_WL, config.voxel_m, config.back(), config.resampling);
 }
 
 TsdfGrid CopyVolume(const MapRepresentation& map, InstanceId id) {

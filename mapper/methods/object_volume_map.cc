@@ -99,7 +99,7 @@ std::vector<Eigen::Vector3i> ObjectVolumeMap::ObservedVoxels(InstanceId id) cons
 
 std::vector<Listing> ObjectVolumeMap::ListAt(const Eigen::Vector3i& voxel) const {
   const GlobalIndex* index = Index();
-  if (index == nullptr) return {};
+  if (index == nullptr || !CanBeStored(ToIndex3(voxel))) return {};
   return index->ListedAt(ToIndex3(voxel));
 }
 
@@ -142,6 +142,13 @@ void ObjectVolumeMap::Save(Sections& sections) const { SaveVolumes(volumes_, sec
 Expected<void> ObjectVolumeMap::Load(const Sections& sections) {
   TSDFPP_ASSIGN(volumes_, LoadAllVolumes(sections, kVolumes, config_));
   return MovesValues() ? CheckWorldLattices(volumes_) : CheckOwnLattices(volumes_);
+}
+
+std::optional<Pose> ObjectVolumeMap::LastPose(InstanceId id) const {
+  const auto of = volumes_.find(id);
+  if (of == volumes_.end()) return std::nullopt;
+  const ObjectVolume& volume = of->second;
+  return volume.T_WO;
 }
 
 Fault ObjectVolumeMap::FindVolumeFault(bool with_covers, std::size_t& blocks) const {

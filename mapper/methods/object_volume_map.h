@@ -31,6 +31,7 @@ class ObjectVolumeMap : public VoxelMap {
   void Save(Sections& sections) const override;
   // Covers are not up to date.
   Expected<void> Load(const Sections& sections) override;
+  std::optional<Pose> LastPose(InstanceId id) const override;
 
  protected:
   explicit ObjectVolumeMap(const MapConfig& config) : config_(config) {}

@@ -98,6 +98,7 @@ const TsdfGrid* SingleFieldMap::GridOf(InstanceId) const { return &field_.values
 
 std::optional<VoxelValue> SingleFieldMap::ValueAt(InstanceId id,
                                                   const Eigen::Vector3i& voxel) const {
+  if (!CanBeStored(ToIndex3(voxel))) return std::nullopt;
   const LabelBlock* labels = field_.labels().Find(BlockOf(ToIndex3(voxel)));
   if (labels == nullptr || labels->id[At(PlaceInBlock(ToIndex3(voxel)))] != id) {
     return std::nullopt;
@@ -106,6 +107,7 @@ std::optional<VoxelValue> SingleFieldMap::ValueAt(InstanceId id,
 }
 
 std::vector<Listing> SingleFieldMap::ListAt(const Eigen::Vector3i& voxel) const {
+  if (!CanBeStored(ToIndex3(voxel))) return {};
   return field_.ListedAt(ToIndex3(voxel));
 }
 
@@ -183,6 +185,11 @@ Expected<void> SingleFieldMap::Load(const Sections& sections) {
   }
   if (!poses.AtEnd()) return DataError("its poses have another length than they say");
   return {};
+}
+
+std::optional<Pose> SingleFieldMap::LastPose(InstanceId id) const {
+  const auto pose = T_WO_.find(id);
+  return pose == T_WO_.end() ? std::nullopt : std::optional<Pose>(pose->second);
 }
 
 }  // namespace tsdfpp

@@ -44,6 +44,7 @@ class SingleFieldMap final : public VoxelMap {
   std::optional<std::string> FindFault() const override;
   void Save(Sections& sections) const override;
   Expected<void> Load(const Sections& sections) override;
+  std::optional<Pose> LastPose(InstanceId id) const override;
 
  private:
   using LabelBlock = LabelledField::LabelBlock;

@@ -98,6 +98,7 @@ class SurfelCast {
   void CastIn(const SplatBands& bands, std::size_t band) {
     const auto width = static_cast<std::size_t>(camera_.width);
     const auto count = static_cast<std::size_t>(options_.surfaces);
+    const double nearest_m = options_.NearestDepth_m();
     const std::size_t first_row = SplatBands::FirstRow(band);
     const std::size_t end_row = bands.EndRow(band);
     std::vector<Hit> hits((end_row - first_row) * width * count);
@@ -108,7 +109,7 @@ class SurfelCast {
         Hit* place = hits.data() + ((v - first_row) * width + splat.u0) * count;
         for (std::size_t u = splat.u0; u < splat.u1; ++u, place += count) {
           const double depth = splat.DepthAlong(rays_.At(u, v));
-          if (depth == 0 || depth < options_.near_m) continue;
+          if (depth == 0 || depth < nearest_m) continue;
           Insert({depth, *i, discs_[*i].id}, place, place + count);
         }
       }

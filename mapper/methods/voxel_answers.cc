@@ -23,7 +23,14 @@ std::vector<Eigen::Vector3i> ObservedVoxelsOf(const TsdfGrid& grid) {
   return SortedVoxels(std::move(voxels));
 }
 
+bool CanBeStored(const Index3& voxel) {
+  const auto is_near = [](int i) { return i >= -kFurthestStored && i <= kFurthestStored; };
+  const Index3 block = BlockOf(voxel);
+  return is_near(block.x) && is_near(block.y) && is_near(block.z);
+}
+
 std::optional<VoxelValue> ValueOf(const TsdfGrid& grid, const Index3& voxel) {
+  if (!CanBeStored(voxel)) return std::nullopt;
   const TsdfBlock* block = grid.Find(BlockOf(voxel));
   const int place = PlaceInBlock(voxel);
   const auto i = static_cast<std::size_t>(place);

@@ -10,6 +10,8 @@ namespace tsdfpp {
 
 // The observed voxels of a grid, sorted by (z, y, x).
 std::vector<Eigen::Vector3i> ObservedVoxelsOf(const TsdfGrid& grid);
+// Whether a grid can store the voxel. Beyond, the keys of blocks wrap.
+bool CanBeStored(const Index3& voxel);
 // The voxel's value, nothing where it is unobserved.
 std::optional<VoxelValue> ValueOf(const TsdfGrid& grid, const Index3& voxel);
 // Sorts by (z, y, x).

@@ -10,7 +10,10 @@ namespace tsdfpp {
 struct RayCastOptions {
   int surfaces = 1;     // how many surfaces along each ray, 1 or more
   bool colour = true;   // whether to fill RaySurface::colour
-  double near_m = 0.0;  // surfaces at less depth are not seen
+  double near_m = 0.0;  // surfaces at less depth are not seen; none is seen behind the camera
+
+  // near_m, and 0 where it is below 0 or no number.
+  double NearestDepth_m() const { return near_m > 0 ? near_m : 0; }
 };
 
 // One surface along each ray, an image a quantity; pixel centres are integers.

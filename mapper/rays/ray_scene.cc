@@ -37,7 +37,8 @@ RayScene::RayScene(const RayPass& ray_pass, const Intrinsics& intrinsics, const 
     : pass(ray_pass),
       options(cast_options),
       camera{intrinsics, T_WC},
-      blocks(FindRayBlocks(pass.volumes, camera, pass.voxel_m, options.near_m, pass.contested)),
+      blocks(FindRayBlocks(pass.volumes, camera, pass.voxel_m, options.NearestDepth_m(),
+                           pass.contested)),
       world_rays(RaysIn({}, camera, 1.0)) {
   // Volumes whose lattice is the world's share their rays.
   int world = -1;

@@ -36,7 +36,7 @@ TileCast::TileCast(const RayScene& scene)
     : scene_(scene),
       voxel_(static_cast<float>(scene.pass.voxel_m)),
       surfaces_(static_cast<std::size_t>(scene.options.surfaces)) {
-  from_.fill(static_cast<float>(scene.options.near_m));
+  from_.fill(static_cast<float>(scene.options.NearestDepth_m()));
   if (scene.pass.make_hidden) hidden_ = scene.pass.make_hidden();
 }
 

@@ -1,4 +1,5 @@
-// What `map` and `compare` say of sequences that lie too far out, and of those that hold nothing.
+// What `map` and `compare` say of sequences that lie too far out, of those that hold nothing, and
+// of those whose numbers are too great for a file.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -17,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::CommandOutput;
 using test::kData;
+using test::kUsage;
 using test::RunTsdfpp;
 
 // The boxes with their frames changed.
@@ -32,6 +34,17 @@ class ChangedBoxes : public test::BoxSource {
 
  private:
   std::function<void(Frame&)> change_;
+};
+
+// Three frames, from this number on.
+class LateBoxes : public test::BoxSource {
+ public:
+  explicit LateBoxes(int first) : BoxSource(3) { info_.first_index = first; }
+  Expected<Frame> Read(int index) override {
+    auto frame = BoxSource::Read(index - info_.first_index);
+    if (frame) frame->index = index;
+    return frame;
+  }
 };
 
 class FarAndEmpty : public testing::Test {
@@ -99,6 +112,25 @@ TEST_F(FarAndEmpty, AnEmptyMapIsSaid) {
   for (const auto& run : Json("compare/summary.json")["runs"]) {
     EXPECT_EQ(run["remarks"], nlohmann::json::array({remark}));
   }
+}
+
+// Before anything is mapped.
+TEST_F(FarAndEmpty, FramesThatNoMapFileHasAreNotMappedToBeSaved) {
+  LateBoxes source(999'999'999);
+  const auto written =
+      WriteCofusion(source, {"0.1.0", 1, "boxes", "none", "none"}, folder_ / "boxes");
+  ASSERT_TRUE(written.has_value()) << written.error().message;
+  const std::string save = folder_ / "late.map";
+  const CommandOutput beyond = Run("map", {"--voxel", "0.05", "--save", save});
+  EXPECT_EQ(beyond.exit_code, kUsage);
+  EXPECT_EQ(beyond.err, "tsdfpp: --save '" + save +
+                            "': the last frame to map is 1000000001, expected at most 1000000000 "
+                            "(--until)\n");
+  EXPECT_FALSE(fs::exists(folder_ / "map"));
+  const CommandOutput saved =
+      Run("map", {"--voxel", "0.05", "--save", save, "--until", "1000000000"});
+  EXPECT_EQ(saved.exit_code, 0) << saved.err;
+  EXPECT_TRUE(fs::exists(save));
 }
 
 }  // namespace

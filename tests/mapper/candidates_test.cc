@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <random>
 #include <set>
@@ -88,7 +89,8 @@ class PlainCandidates {
     return points_W.size() >= static_cast<std::size_t>(config_.min_points);
   }
   bool IsInNextWindow(const Candidate& candidate) const {
-    return SeenSince(candidate, frame_ + 1 - config_.confirm_window + 1) > 0;
+    const int first = frame_ + 1 - config_.confirm_window + 1;
+    return SeenSince(candidate, std::min(first, frame_)) > 0;
   }
   static std::ptrdiff_t SeenSince(const Candidate& candidate, int frame) {
     return std::count_if(candidate.seen.begin(), candidate.seen.end(),
@@ -143,7 +145,9 @@ TEST(Candidates, AreThoseOfPlainPairs) {
   config.min_points = 5;
   config.hold_frames = 6;
   Clouds clouds;
-  for (int trial = 0; trial < 20; ++trial) {
+  for (int trial = 0; trial < 30; ++trial) {
+    config.confirm_window = std::array{5, 1, 2}[static_cast<std::size_t>(trial % 3)];
+    config.confirm_frames = std::min(3, config.confirm_window);
     Candidates candidates(config, kVoxel_m);
     PlainCandidates plain(config);
     for (int frame = 0; frame < 12; ++frame) {
@@ -163,6 +167,29 @@ TEST(Candidates, AreThoseOfPlainPairs) {
                 plain.Confirm(segments_W, may_begin, is_held));
       ASSERT_EQ(candidates.size(), plain.size());
     }
+  }
+}
+
+TEST(Candidates, AreHeldForSoManyFramesWhateverTheWindow) {
+  Clouds clouds;
+  VoteConfig config;
+  config.confirm_frames = 1;
+  config.hold_frames = 4;
+  const Points points = clouds.Around({0, 0, 1}, 0.05, 2 * config.min_points);
+  for (const int window : {1, 2, 5}) {
+    SCOPED_TRACE(window);
+    config.confirm_window = window;
+    ASSERT_TRUE(config.Validate());
+    Candidates candidates(config, kVoxel_m);
+    for (int i = 0; i < config.hold_frames; ++i) {
+      EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kWaits) << i;
+    }
+    EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kIsConfirmed);
+    // Out of sight it is forgotten, and what may begin none is not counted.
+    EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kWaits);
+    EXPECT_EQ(candidates.Confirm({points}, {false}, {true}).front(), Candidacy::kWaits);
+    for (int i = 0; i < window; ++i) candidates.Confirm({}, {}, {});
+    EXPECT_EQ(candidates.size(), 0U);
   }
 }
 

@@ -2,6 +2,9 @@
 // the one made from scratch.
 #include <gtest/gtest.h>
 
+#include <map>
+
+#include "mapper/block_surfaces.h"
 #include "mapper/mesh/scene_parts.h"
 #include "tests/mapper/every_method.h"
 #include "tests/mapper/from_scratch.h"
@@ -70,6 +73,55 @@ TEST_P(KeptScene, FollowsSmallChanges) {
     EXPECT_GT(map->SceneMesh().triangles.size(), 1000U);
   }
   EXPECT_GT(small, 10);
+}
+
+// The faces of one id, with the vertices that they use.
+TriangleMesh FacesOf(const TriangleMesh& scene, InstanceId id) {
+  std::map<std::uint32_t, std::uint32_t> renamed;
+  for (std::size_t i = 0; i < scene.triangles.size(); ++i) {
+    if (scene.face_ids[i] != id) continue;
+    for (const std::uint32_t v : scene.triangles[i]) renamed[v] = 0;
+  }
+  TriangleMesh mesh;
+  for (auto& [v, name] : renamed) {
+    name = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.push_back(scene.vertices[v]);
+    mesh.colours.push_back(scene.colours[v]);
+  }
+  for (std::size_t i = 0; i < scene.triangles.size(); ++i) {
+    if (scene.face_ids[i] != id) continue;
+    const auto& [a, b, c] = scene.triangles[i];
+    mesh.triangles.push_back({renamed.at(a), renamed.at(b), renamed.at(c)});
+  }
+  return mesh;
+}
+
+// They are parted once and kept until something changes.
+TEST(KeptFields, ObjectsAreTheFacesOfTheScene) {
+  for (const Method method : VoxelMethods()) {
+    SCOPED_TRACE(MethodName(method));
+    const auto map = MakeMap(method, ToyConfig());
+    if (!map->block_surfaces()->Surfaces().field) continue;
+    SceneMesher mesher;
+    for (int i = 0; i < 3; ++i) {
+      SetPosesThenFuse(*map, DriveFrame(i));
+      mesher.Update(*map);
+      const std::size_t before = mesher.Bytes();
+      const TriangleMesh scene = mesher.SceneMesh(*map);
+      int shown = 0;
+      for (const InstanceId id : ToyIds()) {
+        const TriangleMesh expected = FacesOf(scene, id);
+        if (!expected.triangles.empty()) ++shown;
+        EXPECT_TRUE(BytesOf(mesher.ObjectMesh(*map, id)) == BytesOf(expected)) << id;
+      }
+      EXPECT_GE(shown, 2);
+      EXPECT_TRUE(mesher.ObjectMesh(*map, 9).vertices.empty());
+      EXPECT_GT(mesher.Bytes(), before);
+      const std::size_t kept = mesher.Bytes();
+      EXPECT_FALSE(mesher.ObjectMesh(*map, kBackground).triangles.empty());
+      EXPECT_EQ(mesher.Bytes(), kept);
+    }
+  }
 }
 
 // Where `tsdf++` lists another object first, triangles of objects whose values are as they were may

@@ -325,5 +325,25 @@ TEST_P(LatticeEdge, AVolumeIsAddedInTheRangeOnly) {
   EXPECT_TRUE(MapToBytes(*map).value() == before);
 }
 
+// The keys of cells of blocks wrap at multiples of 2^26 voxels.
+TEST_P(LatticeEdge, VoxelsThatNoGridCanStoreAreNotThere) {
+  const auto map = DyadicMap(GetParam(), 1);
+  const VoxelInspection& voxels = VoxelsOf(*map);
+  const auto observed = voxels.ObservedVoxels(kBackground);
+  const auto listed = voxels.ListedVoxels();
+  ASSERT_FALSE(observed.empty());
+  for (const int shift : {1 << 26, -(1 << 26), 1 << 27, 1 << 30}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3i far = shift * Eigen::Vector3i::Unit(axis);
+      for (const Eigen::Vector3i& v : observed) {
+        ASSERT_FALSE(voxels.ValueAt(kBackground, v + far)) << Text(v + far);
+      }
+      for (const Eigen::Vector3i& v : listed) {
+        ASSERT_TRUE(voxels.ListAt(v + far).empty()) << Text(v + far);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tsdfpp

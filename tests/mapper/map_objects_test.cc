@@ -216,6 +216,30 @@ TEST_P(MapObjects, AnObjectComesFromAnotherMapAtItsPlace) {
   }
 }
 
+// Who fills a volume by hand sets distances and weights, and says nothing of masks.
+TEST_P(MapObjects, MasksOfAnAddedVolumeNeedNotBeUpToDate) {
+  const auto other = DrivenMap(Method::kTsdfppAnchored, ToyConfig(), 2);
+  const TsdfGrid volume = CopyVolume(*other, kBrick);
+  TsdfGrid unmasked = volume;
+  for (const auto& entry : unmasked.entries()) {
+    for (BlockMask TsdfBlock::*mask : {&TsdfBlock::observed, &TsdfBlock::negative, &TsdfBlock::band,
+                                       &TsdfBlock::crossed, &TsdfBlock::cover, &TsdfBlock::full}) {
+      (*entry.block).*mask = {};
+    }
+  }
+  const Pose T_WO = DriveFrame(1).T_WO.at(kBrick);
+  const Pose aside = MakePose(0.4, {0.1, 0, 1}, {0.05, 0.03, 0.06});
+  for (const Pose& T_WL : {Pose::Identity(), aside}) {
+    const auto map = MakeMap(GetParam(), ToyConfig());
+    const auto expected = MakeMap(GetParam(), ToyConfig());
+    ASSERT_TRUE(EditingOf(*map).Add(kNew, unmasked, T_WL, T_WO));
+    ASSERT_TRUE(EditingOf(*expected).Add(kNew, volume, T_WL, T_WO));
+    EXPECT_EQ(VoxelsOf(*map).FindFault(), std::nullopt);
+    EXPECT_FALSE(map->ObjectMesh(kNew).triangles.empty());
+    EXPECT_TRUE(SnapshotOf(*map, {kNew}) == SnapshotOf(*expected, {kNew}));
+  }
+}
+
 // Renames among the other events, at random, against the reference.
 class RandomRenames : public ::testing::TestWithParam<std::tuple<Method, int>> {};
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomRenames,

@@ -1,5 +1,5 @@
 // The pipeline refuses what is no frame or lies too far out, and goes on as if it had not been
-// given; it says what it could make nothing of.
+// given; it says what it could make nothing of. What it takes: frame numbers that go back.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -16,16 +16,23 @@
 namespace tsdfpp {
 namespace {
 
-Pipeline NewPipeline(Method method, PoseSource poses = PoseSource::kGiven) {
+PipelineConfig ConfigOf(Method method, PoseSource poses = PoseSource::kGiven) {
   PipelineConfig config;
   config.method = method;
   config.map = DyadicConfig();
   config.poses = poses;
-  return {config,
-          {{kBackground, "background", ""},
-           {kBrick, "brick", "toy"},
-           {kBall, "ball", "toy"},
-           {kTray, "tray", "toy"}}};
+  return config;
+}
+
+std::vector<ObjectInfo> Toys() {
+  return {{kBackground, "background", ""},
+          {kBrick, "brick", "toy"},
+          {kBall, "ball", "toy"},
+          {kTray, "tray", "toy"}};
+}
+
+Pipeline NewPipeline(Method method, PoseSource poses = PoseSource::kGiven) {
+  return {ConfigOf(method, poses), Toys()};
 }
 
 class PipelineRange : public EveryMethodTest {};
@@ -70,6 +77,23 @@ TEST_P(PipelineRange, ARefusedFrameLeavesNoTrace) {
     for (const auto& [frame, T_WO] : poses) EXPECT_EQ(others.at(frame).matrix(), T_WO.matrix());
   }
   EXPECT_TRUE(disturbed.Remarks().empty());
+}
+
+// The pose of the greatest number is an old one here.
+TEST_P(PipelineRange, NumbersThatWentBackMoveNothingAfterLoading) {
+  Pipeline saved = NewPipeline(GetParam());
+  for (const int i : {0, 1, 2, 0}) ASSERT_TRUE(saved.Process(DyadicFrame(i)).has_value());
+  auto file = MapFromBytes(MapToBytes(saved.map()).value(), "map.tsdf");
+  ASSERT_TRUE(file.has_value());
+  Pipeline loaded(ConfigOf(GetParam()), Toys(), std::move(file->map), saved.trajectories());
+  Frame next = DyadicFrame(0);
+  next.index = 3;
+  next.T_WO.clear();  // all stay
+  ASSERT_TRUE(saved.Process(next).has_value());
+  ASSERT_TRUE(loaded.Process(next).has_value());
+  EXPECT_EQ(loaded.trajectories().at(kBrick).at(3).matrix(),
+            saved.trajectories().at(kBrick).at(3).matrix());
+  EXPECT_TRUE(MapToBytes(loaded.map()).value() == MapToBytes(saved.map()).value());
 }
 
 // Poses that the frame brings along are not read.

@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 
 #include "mapper/map_representation.h"
@@ -360,6 +361,26 @@ TEST_P(RayCast, AnEmptyMapShowsNothing) {
   for (const RaySurface& surface : map->CastRays(kCamera, CircleCamera(0), options)) {
     EXPECT_EQ(cv::countNonZero(surface.depth), 0);
     EXPECT_EQ(cv::countNonZero(surface.id != kNoInstance), 0);
+  }
+}
+
+// The camera is amid the toys, and just below the table's surface, which is behind it.
+TEST_P(RayCast, NothingIsSeenBehindTheCamera) {
+  const auto map = DrivenToys(GetParam(), ToyConfig(), !IsOneField(GetParam()));
+  for (const Pose& T_WC :
+       {LookAt({0.10, -0.03, 0.09}, {-0.1, 0.05, 0.0}),
+        LookAt({-0.2, -0.15, kTableTop_m - 1.5 * kToyVoxel_m}, {-0.1, -0.1, -1})}) {
+    RayCastOptions options;
+    options.surfaces = 2;
+    const std::string expected = BytesOf(map->CastRays(kCamera, T_WC, options));
+    for (const double near_m : {-1.0, -std::numeric_limits<double>::infinity(),
+                                std::numeric_limits<double>::quiet_NaN()}) {
+      SCOPED_TRACE(near_m);
+      options.near_m = near_m;
+      const std::vector<RaySurface> cast = map->CastRays(kCamera, T_WC, options);
+      for (const RaySurface& surface : cast) EXPECT_EQ(cv::countNonZero(surface.depth < 0), 0);
+      EXPECT_TRUE(BytesOf(cast) == expected);
+    }
   }
 }
 
