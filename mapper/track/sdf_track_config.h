@@ -33,7 +33,7 @@ struct SdfTrackConfig {
   // Where distances fall by more than this a metre they are not one surface's: of a side seen first
   // at a grazing angle, whose free space is seen far along the ray, and of the side beside it,
   // which lies before what is behind it. Points there have no distance. 0 switches this off.
-  double max_slope = 4;
+  double max_slope = 0;
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
   int coarse_points = 400;        // of the first passes
@@ -48,7 +48,7 @@ struct SdfTrackConfig {
   // A segment is kept, at most so many points of it, and registered along with each later one until
   // the object has turned by so much before the camera, or by kMostViewTurn_rad where terms of the
   // image compare it: what the model adds to both is taken off. 0 switches this off.
-  double keyframe_turn_rad = 0.8;
+  double keyframe_turn_rad = 0.15;
   int keyframe_points = 1500;
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
