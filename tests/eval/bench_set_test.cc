@@ -107,15 +107,6 @@ TEST_F(SmallSet, EachSceneHasItsOwnSeed) {
   ASSERT_EQ(cells.size(), 2U);
   EXPECT_EQ(cells[0].settings.seed, 1U);
   EXPECT_EQ(cells[1].settings.seed, 7U);
-  // No number of an experiment is that exact.
-  ASSERT_TRUE(WriteFile(folder_ / "sets/s/b.toml", "seed = 9007199254740993\n" + test::TinyScene(5))
-                  .has_value());
-  const auto above = ExperimentOf(set_, {"tsdf"});
-  ASSERT_FALSE(above.has_value());
-  EXPECT_EQ(above.error().kind, ErrorKind::kUsage);
-  EXPECT_NE(above.error().message.find("b.toml: 'seed' is 9007199254740993, expected at most 2^53"),
-            std::string::npos)
-      << above.error().message;
 }
 
 TEST_F(SmallSet, ValuesThatNoMapHasAreRefused) {

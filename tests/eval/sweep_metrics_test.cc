@@ -104,9 +104,6 @@ TEST(SweepMetrics, HaveNoTableAndNoGhostsWithoutATrueBackground) {
   EXPECT_EQ(undefined, 9);
   const std::vector<Measured> all = MeasureAll(evaluation, {1}, RunCosts{});
   EXPECT_EQ(all[MetricIndex("movers_completion")].value, 0.5);
-  const auto written = ToJson(evaluation);
-  EXPECT_EQ(written["objects"][0]["hole_area_cm2"], 7.0);
-  EXPECT_EQ(written["ghost_area_m2"]["why"], "no true background is known");
 }
 
 TEST(SweepMetrics, ThePageIsMadeOfIt) {
