@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 
 #include "cli/command.h"
 #include "cli/sweep_progress.h"
@@ -48,17 +47,8 @@ Expected<CommandResult> Describe(const BenchSet& set) {
 
 Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments& options) {
   if (options.out.empty()) return UsageError("--out is required with --run");
-  std::set<std::string> methods;
-  for (const std::string& method : SplitList(options.run)) {
-    // As results have it: "anchored" is "tsdf++/anchored". What is unknown is said below.
-    CellSettings probe;
-    if (!FindAxis("method")->set(probe, method)) continue;
-    if (!methods.insert(probe.method).second) {
-      return UsageError("--run names {} twice", probe.method);
-    }
-  }
-  TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
+  TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   SweepOptions sweep;
   sweep.out = std::filesystem::path(options.out) / "work";
   sweep.jobs = JobsOrCores(options.jobs);

@@ -165,12 +165,12 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
     lost_ = std::make_unique<LostObjects>(config.track);
   }
   is_empty_ = map_->Memory().blocks == 0;
+  // Frame numbers may have gone back: the map knows which pose was the last one.
+  const MapPersistence* kept = std::as_const(*map_).persistence();
   for (const auto& [id, poses] : trajectories_) {
     // One that was lost is nowhere.
     if (lost_ != nullptr && !ModelOf(*map_, id)) continue;
     if (poses.empty()) continue;
-    // Frame numbers may have gone back: the map knows which pose was the last one.
-    const MapPersistence* kept = std::as_const(*map_).persistence();
     const std::optional<Pose> last = kept == nullptr ? std::nullopt : kept->LastPose(id);
     T_WO_[id] = last.value_or(poses.rbegin()->second);
   }

@@ -54,6 +54,14 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const std::filesystem::
                                                          const SequenceOptions& options,
                                                          SequenceNotes& notes);
 
+// Says, if there are any, how many of a folder's colour images are left out.
+inline void SayColoursWithoutDepth(const std::filesystem::path& folder, int lost, int colours,
+                                   SequenceNotes& notes) {
+  if (lost <= 0) return;
+  notes.push_back(fmt::format("{}: {} of {} colour images have no depth image and are left out",
+                              folder.string(), lost, colours));
+}
+
 // kUsage, of `place`, which has camera poses though --fixed-camera was given.
 inline tl::unexpected<Error> FixedCameraWithPoses(const std::filesystem::path& place) {
   return UsageError("{}: has camera poses, expected none where the camera is to be taken as fixed",

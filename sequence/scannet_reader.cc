@@ -38,9 +38,9 @@ Expected<std::vector<std::pair<int, std::string>>> DepthStems(const fs::path& fo
 }
 
 // Colour images without a depth image, which has the same number, are left out.
-Expected<void> SayColoursWithoutDepth(const fs::path& folder,
-                                      const std::vector<std::pair<int, std::string>>& depths,
-                                      SequenceNotes& notes) {
+Expected<void> CountColoursWithoutDepth(const fs::path& folder,
+                                        const std::vector<std::pair<int, std::string>>& depths,
+                                        SequenceNotes& notes) {
   std::set<std::string> stems;
   for (const auto& [number, stem] : depths) stems.insert(stem);
   TSDFPP_ASSIGN(const auto names, NamesIn(folder));
@@ -52,10 +52,7 @@ Expected<void> SayColoursWithoutDepth(const fs::path& folder,
     ++colours;
     lost += stems.contains(stem) ? 0 : 1;
   }
-  if (lost > 0) {
-    notes.push_back(fmt::format("{}: {} of {} colour images have no depth image and are left out",
-                                folder.string(), lost, colours));
-  }
+  SayColoursWithoutDepth(folder, lost, colours, notes);
   return {};
 }
 
@@ -120,7 +117,7 @@ Expected<std::unique_ptr<DatasetSource>> OpenScannet(const fs::path& folder,
   sequence.size_source = "ScanNet's default camera";
   TSDFPP_ASSIGN(const Intrinsics camera, ReadCameras(folder, options, sequence, notes));
   TSDFPP_ASSIGN(const auto stems, DepthStems(folder / "depth"));
-  TSDFPP_RETURN_IF_ERROR(SayColoursWithoutDepth(folder / "color", stems, notes));
+  TSDFPP_RETURN_IF_ERROR(CountColoursWithoutDepth(folder / "color", stems, notes));
 
   std::error_code code;
   sequence.has_masks = fs::is_directory(folder / "instance-filt", code);

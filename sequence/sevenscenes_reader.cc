@@ -62,10 +62,8 @@ Expected<std::unique_ptr<DatasetSource>> OpenSevenScenes(const fs::path& folder,
     return DataError("{}: no image named frame-000000.depth.png or so", folder.string());
   }
   // Every depth image has its colours.
-  if (const int lost = colours - static_cast<int>(sequence.frames.size()); lost > 0) {
-    notes.push_back(fmt::format("{}: {} of {} colour images have no depth image and are left out",
-                                folder.string(), lost, colours));
-  }
+  SayColoursWithoutDepth(folder, colours - static_cast<int>(sequence.frames.size()), colours,
+                         notes);
   sequence.has_masks = masks > 0;
   for (FrameFiles& frame : sequence.frames) {
     if (masks == 0) {

@@ -32,8 +32,7 @@ struct BenchSet {
   std::vector<BenchSequence> sequences;
 
   // Reads `folder`/`name`/set.toml. Errors: kUsage, with file, line and key, also where a value is
-  // out of its axis's range; naming the sets there
-  // are where there is none of this name.
+  // out of its axis's range; naming the sets there are where there is none of this name.
   static Expected<BenchSet> Load(const std::filesystem::path& folder, const std::string& name);
 };
 
@@ -44,8 +43,7 @@ Expected<BenchSequence> HashSequence(const BenchSet& set, const BenchSequence& s
 Expected<void> CheckFrozen(const BenchSet& set);
 
 // The set as an experiment of these methods, each scene with its own seed. Errors: kUsage, a method
-// that is unknown or, in whatever words, there twice; a seed that no axis can have; those of
-// scenes.
+// that is unknown or, in whatever words, there twice; those of scenes.
 Expected<ExperimentConfig> ExperimentOf(const BenchSet& set,
                                         const std::vector<std::string>& methods);
 

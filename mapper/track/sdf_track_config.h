@@ -30,9 +30,8 @@ struct SdfTrackConfig {
 
   // Point to signed distance.
   bool curved = true;  // distances without their sag between voxels (SurfaceReader::SagAt)
-  // Where distances fall by more than this a metre they are not one surface's: of a side seen first
-  // at a grazing angle, whose free space is seen far along the ray, and of the side beside it,
-  // which lies before what is behind it. Points there have no distance. 0 switches this off.
+  // Where the distance changes by more than so many metres a metre it is of two surfaces
+  // (docs/tracking.md, Steep distances), and a point there has none. 0 switches this off.
   double max_slope = 0;
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations

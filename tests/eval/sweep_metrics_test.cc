@@ -104,6 +104,10 @@ TEST(SweepMetrics, HaveNoTableAndNoGhostsWithoutATrueBackground) {
   EXPECT_EQ(undefined, 9);
   const std::vector<Measured> all = MeasureAll(evaluation, {1}, RunCosts{});
   EXPECT_EQ(all[MetricIndex("movers_completion")].value, 0.5);
+  evaluation.objects.clear();  // these are written as they are
+  const auto written = ToJson(evaluation);
+  EXPECT_EQ(written["ghost_area_m2"]["why"], "no true background is known");
+  EXPECT_EQ(written["revealed_unseen_area_m2"]["why"], "no true background is known");
 }
 
 TEST(SweepMetrics, ThePageIsMadeOfIt) {
