@@ -31,6 +31,7 @@ std::string WithFolder(std::string text, const std::string& folder) {
 TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
   const test::TempFolder folder;
   const std::string scene = TSDFPP_SOURCE_DIR "/scenes/mini.toml";
+  const std::string sets = TSDFPP_SOURCE_DIR "/eval/bench-sets";
   ASSERT_TRUE(WriteFile(folder / "file", "x").has_value());
   ASSERT_TRUE(WriteFile(folder / "letters/letter.txt", "x").has_value());
   fs::create_directories(folder / "empty");
@@ -151,14 +152,11 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
       {{"compare", scene, "--out", "@/o", "--methods", "anchored,tsdf++/anchored"},
        "--methods names tsdf++/anchored twice"},
       {{"map", scene, "--out", "@/o", "--remove", ","}, "--remove ',' names no object"},
-      {{"bench-set", "v1", "--sets", TSDFPP_SOURCE_DIR "/eval/bench-sets", "--run", "tsdf,tsdf",
-        "--out", "@/o"},
+      {{"bench-set", "v1", "--sets", sets, "--run", "tsdf,tsdf", "--out", "@/o"},
        "method tsdf is named twice"},
-      {{"bench-set", "v1", "--sets", TSDFPP_SOURCE_DIR "/eval/bench-sets", "--run",
-        "anchored,tsdf++/anchored", "--out", "@/o"},
+      {{"bench-set", "v1", "--sets", sets, "--run", "anchored,tsdf++/anchored", "--out", "@/o"},
        "method tsdf++/anchored is named twice"},
-      {{"bench-set", "v1", "--sets", TSDFPP_SOURCE_DIR "/eval/bench-sets", "--leaderboard", "@",
-        "--out", "@/board.json"},
+      {{"bench-set", "v1", "--sets", sets, "--leaderboard", "@", "--out", "@/board.json"},
        "--out '@/board.json' would be one of the results of '@', expected another place"},
   };
   EXPECT_GE(wrong.size(), 30U);
