@@ -275,6 +275,9 @@ Expected<Parsed> Parse(const std::filesystem::path& path) {
       return DataError("{}: {} elements {} have no property, expected one at least", file,
                        element.count, Quoted(element.name));
     }
+    if (element.name == "tristrips" && element.count > 0) {
+      return DataError("{}: its triangles are strips (element 'tristrips'), expected faces", file);
+    }
     for (std::size_t i = 0; i < element.count && body.Ok(); ++i) {
       body.BeginElement();
       if (element.name == "vertex") {

@@ -12,8 +12,8 @@ namespace tsdfpp {
 // Errors: kEnvironment where the file cannot be written.
 Expected<void> WritePly(const std::filesystem::path& path, const TriangleMesh& mesh);
 
-// Reads binary little-endian or ASCII PLY with float or double positions; polygons are fanned.
-// Errors: kData, naming the file and what is wrong.
+// Reads binary little-endian or ASCII PLY with float or double positions; polygons are cut into
+// triangles, strips of triangles refused. Errors: kData, naming the file and what is wrong.
 Expected<TriangleMesh> ReadPly(const std::filesystem::path& path);
 
 // The same with the regions of a true model: `comment region <index> <name>` lines and a `region`

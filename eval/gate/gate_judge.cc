@@ -51,7 +51,7 @@ Measured OtherValue(const Gate& gate, const std::string& replicate, const GatePa
 Measured ComparedValue(const Gate& gate, const std::string& replicate, const GatePair& pair,
                        const GateReference* reference) {
   if (gate.metric == kFrameTimeMetric) {
-    const Measured ratio = TimeRatio(*pair.ours, *pair.theirs);
+    Measured ratio = TimeRatio(*pair.ours, *pair.theirs);
     if (ratio.value) return ratio;
     return Measured::Undefined(fmt::format("{}: {}", replicate, ratio.why_not));
   }
@@ -61,7 +61,7 @@ Measured ComparedValue(const Gate& gate, const std::string& replicate, const Gat
         fmt::format("{} is undefined at {}: {}", gate.metric, replicate, ours.why_not));
   }
   if (gate.kind == Gate::Kind::kAbsolute) return ours;
-  const Measured other = OtherValue(gate, replicate, pair, reference);
+  Measured other = OtherValue(gate, replicate, pair, reference);
   if (!other.value) return other;
   if (!gate.ratio) return Measured::Of(*ours.value - *other.value);
   if (*other.value > 0) return Measured::Of(*ours.value / *other.value);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/data_folder.h"
+#include "core/one_line.h"
 #include "eval/score/evaluation.h"
 #include "eval/score/label_image.h"
 
@@ -46,7 +47,10 @@ Expected<MaskEvaluator> MaskEvaluator::Open(const fs::path& folder) {
        entry.increment(failure)) {
     if (entry->path().extension() != ".png") continue;
     const auto frame = NumberAtEnd(entry->path().stem().string());
-    if (!frame) continue;
+    if (!frame) {
+      evaluator.unnumbered_.push_back(entry->path().filename().string());
+      continue;
+    }
     const auto [at, is_new] = evaluator.images_.emplace(*frame, entry->path());
     if (!is_new) {
       return DataError("{}: is of frame {}, as is {}", entry->path().string(), *frame,
@@ -58,6 +62,7 @@ Expected<MaskEvaluator> MaskEvaluator::Open(const fs::path& folder) {
     return DataError("{}: holds no image named after a frame, expected e.g. Mask0001.png",
                      folder.string());
   }
+  std::ranges::sort(evaluator.unnumbered_);
   return evaluator;
 }
 
@@ -94,6 +99,11 @@ Expected<MaskEvaluation> MaskEvaluator::Result(const SequenceInfo& info,
     out.remarks.push_back(
         fmt::format("{}: {} images are of no frame of the sequence, which has {} to {}: left out",
                     folder_.string(), strangers, info.first_index, last));
+  }
+  if (!unnumbered_.empty()) {
+    out.remarks.push_back(
+        fmt::format("{}: {} images, {} among them, end in no frame's number: left out",
+                    folder_.string(), unnumbered_.size(), Quoted(unnumbered_.front())));
   }
   std::map<int, std::pair<std::int64_t, InstanceId>> most;  // of each predicted id
   for (const auto& [pair, pixels] : pairs_) {

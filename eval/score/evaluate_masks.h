@@ -36,7 +36,8 @@ class MaskEvaluator {
   // image cannot be read or has another size than the true mask.
   Expected<void> Observe(const Frame& frame);
 
-  // Images of frames that the sequence `info` does not have are remarked on. With kNames ids are
+  // Images of frames that the sequence `info` does not have are remarked on, and those that no
+  // number names. With kNames ids are
   // the sequence's objects where it has them; else an id is the object with which it shares most
   // pixels. Errors: kData where no frame had an image.
   Expected<MaskEvaluation> Result(const SequenceInfo& info, const std::vector<ObjectInfo>& objects,
@@ -45,6 +46,7 @@ class MaskEvaluator {
  private:
   std::filesystem::path folder_;
   std::map<int, std::filesystem::path> images_;  // by frame
+  std::vector<std::string> unnumbered_;          // names of others, in order
   LabelPairs pairs_;
   PanopticCounts counts_;
   int observed_ = 0;

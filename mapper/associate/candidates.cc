@@ -17,6 +17,11 @@ Index3 Beside(const Index3& cell, int i) {
 Candidates::Candidates(const VoteConfig& config, double voxel_m)
     : config_(config), cell_m_(0.5 * config.near_voxels * voxel_m) {}
 
+std::size_t Candidates::NamedOf(const std::vector<Candidate>& candidates) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      candidates, [](const Candidate& candidate) { return candidate.id != kNoInstance; }));
+}
+
 std::vector<Index3> Candidates::CellsOf(const std::vector<Eigen::Vector3d>& points_W) const {
   std::vector<Index3> cells;
   cells.reserve(points_W.size());
@@ -79,9 +84,15 @@ std::vector<Candidates::Pair> Candidates::PairsOf(std::size_t segment,
   return pairs;
 }
 
-std::vector<Candidates::Candidacy> Candidates::Confirm(
+void Candidates::Forget(const std::function<bool(InstanceId)>& is_in_map) {
+  std::erase_if(candidates_, [&](const Candidate& candidate) {
+    return candidate.id != kNoInstance && is_in_map(candidate.id);
+  });
+}
+
+std::vector<Candidates::Verdict> Candidates::Confirm(
     const std::vector<std::vector<Eigen::Vector3d>>& segments_W, const std::vector<bool>& may_begin,
-    const std::vector<bool>& is_held) {
+    const std::vector<bool>& is_held, const std::function<InstanceId()>& new_id) {
   ++frame_;
   std::vector<CellOfCandidate> index;
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
@@ -105,9 +116,10 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
     is_taken[pair.candidate] = true;
   }
 
-  std::vector<Candidacy> candidacies(segments_W.size(), Candidacy::kNone);
+  std::vector<Verdict> verdicts(segments_W.size());
   std::vector<Candidate> left;
-  std::size_t room = kMostCandidates - std::min(kMostCandidates, candidates_.size());
+  std::size_t named = NamedOf(candidates_);
+  std::size_t room = kMostCandidates - std::min(kMostCandidates, candidates_.size() - named);
   for (std::size_t s = 0; s < segments_W.size(); ++s) {
     if (!is_large[s]) continue;
     Candidate candidate;
@@ -123,12 +135,14 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
     while (!candidate.seen.empty() && candidate.seen.front() <= frame_ - config_.confirm_window) {
       candidate.seen.pop_front();
     }
-    if (may_begin[s] && static_cast<int>(candidate.seen.size()) >= config_.confirm_frames &&
-        (!is_held[s] || frame_ - candidate.first >= config_.hold_frames)) {
-      candidacies[s] = Candidacy::kIsConfirmed;
-      continue;
-    }
-    candidacies[s] = Candidacy::kWaits;
+    const bool is_confirmed = may_begin[s] &&
+                              static_cast<int>(candidate.seen.size()) >= config_.confirm_frames &&
+                              (!is_held[s] || frame_ - candidate.first >= config_.hold_frames);
+    const bool is_new = is_confirmed && candidate.id == kNoInstance;
+    if (is_new) candidate.id = new_id();
+    verdicts[s] =
+        is_confirmed ? Verdict{Candidacy::kIsConfirmed, candidate.id} : Verdict{Candidacy::kWaits};
+    if (is_new && candidate.id != kNoInstance && ++named > kMostCandidates) continue;
     candidate.cells = CellsOf(segments_W[s]);
     if (!IsOver(candidate)) left.push_back(std::move(candidate));
   }
@@ -136,7 +150,7 @@ std::vector<Candidates::Candidacy> Candidates::Confirm(
     if (!is_taken[c] && !IsOver(candidates_[c])) left.push_back(std::move(candidates_[c]));
   }
   candidates_ = std::move(left);
-  return candidacies;
+  return verdicts;
 }
 
 }  // namespace tsdfpp

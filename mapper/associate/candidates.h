@@ -1,8 +1,10 @@
-// Segments that no object of the map claims, until they have been there long enough to be one.
+// Segments that no object of the map claims, until they have been there long enough to be one, and
+// the map has it.
 #pragma once
 
 #include <algorithm>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -18,6 +20,7 @@ namespace tsdfpp {
 class Candidates {
  public:
   // Far more than a scene shows at a time: they bound what a frame of very many segments costs.
+  // So many wait, and so many have an id.
   static constexpr std::size_t kMostCandidates = 1000;
   static constexpr std::size_t kMostPairs = 16;
 
@@ -28,31 +31,43 @@ class Candidates {
   enum class Candidacy {
     kNone,         // too small, or it may begin none and is none
     kWaits,        // a candidate
-    kIsConfirmed,  // it was one, and is an object from now on
+    kIsConfirmed,  // it was one for long enough, and is an object from now on
   };
+  struct Verdict {
+    Candidacy candidacy = Candidacy::kNone;
+    InstanceId id = kNoInstance;  // of who is confirmed
+    bool operator==(const Verdict&) const = default;
+  };
+
+  // Forgets those that have become objects that the map has.
+  void Forget(const std::function<bool(InstanceId)>& is_in_map);
 
   // Takes in the unclaimed segments of the next frame, each the points that it shows in the world's
   // frame, and whether it may begin a candidate; the others can but be one that there is, which
   // waits on, and are not counted. Says what each is. It is confirmed where it and its candidate
   // were there, with min_points or more, in confirm_frames of the last confirm_window frames, but
   // if it is held, not in the hold_frames frames from that on in which it was first there.
-  // Who is confirmed is a candidate no longer, and who cannot be any more is forgotten: whom the
-  // next frame's window does not reach back to, but for who was there in this frame. A candidate
-  // is one segment of a frame at most: pairs with the greatest overlap (that share times the share
-  // of the candidate's cells that are near the segment's) are made first, and of a segment's only
-  // the kMostPairs greatest are looked at. While there are kMostCandidates, no segment becomes a
-  // further one.
-  std::vector<Candidacy> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
-                                 const std::vector<bool>& may_begin,
-                                 const std::vector<bool>& is_held);
+  // Who is confirmed gets an id of `new_id` (kNoInstance: there is none), and stays a candidate
+  // that has this id: its segment may be too small to be fused, and then the map has no object that
+  // claims it in the next frame, in which it would be born once more. While kMostCandidates have
+  // one, a further one is forgotten.
+  // Who cannot be confirmed any more is forgotten: whom the next frame's window does not reach back
+  // to, but for who was there in this frame. A candidate is one segment of a frame at most: pairs
+  // with the greatest overlap (that share times the share of the candidate's cells that are near
+  // the segment's) are made first, and of a segment's only the kMostPairs greatest are looked at.
+  // While kMostCandidates wait, no segment becomes a further one.
+  std::vector<Verdict> Confirm(const std::vector<std::vector<Eigen::Vector3d>>& segments_W,
+                               const std::vector<bool>& may_begin, const std::vector<bool>& is_held,
+                               const std::function<InstanceId()>& new_id);
 
   std::size_t size() const { return candidates_.size(); }
 
  private:
   struct Candidate {
-    int first = 0;              // the frame that it was first there
-    std::deque<int> seen;       // frames, within the window
-    std::vector<Index3> cells;  // of the points that it showed last, sorted
+    int first = 0;                // the frame that it was first there
+    std::deque<int> seen;         // frames, within the window
+    std::vector<Index3> cells;    // of the points that it showed last, sorted
+    InstanceId id = kNoInstance;  // once it was confirmed
   };
   struct CellOfCandidate {
     Index3 cell;
@@ -73,6 +88,7 @@ class Candidates {
     const int window = std::max(config_.confirm_window, 2);
     return candidate.seen.empty() || candidate.seen.back() <= frame_ - window + 1;
   }
+  static std::size_t NamedOf(const std::vector<Candidate>& candidates);
   std::vector<Index3> CellsOf(const std::vector<Eigen::Vector3d>& points_W) const;
   // The candidates that a segment can be, at most kMostPairs; `index` has all cells, sorted.
   std::vector<Pair> PairsOf(std::size_t segment, const std::vector<Eigen::Vector3d>& points_W,

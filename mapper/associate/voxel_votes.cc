@@ -282,17 +282,18 @@ void VoxelVotes::GiveBirth(const ObjectLookup& lookup, std::vector<Segment>& seg
   }
   if (!next_.candidates) next_.candidates.emplace(config_, voxel_m);
   using enum Candidates::Candidacy;
-  const auto candidacies = next_.candidates->Confirm(points_W, may_begin, is_held);
+  next_.candidates->Forget([&](InstanceId id) { return lookup.NumberOf(id).has_value(); });
+  const auto verdicts = next_.candidates->Confirm(points_W, may_begin, is_held, [&] {
+    if (next_.next_id < kNoInstance) return static_cast<InstanceId>(next_.next_id++);
+    next_.refused_birth = true;
+    return kNoInstance;
+  });
   for (std::size_t i = 0; i < unclaimed.size(); ++i) {
-    if (candidacies[i] == kNone && !unclaimed[i]->is_known && !IsPartlyAnObject(*unclaimed[i])) {
+    if (verdicts[i].candidacy == kIsConfirmed) unclaimed[i]->label = verdicts[i].id;
+    if (verdicts[i].candidacy == kNone && !unclaimed[i]->is_known &&
+        !IsPartlyAnObject(*unclaimed[i])) {
       unclaimed[i]->label = kBackground;
     }
-    if (candidacies[i] != kIsConfirmed) continue;
-    if (next_.next_id >= kNoInstance) {
-      next_.refused_birth = true;
-      continue;
-    }
-    unclaimed[i]->label = static_cast<InstanceId>(next_.next_id++);
   }
 }
 

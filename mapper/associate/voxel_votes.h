@@ -47,7 +47,7 @@ class VoxelVotes : public Associator {
   //     an object that is missing (ExpectReturns()) is held back until it is found to be that
   //     (mapper/track/lost_objects.h), for hold_frames frames at most. Ids count up and are never
   //     used again; after the last one, kNoInstance - 1, nothing is born any more, and Remarks()
-  //     says so.
+  //     says so. One of which nothing was fused yet is the same object in the next frame.
   //     Unknown segments and far parts may be the candidate that a known one was before, which
   //     waits on, but begin none. Else, if they are unknown, they are background, or held back
   //     where cut_share of their points vote for one object.

@@ -180,6 +180,10 @@ TEST(Ply, MalformedFilesAreNamed) {
       // Elements that take no bytes would be counted for ever.
       {"ply\nformat ascii 1.0\nelement junk 20\nend_header\n",
        "20 elements 'junk' have no property, expected one at least"},
+      // Else the mesh would have no triangle.
+      {vertices + "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" +
+           points + "4 0 1 2 -1\n",
+       "its triangles are strips (element 'tristrips'), expected faces"},
       {"ply\nformat ascii 1.0\ncomment region 0 a\x1b[31m\nend_header\n",
        "region 0 'a\\x1b[31m' holds a control character"},
       {vertices + "end_header\n0 0 0\n1 0 0\n", short_file},

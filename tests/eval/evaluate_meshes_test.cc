@@ -1,5 +1,6 @@
 // Files of any mapper against the truth: closed forms on a wall with two boxes, what is said of
-// meshes that fit badly, and the same numbers as `compare`.
+// meshes that fit badly, and the same numbers as `compare`. Longer than most files: each file that
+// fits badly has a case.
 #include "eval/score/evaluate_meshes.h"
 
 #include <gtest/gtest.h>
@@ -351,6 +352,9 @@ TEST(EvaluateMeshes, MasksAreComparedUnderTheirOwnIds) {
   fs::copy(folder / "own/Mask0002.png", folder / "own/Mask0017.png");
   EXPECT_TRUE(Evaluated(config).masks->remarks.at(0).ends_with(
       "1 images are of no frame of the sequence, which has 0 to 5: left out"));
+  fs::copy(folder / "own/Mask0002.png", folder / "own/first.png");
+  EXPECT_TRUE(Evaluated(config).masks->remarks.at(1).ends_with(
+      "1 images, 'first.png' among them, end in no frame's number: left out"));
   config.masks = folder / "others";
   result = Evaluated(config);
   EXPECT_EQ(result.masks->iou.at(kLeft).value, 0.0);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
 #include <random>
 #include <set>
@@ -17,6 +18,7 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 using Candidacy = Candidates::Candidacy;
+using Verdict = Candidates::Verdict;
 constexpr double kVoxel_m = 0.01;
 
 // candidates.h's rules, with the points themselves in place of an index of cells.
@@ -24,9 +26,17 @@ class PlainCandidates {
  public:
   explicit PlainCandidates(const VoteConfig& config) : config_(config) {}
 
-  std::vector<Candidacy> Confirm(const std::vector<Points>& segments_W,
-                                 const std::vector<bool>& may_begin,
-                                 const std::vector<bool>& is_held) {
+  void Forget(const std::function<bool(InstanceId)>& is_in_map) {
+    std::vector<Candidate> left;
+    for (const Candidate& candidate : candidates_) {
+      if (candidate.id == kNoInstance || !is_in_map(candidate.id)) left.push_back(candidate);
+    }
+    candidates_ = left;
+  }
+
+  std::vector<Verdict> Confirm(const std::vector<Points>& segments_W,
+                               const std::vector<bool>& may_begin, const std::vector<bool>& is_held,
+                               const std::function<InstanceId()>& new_id) {
     ++frame_;
     struct Pair {
       double overlap;
@@ -52,7 +62,7 @@ class PlainCandidates {
       candidate_of[pair.segment] = pair.candidate;
       taken.insert(pair.candidate);
     }
-    std::vector<Candidacy> candidacies(segments_W.size(), Candidacy::kNone);
+    std::vector<Verdict> verdicts(segments_W.size());
     std::vector<Candidate> left;
     for (std::size_t s = 0; s < segments_W.size(); ++s) {
       if (!IsLarge(segments_W[s])) continue;
@@ -66,15 +76,17 @@ class PlainCandidates {
           may_begin[s] &&
           SeenSince(candidate, frame_ - config_.confirm_window + 1) >= config_.confirm_frames &&
           (!is_held[s] || frame_ >= candidate.first + config_.hold_frames);
-      candidacies[s] = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
-      if (!is_confirmed && IsInNextWindow(candidate)) left.push_back(candidate);
+      verdicts[s].candidacy = is_confirmed ? Candidacy::kIsConfirmed : Candidacy::kWaits;
+      if (is_confirmed && candidate.id == kNoInstance) candidate.id = new_id();
+      if (is_confirmed) verdicts[s].id = candidate.id;
+      if (IsInNextWindow(candidate)) left.push_back(candidate);
     }
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (taken.contains(c)) continue;
       if (IsInNextWindow(candidates_[c])) left.push_back(candidates_[c]);
     }
     candidates_ = left;
-    return candidacies;
+    return verdicts;
   }
 
   std::size_t size() const { return candidates_.size(); }
@@ -84,6 +96,7 @@ class PlainCandidates {
     int first = 0;
     std::vector<int> seen;
     Points points_W;
+    InstanceId id = kNoInstance;
   };
   bool IsLarge(const Points& points_W) const {
     return points_W.size() >= static_cast<std::size_t>(config_.min_points);
@@ -122,6 +135,19 @@ class PlainCandidates {
   std::vector<Candidate> candidates_;
 };
 
+// Ids from 1 on; there is no last one.
+class Ids {
+ public:
+  InstanceId operator()() { return ++last_; }
+
+ private:
+  InstanceId last_ = 0;
+};
+
+Candidacy CandidacyOf(Candidates& candidates, const Points& points, bool may_begin, bool is_held) {
+  return candidates.Confirm({points}, {may_begin}, {is_held}, Ids()).front().candidacy;
+}
+
 class Clouds {
  public:
   double Between(double low, double high) {
@@ -150,6 +176,8 @@ TEST(Candidates, AreThoseOfPlainPairs) {
     config.confirm_frames = std::min(3, config.confirm_window);
     Candidates candidates(config, kVoxel_m);
     PlainCandidates plain(config);
+    Ids ids;
+    Ids plain_ids;
     for (int frame = 0; frame < 12; ++frame) {
       std::vector<Points> segments_W;
       std::vector<bool> may_begin;
@@ -163,8 +191,12 @@ TEST(Candidates, AreThoseOfPlainPairs) {
         is_held.push_back(clouds.Between(0, 1) < 0.5);
       }
       SCOPED_TRACE(testing::Message() << "trial " << trial << ", frame " << frame);
-      ASSERT_EQ(candidates.Confirm(segments_W, may_begin, is_held),
-                plain.Confirm(segments_W, may_begin, is_held));
+      // The map has every third a frame later; the others are never fused.
+      const auto is_in_map = [](InstanceId id) { return id % 3 == 0; };
+      candidates.Forget(is_in_map);
+      plain.Forget(is_in_map);
+      ASSERT_EQ(candidates.Confirm(segments_W, may_begin, is_held, std::ref(ids)),
+                plain.Confirm(segments_W, may_begin, is_held, std::ref(plain_ids)));
       ASSERT_EQ(candidates.size(), plain.size());
     }
   }
@@ -182,13 +214,14 @@ TEST(Candidates, AreHeldForSoManyFramesWhateverTheWindow) {
     ASSERT_TRUE(config.Validate());
     Candidates candidates(config, kVoxel_m);
     for (int i = 0; i < config.hold_frames; ++i) {
-      EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kWaits) << i;
+      EXPECT_EQ(CandidacyOf(candidates, points, true, true), Candidacy::kWaits) << i;
     }
-    EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kIsConfirmed);
+    EXPECT_EQ(CandidacyOf(candidates, points, true, true), Candidacy::kIsConfirmed);
+    candidates.Forget([](InstanceId) { return true; });
     // Out of sight it is forgotten, and what may begin none is not counted.
-    EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kWaits);
-    EXPECT_EQ(candidates.Confirm({points}, {false}, {true}).front(), Candidacy::kWaits);
-    for (int i = 0; i < window; ++i) candidates.Confirm({}, {}, {});
+    EXPECT_EQ(CandidacyOf(candidates, points, true, true), Candidacy::kWaits);
+    EXPECT_EQ(CandidacyOf(candidates, points, false, true), Candidacy::kWaits);
+    for (int i = 0; i < window; ++i) candidates.Confirm({}, {}, {}, Ids());
     EXPECT_EQ(candidates.size(), 0U);
   }
 }
@@ -200,10 +233,43 @@ TEST(Candidates, AreNotConfirmedByWhatMayBeginNone) {
   const Points points = clouds.Around({0, 0, 1}, 0.05, 2 * config.min_points);
   Candidates candidates(config, kVoxel_m);
   for (int i = 0; i < config.confirm_frames + 1; ++i) {
-    EXPECT_EQ(candidates.Confirm({points}, {true}, {true}).front(), Candidacy::kWaits) << i;
+    EXPECT_EQ(CandidacyOf(candidates, points, true, true), Candidacy::kWaits) << i;
   }
-  EXPECT_EQ(candidates.Confirm({points}, {false}, {false}).front(), Candidacy::kWaits);
-  EXPECT_EQ(candidates.Confirm({points}, {true}, {false}).front(), Candidacy::kIsConfirmed);
+  EXPECT_EQ(CandidacyOf(candidates, points, false, false), Candidacy::kWaits);
+  EXPECT_EQ(CandidacyOf(candidates, points, true, false), Candidacy::kIsConfirmed);
+}
+
+// Of a segment too small for the tracker the map never has anything: it would be born again and
+// again, until all ids were used up.
+TEST(Candidates, KeepTheirIdUntilTheMapHasThem) {
+  Clouds clouds;
+  VoteConfig config;
+  config.hold_frames = 0;
+  const Points points = clouds.Around({0, 0, 1}, 0.05, 2 * config.min_points);
+  Candidates candidates(config, kVoxel_m);
+  Ids ids;
+  const auto verdict = [&] {
+    return candidates.Confirm({points}, {true}, {false}, std::ref(ids)).front();
+  };
+  for (int i = 1; i < config.confirm_frames; ++i) {
+    EXPECT_EQ(verdict(), (Verdict{Candidacy::kWaits, kNoInstance})) << i;
+  }
+  for (int i = 0; i < 3 * config.confirm_window; ++i) {
+    EXPECT_EQ(verdict(), (Verdict{Candidacy::kIsConfirmed, 1})) << i;
+    candidates.Forget([](InstanceId) { return false; });
+  }
+  // Hidden for a frame it is the same, too.
+  candidates.Confirm({}, {}, {}, std::ref(ids));
+  EXPECT_EQ(verdict(), (Verdict{Candidacy::kIsConfirmed, 1}));
+  // Beyond the window it is another.
+  for (int i = 0; i < config.confirm_window; ++i) candidates.Confirm({}, {}, {}, std::ref(ids));
+  EXPECT_EQ(verdict(), (Verdict{Candidacy::kWaits, kNoInstance}));
+  for (int i = 1; i < config.confirm_frames; ++i) {
+    EXPECT_EQ(verdict().id, i + 1 < config.confirm_frames ? kNoInstance : 2) << i;
+  }
+  // The map has it: what else is there begins anew.
+  candidates.Forget([](InstanceId id) { return id == 2; });
+  EXPECT_EQ(verdict(), (Verdict{Candidacy::kWaits, kNoInstance}));
 }
 
 // Time and memory would grow with the square of the segments, which are as many as a frame's masks
@@ -219,17 +285,17 @@ TEST(Candidates, VeryManySegmentsWaitForTheirTurn) {
     const int row = s / 100;
     segments_W.push_back(clouds.Around(Eigen::Vector3d(s % 100, row, 1), 0.02, 50));
   }
+  Ids ids;
   std::size_t confirmed = 0;
   int frames = 0;
   while (!segments_W.empty() && frames < 100) {
     ++frames;
-    const auto candidacies =
-        candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true),
-                           std::vector<bool>(segments_W.size()));
-    ASSERT_LE(candidates.size(), Candidates::kMostCandidates);
+    const auto verdicts = candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true),
+                                             std::vector<bool>(segments_W.size()), std::ref(ids));
+    ASSERT_LE(candidates.size(), 2 * Candidates::kMostCandidates);
     std::vector<Points> rest;
     for (std::size_t s = 0; s < segments_W.size(); ++s) {
-      if (candidacies[s] == Candidacy::kIsConfirmed)
+      if (verdicts[s].candidacy == Candidacy::kIsConfirmed)
         ++confirmed;
       else
         rest.push_back(segments_W[s]);
@@ -247,10 +313,10 @@ TEST(Candidates, VeryManySegmentsAtOnePlaceAreBounded) {
   Candidates candidates(config, kVoxel_m);
   std::vector<Points> segments_W(6000, clouds.Around({0, 0, 1}, 0.02, 50));
   for (int frame = 1; frame < config.confirm_frames; ++frame) {
-    for (const Candidacy candidacy :
+    for (const Verdict& verdict :
          candidates.Confirm(segments_W, std::vector<bool>(segments_W.size(), true),
-                            std::vector<bool>(segments_W.size()))) {
-      ASSERT_NE(candidacy, Candidacy::kIsConfirmed);
+                            std::vector<bool>(segments_W.size()), Ids())) {
+      ASSERT_NE(verdict.candidacy, Candidacy::kIsConfirmed);
     }
     EXPECT_EQ(candidates.size(), Candidates::kMostCandidates);
   }

@@ -280,18 +280,39 @@ TEST(VoxelVotes, NeverUseAnIdTwice) {
   VoteConfig config;
   config.confirm_frames = 1;
   VoxelVotes votes(config, kNoInstance - 2);
+  const auto show = [&](const Frame& frame, const cv::Mat& segments) {
+    const cv::Mat labels = votes.Associate(frame, {segments, {}}, *map).labels;
+    votes.Accept();
+    return VoteWorld::MostOf(labels, frame.mask);
+  };
   std::set<InstanceId> ids;
   for (int i = 0; i < 3; ++i) {
     const Frame frame = RenderToys(TableWithToys(), 0.3, i);
-    const cv::Mat labels = votes.Associate(frame, {frame.mask, {}}, *map).labels;
-    votes.Accept();
-    for (const auto& [id, truth] : VoteWorld::MostOf(labels, frame.mask)) {
-      // The map stays empty, so that every object is new in every frame.
+    for (const auto& [id, truth] : show(frame, frame.mask)) {
+      // The map stays empty, and what is out of sight for so long is new.
       EXPECT_TRUE(ids.insert(id).second) << id;
     }
     EXPECT_EQ(votes.Remarks().size(), 1U);
+    const cv::Mat none(frame.mask.size(), CV_16UC1, cv::Scalar(kBackground));
+    for (int k = 0; k < config.confirm_window; ++k) show(frame, none);
   }
   EXPECT_EQ(ids, (std::set<InstanceId>{kNoInstance - 2, kNoInstance - 1}));
+}
+
+// The tracker freezes what has too few points for it, so that nothing of it is ever fused.
+TEST(VoxelVotes, WhatIsNeverFusedIsBornOnce) {
+  const auto map = MakeMap(Method::kTsdfppAnchored, ToyConfig());
+  VoxelVotes votes({});
+  std::map<InstanceId, InstanceId> first;
+  for (int i = 0; i < 12; ++i) {
+    const Frame frame = RenderToys(TableWithToys(), 0.3 + 0.02 * i, i);
+    const cv::Mat labels = votes.Associate(frame, {frame.mask, {}}, *map).labels;
+    votes.Accept();
+    const auto ids = VoteWorld::MostOf(labels, frame.mask);
+    if (i + 1 == kConfirmed) first = ids;
+    EXPECT_EQ(ids, first) << i;
+  }
+  EXPECT_GE(first.size(), 3U);
 }
 
 // One that the map has from elsewhere is nobody else's.
