@@ -51,7 +51,7 @@ class FarAndEmpty : public testing::Test {
  protected:
   fs::path Sequence(const std::function<void(Frame&)>& change) {
     ChangedBoxes source(change);
-    const fs::path set = folder_ / "boxes";
+    fs::path set = folder_ / "boxes";
     const auto written = WriteCofusion(source, {"0.1.0", 1, "boxes", "none", "none"}, set);
     EXPECT_TRUE(written.has_value()) << written.error().message;
     return set;

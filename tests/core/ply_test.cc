@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <bit>
+#include <cstdint>
 #include <limits>
 
 #include "core/files.h"
@@ -29,7 +30,12 @@ TriangleMesh SomeMesh() {
 void ExpectSame(const TriangleMesh& a, const TriangleMesh& b) {
   ASSERT_EQ(a.vertices.size(), b.vertices.size());
   for (std::size_t i = 0; i < a.vertices.size(); ++i) {
-    EXPECT_EQ(std::memcmp(a.vertices[i].data(), b.vertices[i].data(), 3 * sizeof(float)), 0) << i;
+    for (int axis = 0; axis < 3; ++axis) {
+      // Bit for bit, the sign of a zero and numbers that are none, too.
+      EXPECT_EQ(std::bit_cast<std::uint32_t>(a.vertices[i][axis]),
+                std::bit_cast<std::uint32_t>(b.vertices[i][axis]))
+          << i;
+    }
   }
   EXPECT_EQ(a.triangles, b.triangles);
   EXPECT_EQ(a.colours, b.colours);

@@ -19,7 +19,7 @@ namespace {
 constexpr const char* kMetric = "movers_completion";
 const BootstrapConfig kStatistics{BootstrapConfig::Method::kPercentile, 0.95, 1000, 1, 0};
 
-CellResult CellWith(Measured value) {
+CellResult CellWith(const Measured& value) {
   CellResult cell;
   cell.examined.assign(SweepMetrics().size(), Measured::Undefined("not of this test"));
   cell.frames.push_back({40, true, {}, "digest"});
@@ -105,6 +105,7 @@ TEST_F(GateRunTest, TimesAreComparedFrameByFrame) {
   std::vector<double> theirs(12, 100);
   theirs.resize(24, 1000);
   std::vector<double> ours;
+  ours.reserve(theirs.size());
   for (const double ms : theirs) ours.push_back(0.2 * ms);
   ours[3] = ours[17] = 5000;
   const auto judge = [&](double factor, const std::string& run, std::size_t frames = 24) {

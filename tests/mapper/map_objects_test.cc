@@ -220,7 +220,7 @@ TEST_P(MapObjects, AnObjectComesFromAnotherMapAtItsPlace) {
 TEST_P(MapObjects, MasksOfAnAddedVolumeNeedNotBeUpToDate) {
   const auto other = DrivenMap(Method::kTsdfppAnchored, ToyConfig(), 2);
   const TsdfGrid volume = CopyVolume(*other, kBrick);
-  TsdfGrid unmasked = volume;
+  const TsdfGrid unmasked = CopyVolume(*other, kBrick);
   for (const auto& entry : unmasked.entries()) {
     for (BlockMask TsdfBlock::*mask : {&TsdfBlock::observed, &TsdfBlock::negative, &TsdfBlock::band,
                                        &TsdfBlock::crossed, &TsdfBlock::cover, &TsdfBlock::full}) {

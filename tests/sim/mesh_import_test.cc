@@ -237,8 +237,9 @@ TEST_F(MeshImport, ColoursOfVerticesAndMaterials) {
   const std::string obj =
       "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 0\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 "
       "4 3\n";
-  for (const auto& [name, bytes] : std::vector<std::pair<std::string, std::string>>{
-           {"c.ply", kPlyHeader + kPlyVertices + kPlyFaces}, {"c.obj", obj}}) {
+  const std::string ply = fmt::format("{}{}{}", kPlyHeader, kPlyVertices, kPlyFaces);
+  for (const auto& [name, bytes] :
+       std::vector<std::pair<std::string, std::string>>{{"c.ply", ply}, {"c.obj", obj}}) {
     SCOPED_TRACE(name);
     mesh = Import(Write(name, bytes));
     EXPECT_EQ(mesh.report.turned, name == "c.obj" ? 1U : 0U);
