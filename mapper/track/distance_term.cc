@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 
 #include "mapper/track/robust_deviation.h"
 
@@ -48,12 +47,15 @@ double DistanceTerm::WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_
          double{at.weight / (at.weight + kFewObservations)};
 }
 
+bool DistanceTerm::IsOfTwoSurfaces(const SurfaceSample& at, const Eigen::Vector3d& ray_L) const {
+  if (config_.max_slope <= 0 || at.slope <= config_.max_slope) return false;
+  return -at.gradient_L.cast<double>().dot(ray_L) > config_.max_fall * ray_L.norm();
+}
+
 void DistanceTerm::KeepAt(const Pose& T_LC) {
   kept_.assign(points_.size(), {});
   cubes_.resize(points_.size());
   const Eigen::Vector3d camera_L = T_LC.translation();
-  const auto max_slope = static_cast<float>(
-      config_.max_slope > 0 ? config_.max_slope : std::numeric_limits<float>::max());
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, Taken(), kPointsPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
@@ -65,7 +67,7 @@ void DistanceTerm::KeepAt(const Pose& T_LC) {
           Kept& kept = kept_[i];
           if (config_.curved) kept.sag_m = model_->SagAt(y, sags);
           const SurfaceSample at = model_->At(y, kept.sag_m, cubes_[i]);
-          if (!at.has_slope || at.slope > max_slope) continue;
+          if (!at.has_slope || IsOfTwoSurfaces(at, y - camera_L)) continue;
           kept.per_slope = 1 / at.slope;
           kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
           kept.distance_m = at.distance_m();

@@ -64,6 +64,9 @@ class DistanceTerm {
     const Eigen::Vector3d y = T_LC * points_[i].p_C.cast<double>();
     return kept_.empty() ? model_->At(y) : model_->At(y, kept_[i].sag_m, cubes_[i]);
   }
+  // Whether the distance there lies between two surfaces (SdfTrackConfig::max_slope); `ray_L` is
+  // the camera's, of any length.
+  bool IsOfTwoSurfaces(const SurfaceSample& at, const Eigen::Vector3d& ray_L) const;
   double WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_C, const Eigen::Vector3d& y,
                   const Eigen::Vector3d& camera_L) const;
   void AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end, NormalEquations& sums) const;

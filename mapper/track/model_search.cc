@@ -239,6 +239,8 @@ class Search {
   // Each registered; it costs its score, negated, or infinity where it does not settle.
   std::vector<Place> Registered(const std::vector<Place>& seeds, bool is_rough) const {
     SdfTrackConfig config = config_;
+    // What was measured at a grazing angle is seen from elsewhere now, and may fall along any ray.
+    config.max_slope = 0;
     if (is_rough) {
       config.coarse_points = config.middle_points = static_cast<int>(kRoughPoints);
       config.max_iterations = kRoughIterations;

@@ -25,6 +25,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("lateral_px", lateral_px, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("model_voxels", model_voxels, 0.001, 10));
   TSDFPP_RETURN_IF_ERROR(InRange("max_slope", max_slope, 0, 1e6));
+  TSDFPP_RETURN_IF_ERROR(InRange("max_fall", max_fall, 0, 1e6));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_voxels", huber_voxels, 0.001, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_deviations", huber_deviations, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("coarse_points", coarse_points, 10, 1000000));
@@ -33,6 +34,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("settled_voxels", settled_voxels, 1e-6, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("weak_share", weak_share, 0, 0.1));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_turn_rad", keyframe_turn_rad, 0, EIGEN_PI));
+  TSDFPP_RETURN_IF_ERROR(InRange("anchor_turn_rad", anchor_turn_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_points", keyframe_points, 10, 1000000));
   TSDFPP_RETURN_IF_ERROR(InRange("free_space_weight", free_space_weight, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("outline_weight", outline_weight, 0, 100));
@@ -79,6 +81,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("model_voxels", config.model_voxels)
       .Get("curved", config.curved)
       .Get("max_slope", config.max_slope)
+      .Get("max_fall", config.max_fall)
       .Get("huber_voxels", config.huber_voxels)
       .Get("huber_deviations", config.huber_deviations)
       .Get("coarse_points", config.coarse_points)
@@ -88,6 +91,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("weak_share", config.weak_share)
       .Get("keyframe_turn_rad", config.keyframe_turn_rad)
       .Get("keyframe_points", config.keyframe_points)
+      .Get("anchor_turn_rad", config.anchor_turn_rad)
       .Get("free_space_weight", config.free_space_weight)
       .Get("outline_weight", config.outline_weight)
       .Get("colour_weight", config.colour_weight)
@@ -125,6 +129,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"model_voxels", model_voxels},
                      {"curved", curved},
                      {"max_slope", max_slope},
+                     {"max_fall", max_fall},
                      {"huber_voxels", huber_voxels},
                      {"huber_deviations", huber_deviations},
                      {"coarse_points", coarse_points},
@@ -134,6 +139,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"weak_share", weak_share},
                      {"keyframe_turn_rad", keyframe_turn_rad},
                      {"keyframe_points", keyframe_points},
+                     {"anchor_turn_rad", anchor_turn_rad},
                      {"free_space_weight", free_space_weight},
                      {"outline_weight", outline_weight},
                      {"colour_weight", colour_weight},

@@ -30,9 +30,11 @@ struct SdfTrackConfig {
 
   // Point to signed distance.
   bool curved = true;  // distances without their sag between voxels (SurfaceReader::SagAt)
-  // Where the distance changes by more than so many metres a metre it is of two surfaces
-  // (docs/tracking.md, Steep distances), and a point there has none. 0 switches this off.
-  double max_slope = 0;
+  // Where the distance changes by more than max_slope metres a metre, and falls by more than
+  // max_fall metres a metre along the camera's ray, it is of two surfaces (docs/tracking.md, Steep
+  // distances), and a point there has none. A max_slope of 0 switches this off.
+  double max_slope = 4;
+  double max_fall = 1.5;
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
   int coarse_points = 400;        // of the first passes
@@ -44,10 +46,15 @@ struct SdfTrackConfig {
   // is expected to move on as it did; 0 switches this off.
   double weak_share = 0.02;
 
-  // A segment is kept, at most so many points of it, and registered along with each later one until
-  // the object has turned by so much before the camera, or by kMostViewTurn_rad where terms of the
-  // image compare it: what the model adds to both is taken off. 0 switches this off.
+  // A segment is kept, at most keyframe_points of it, and registered along with each later one
+  // until the object has turned by so much before the camera, or by kMostViewTurn_rad where terms
+  // of the image compare it: what the model adds to both is taken off. 0 switches this off.
   double keyframe_turn_rad = 0.15;
+  // A second one is kept for longer, so that fewer take over each other's errors. It corrects along
+  // the directions that are known as well as it was (calibration.h). 0, or no first one, switches
+  // this off.
+  double anchor_turn_rad = 0.8;
+  double AnchorTurn_rad() const { return keyframe_turn_rad > 0 ? anchor_turn_rad : 0; }
   int keyframe_points = 1500;
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 

@@ -104,7 +104,8 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
     anew.has_moved = memory.has_moved;
     anew.is_placed = memory.is_placed;
     memory = std::move(anew);
-    if (config_.keyframe_turn_rad > 0) memory.keyframe = KeyframeOf(sight, T_OC);
+    Renew(memory.keyframe, config_.KeyframeTurn_rad(), sight, T_OC);
+    Renew(memory.anchor, config_.AnchorTurn_rad(), sight, T_OC);
     return;
   }
   const auto registered = Register(sight, *model, known->second, memory);
@@ -124,7 +125,10 @@ void SdfTracker::Place(InstanceId id, int frame, PlacedModel model) {
   memory.leaning.reset();
   memory.place.reset();
   memory.T_WO_last.clear();
-  if (model == PlacedModel::kOther) memory.keyframe.reset();
+  if (model == PlacedModel::kOther) {
+    memory.keyframe.reset();
+    memory.anchor.reset();
+  }
   memory.is_placed = true;
 }
 
@@ -143,14 +147,17 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
     sight.passed = static_cast<int>(std::clamp<std::int64_t>(passed, 1, kMostPassed));
   }
 
-  const std::optional<Pose> calibration = Calibration(sight, memory);
+  const std::optional<Calibration> near = Calibrate(sight, memory.keyframe);
+  const std::optional<Calibration> far = Calibrate(sight, memory.anchor);
   SdfRegistration task = TaskOf(sight, memory);
-  if (calibration) task.bias = calibration->inverse();
+  if (near) task.bias = near->correction_L.inverse();
   const auto others = OthersOf(sight, memory, task.bias);
   task.others = others;
   SdfRegistrationResult found = RegisterToDistances(task, config_);
   const SdfRegistrationResult nearest = found;
-  if (found.converged && calibration) found.T_LC = *calibration * found.T_LC;
+  if (found.converged && near) {
+    found.T_LC = (far ? Joined(*near, *far, found) : near->correction_L) * found.T_LC;
+  }
   const Rest rest = StayAtRest(sight, task, nearest, memory, found);
   if (!rest.is_kept && !found.converged) return std::nullopt;
   // What fails does not begin to wait.
@@ -186,15 +193,15 @@ SdfRegistration SdfTracker::TaskOf(const Sight& sight, const Memory& memory) con
   return task;
 }
 
-std::optional<Pose> SdfTracker::Calibration(const Sight& sight, const Memory& memory) const {
-  if (!memory.keyframe) return std::nullopt;
-  const Keyframe& keyframe = *memory.keyframe;
-  SdfRegistration task{sight.model, keyframe.points, sight.voxel_m, keyframe.camera};
-  task.T_LC_expected = sight.T_LO * keyframe.T_OC;
+std::optional<Calibration> SdfTracker::Calibrate(const Sight& sight,
+                                                 const std::optional<Keyframe>& keyframe) const {
+  if (!keyframe) return std::nullopt;
+  SdfRegistration task{sight.model, keyframe->points, sight.voxel_m, keyframe->camera};
+  task.T_LC_expected = sight.T_LO * keyframe->T_OC;
   task.is_near = true;
   const SdfRegistrationResult apparent = RegisterToDistances(task, config_);
   if (!apparent.converged) return std::nullopt;
-  return task.T_LC_expected * apparent.T_LC.inverse();
+  return Calibration{task.T_LC_expected * apparent.T_LC.inverse(), apparent.known};
 }
 
 std::vector<std::unique_ptr<PointTerm>> SdfTracker::OthersOf(const Sight& sight,
@@ -254,13 +261,8 @@ MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrat
 void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found, const Rest& rest,
                           Memory& memory) const {
   const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
-  const auto has_turned = [&] {
-    const Eigen::Matrix3d turn = memory.keyframe->T_OC.linear().transpose() * T_OC.linear();
-    return Eigen::AngleAxisd(turn).angle() > config_.KeyframeTurn_rad();
-  };
-  if (config_.keyframe_turn_rad > 0 && (!memory.keyframe || has_turned())) {
-    memory.keyframe = KeyframeOf(sight, T_OC);
-  }
+  Renew(memory.keyframe, config_.KeyframeTurn_rad(), sight, T_OC);
+  Renew(memory.anchor, config_.AnchorTurn_rad(), sight, T_OC);
   if (sight.passed != 1) memory.T_WO_last.clear();
   memory.T_WO_last.push_back(sight.frame->T_WC * T_OC.inverse());
   if (memory.T_WO_last.size() > static_cast<std::size_t>(config_.rest_frames)) {
@@ -274,6 +276,16 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
   if (sight.passed > 1) {
     memory.motion_L = found.frame.MotionOf(found.frame.LengthsOf(memory.motion_L) / sight.passed);
   }
+}
+
+void SdfTracker::Renew(std::optional<Keyframe>& keyframe, double turn_rad, const Sight& sight,
+                       const Pose& T_OC) const {
+  if (turn_rad <= 0) return;
+  if (keyframe) {
+    const Eigen::Matrix3d turn = keyframe->T_OC.linear().transpose() * T_OC.linear();
+    if (Eigen::AngleAxisd(turn).angle() <= turn_rad) return;
+  }
+  keyframe = KeyframeOf(sight, T_OC);
 }
 
 SdfTracker::Keyframe SdfTracker::KeyframeOf(const Sight& sight, const Pose& T_OC) const {

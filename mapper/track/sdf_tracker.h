@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapper/track/calibration.h"
 #include "mapper/track/object_model.h"
 #include "mapper/track/sdf_registration.h"
 #include "mapper/track/tracker.h"
@@ -54,6 +55,7 @@ class SdfTracker : public Tracker {
     Pose motion_L = Pose::Identity();         // a frame: T_WL(before)^-1 * T_WL(after)
     std::optional<Eigen::Vector3d> centre_O;  // of its segment then
     std::optional<Keyframe> keyframe;
+    std::optional<Keyframe> anchor;         // another, kept for longer
     std::optional<PlaceUncertainty> place;  // then
     std::optional<Vector6> leaning;         // of what was left at rest: to where it was found
     std::deque<Pose> T_WO_last;             // of the last rest_frames in a row, oldest first
@@ -136,8 +138,9 @@ class SdfTracker : public Tracker {
   // The terms beside the distances that the config has; `bias` is SdfRegistration's.
   std::vector<std::unique_ptr<PointTerm>> OthersOf(const Sight& sight, const Memory& memory,
                                                    const Pose& bias) const;
-  // What the keyframe says that the model adds to places: takes a seeming one to that where it is.
-  std::optional<Pose> Calibration(const Sight& sight, const Memory& memory) const;
+  // What a keyframe says that the model adds to places.
+  std::optional<Calibration> Calibrate(const Sight& sight,
+                                       const std::optional<Keyframe>& keyframe) const;
   bool PassesGates(const Sight& sight, const SdfRegistrationResult& found) const;
   // Much of it is hidden, and what is left says little about its place.
   bool IsHardlySeen(const Sight& sight, const SdfRegistrationResult& found) const;
@@ -146,6 +149,9 @@ class SdfTracker : public Tracker {
                                 Memory& memory) const;
   void Remember(const Sight& sight, const SdfRegistrationResult& found, const Rest& rest,
                 Memory& memory) const;
+  // Where there is none, or the object has turned so far since; `turn_rad` 0: keeps none.
+  void Renew(std::optional<Keyframe>& keyframe, double turn_rad, const Sight& sight,
+             const Pose& T_OC) const;
   // The segment, seen from there.
   Keyframe KeyframeOf(const Sight& sight, const Pose& T_OC) const;
 
