@@ -282,7 +282,8 @@ TEST(SdfRegistration, SidesThatAreSeenGrazingCount) {
   const SurfaceReader model(grid, kVoxel_m);
   Points side_L;
   for (int i = 0; i < 400; ++i) {
-    side_L.emplace_back(kSide_m, 0.0045 * (i % 20) - 0.043, 0.0045 * (i / 20) - 0.043);
+    const int row = i / 20;
+    side_L.emplace_back(kSide_m, 0.0045 * (i % 20) - 0.043, 0.0045 * row - 0.043);
   }
   const Pose T_LC = reference::LookAt(eye, Eigen::Vector3d::Zero());
   std::vector<SegmentPoint> points;
