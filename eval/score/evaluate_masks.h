@@ -37,9 +37,8 @@ class MaskEvaluator {
   Expected<void> Observe(const Frame& frame);
 
   // Images of frames that the sequence `info` does not have are remarked on, and those that no
-  // number names. With kNames ids are
-  // the sequence's objects where it has them; else an id is the object with which it shares most
-  // pixels. Errors: kData where no frame had an image.
+  // number names. With kNames ids are the sequence's objects where it has them; else an id is the
+  // object with which it shares most pixels. Errors: kData where no frame had an image.
   Expected<MaskEvaluation> Result(const SequenceInfo& info, const std::vector<ObjectInfo>& objects,
                                   MatchMode mode) const;
 

@@ -17,11 +17,6 @@ Index3 Beside(const Index3& cell, int i) {
 Candidates::Candidates(const VoteConfig& config, double voxel_m)
     : config_(config), cell_m_(0.5 * config.near_voxels * voxel_m) {}
 
-std::size_t Candidates::NamedOf(const std::vector<Candidate>& candidates) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      candidates, [](const Candidate& candidate) { return candidate.id != kNoInstance; }));
-}
-
 std::vector<Index3> Candidates::CellsOf(const std::vector<Eigen::Vector3d>& points_W) const {
   std::vector<Index3> cells;
   cells.reserve(points_W.size());
@@ -118,7 +113,8 @@ std::vector<Candidates::Verdict> Candidates::Confirm(
 
   std::vector<Verdict> verdicts(segments_W.size());
   std::vector<Candidate> left;
-  std::size_t named = NamedOf(candidates_);
+  auto named = static_cast<std::size_t>(std::ranges::count_if(
+      candidates_, [](const Candidate& candidate) { return candidate.id != kNoInstance; }));
   std::size_t room = kMostCandidates - std::min(kMostCandidates, candidates_.size() - named);
   for (std::size_t s = 0; s < segments_W.size(); ++s) {
     if (!is_large[s]) continue;

@@ -88,7 +88,6 @@ class Candidates {
     const int window = std::max(config_.confirm_window, 2);
     return candidate.seen.empty() || candidate.seen.back() <= frame_ - window + 1;
   }
-  static std::size_t NamedOf(const std::vector<Candidate>& candidates);
   std::vector<Index3> CellsOf(const std::vector<Eigen::Vector3d>& points_W) const;
   // The candidates that a segment can be, at most kMostPairs; `index` has all cells, sorted.
   std::vector<Pair> PairsOf(std::size_t segment, const std::vector<Eigen::Vector3d>& points_W,
