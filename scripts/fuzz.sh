@@ -48,13 +48,7 @@ if [ -n "$bundle" ]; then
   # The C library is the machine's own.
   ldd build/fuzz/tsdfpp_fuzz | awk '$3 ~ /^\// {print $3}' | grep -vE '/lib(c|m|dl|rt|pthread|resolv)\.so' |
     xargs -I{} cp -L {} "$bundle/lib/"
-  for folder in tests/fuzz/corpus/*/; do
-    target=$(basename "$folder")
-    mkdir -p "$bundle/corpus/$target"
-    for from in "$folder" "tests/fuzz/crashes/$target" "$out/$target/corpus"; do
-      if [ -d "$from" ]; then find "$from" -type f -exec cp {} "$bundle/corpus/$target/" +; fi
-    done
-  done
+  bash tests/fuzz/gather.sh "$bundle/corpus" "$out"
   du -sh "$bundle"
   exit
 fi
@@ -65,7 +59,7 @@ if [ -n "$import" ]; then
     if [ ! -d "tests/fuzz/corpus/$target" ]; then continue; fi
     mkdir -p "$out/$target/corpus" "$out/$target/crashes"
     for kind in corpus crashes; do
-      if [ -d "$folder/$kind" ]; then find "$folder/$kind" -type f -exec cp {} "$out/$target/$kind/" +; fi
+      if [ -d "$folder/$kind" ]; then find "$folder/$kind" -type f -exec cp -t "$out/$target/$kind" {} +; fi
     done
     cat "$folder/runs.tsv" >>"$out/$target/runs.tsv"
   done
@@ -79,11 +73,7 @@ if [ "$seconds" -gt 0 ]; then
   seeds=$(mktemp -d)
   trap 'rm -rf "$seeds"' EXIT
   ln -s "$PWD/build/fuzz/tsdfpp_fuzz" "$seeds/"
-  for folder in tests/fuzz/corpus/*/; do
-    target=$(basename "$folder")
-    mkdir -p "$seeds/corpus/$target"
-    find "$folder" "tests/fuzz/crashes/$target" -type f -exec cp {} "$seeds/corpus/$target/" + 2>/dev/null || true
-  done
+  bash tests/fuzz/gather.sh "$seeds/corpus"
   FUZZ_HOME=$seeds OUT=$out bash tests/fuzz/run.sh --seconds "$seconds" --jobs "$jobs" ${targets:+--targets "$targets"} ||
     status=$?
 fi

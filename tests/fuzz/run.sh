@@ -101,6 +101,10 @@ for target in $targets; do
     echo "run.sh: there is no target '$target' in $home/corpus" >&2
     exit 2
   fi
+  if [ -z "$(find "$home/corpus/$target" -type f)" ]; then
+    echo "run.sh: there is no input to begin with in $home/corpus/$target" >&2
+    exit 2
+  fi
 done
 running=0
 for target in $targets; do

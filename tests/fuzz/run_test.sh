@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # What tests/fuzz/run.sh writes down of a run, by how it ends: a run that was told to end (status 72) made no find, and is
-# not followed by another; one that failed made one, and is followed by another while there is time.
+# not followed by another; one that failed made one, and is followed by another while there is time. And that it begins
+# with inputs: gather.sh copies all seeds, finds and corpora, and without any a run is refused.
 set -euo pipefail
-run=$(cd "$(dirname "$0")" && pwd)/run.sh
+here=$(cd "$(dirname "$0")" && pwd)
+run=$here/run.sh
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 mkdir -p "$folder/corpus/toy"
@@ -34,3 +36,31 @@ EOF
 expect 0 no 2 0 0
 expect 72 no 1 0 0
 expect 77 yes 2 2 1
+
+rm "$folder/corpus/toy/seed"
+rc=0
+OUT=$folder/out FUZZ_HOME=$folder bash "$run" --seconds 2 2>"$folder/said" || rc=$?
+if [ $rc != 2 ] || ! grep -q "no input to begin with in $folder/corpus/toy" "$folder/said"; then
+  echo "run.sh without seeds: exit status $rc, '$(cat "$folder/said")'; expected 2 and a word" >&2
+  exit 1
+fi
+
+# Names of seeds and of finds differ, so what is gathered of a target is as many files as both have.
+mkdir -p "$folder/left/map/corpus"
+echo new >"$folder/left/map/corpus/of-a-run"
+bash "$here/gather.sh" "$folder/gathered" "$folder/left"
+for seeds in "$here"/corpus/*/; do
+  target=$(basename "$seeds")
+  expected=$(find "$seeds" -type f | wc -l)
+  if [ -d "$here/crashes/$target" ]; then expected=$((expected + $(find "$here/crashes/$target" -type f | wc -l))); fi
+  if [ "$target" = map ]; then expected=$((expected + 1)); fi
+  gathered=$(find "$folder/gathered/$target" -type f | wc -l)
+  if [ "$gathered" != "$expected" ] || [ "$gathered" = 0 ]; then
+    echo "gather.sh, $target: $gathered files, expected $expected" >&2
+    exit 1
+  fi
+done
+if [ ! -f "$folder/gathered/map/of-a-run" ]; then
+  echo "gather.sh left out what a run had left" >&2
+  exit 1
+fi
