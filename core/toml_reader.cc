@@ -101,6 +101,15 @@ Expected<toml::table> ParseTomlFile(const std::filesystem::path& path) {
   return ParseToml(*text, path.string());
 }
 
+std::string TomlText(const toml::table& table) {
+  constexpr auto kFlags =
+      toml::toml_formatter::default_flags &
+      ~(toml::format_flags::allow_multi_line_strings | toml::format_flags::allow_literal_strings);
+  std::ostringstream text;
+  text << toml::toml_formatter(table, kFlags);
+  return text.str();
+}
+
 TomlReader::TomlReader(const toml::table& table, std::string where, std::string path)
     : table_(table), where_(std::move(where)), path_(std::move(path)) {}
 

@@ -1,4 +1,5 @@
-// Strict TOML: every key is read with its type, and a key that nobody read is an error.
+// Strict TOML: every key is read with its type, and a key that nobody read is an error. And TOML as
+// text that reads back as the same.
 #pragma once
 
 #include <toml++/toml.h>
@@ -17,6 +18,10 @@ namespace tsdfpp {
 // Errors: kUsage, with file, line and column where the text is not TOML or the file is missing.
 Expected<toml::table> ParseTomlFile(const std::filesystem::path& path);
 Expected<toml::table> ParseToml(std::string_view text, std::string_view name);
+
+// Of finite numbers and strings of any bytes that UTF-8 allows; ends without a newline. Strings
+// have escapes: toml++ writes the others without a look at quotes and line ends in them.
+std::string TomlText(const toml::table& table);
 
 // Reads one table. Getters leave `value` untouched where the key is absent (so it keeps its
 // default) unless `required`. The first fault is kept, and Finish() returns it; Finish() also names

@@ -133,9 +133,7 @@ struct Settings {
 std::string SettingsToText(Method method, const MapConfig& config) {
   toml::table table = config.ToToml();
   table.insert("method", MethodName(method));
-  std::ostringstream text;
-  text << table << '\n';
-  return text.str();
+  return TomlText(table) + '\n';
 }
 
 Expected<Settings> SettingsFromText(const std::string& text) {

@@ -180,9 +180,7 @@ std::string AdapterConfig::ToToml() const {
                           {"disk_limit_mb", disk_limit_mb},
                           {"scale", scale},
                           {"match", match == MatchMode::kNames ? "names" : "overlap"}};
-  std::ostringstream text;
-  text << table << "\n";
-  return text.str();
+  return TomlText(table) + "\n";
 }
 
 Expected<AdapterConfig> ReadAdapter(const fs::path& file) {

@@ -52,9 +52,12 @@ struct SdfTrackConfig {
   double keyframe_turn_rad = 0.15;
   // A second one is kept for longer, so that fewer take over each other's errors. It corrects along
   // the directions that are known as well as it was (calibration.h). 0, or no first one, switches
-  // this off.
+  // this off; so do terms of the image that compare the first, since they may know what distances,
+  // by which alone it corrects, do not.
   double anchor_turn_rad = 0.8;
-  double AnchorTurn_rad() const { return keyframe_turn_rad > 0 ? anchor_turn_rad : 0; }
+  double AnchorTurn_rad() const {
+    return keyframe_turn_rad > 0 && !ComparesViews() ? anchor_turn_rad : 0;
+  }
   int keyframe_points = 1500;
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
@@ -64,9 +67,9 @@ struct SdfTrackConfig {
   double outline_weight = 0;
   double colour_weight = 0;
   static constexpr double kMostViewTurn_rad = 0.15;
+  bool ComparesViews() const { return outline_weight > 0 || colour_weight > 0; }
   double KeyframeTurn_rad() const {
-    const bool compares = outline_weight > 0 || colour_weight > 0;
-    return compares ? std::min(keyframe_turn_rad, kMostViewTurn_rad) : keyframe_turn_rad;
+    return ComparesViews() ? std::min(keyframe_turn_rad, kMostViewTurn_rad) : keyframe_turn_rad;
   }
 
   // Gates; an object that fails one is frozen for the frame.

@@ -85,7 +85,7 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
   Sight sight{&frame, &labels, turn.id, &points, CentreOf(points)};
   sight.voxel_m = voxel_m;
   std::optional<SegmentView> view;
-  if (config_.outline_weight > 0 || config_.colour_weight > 0) {
+  if (config_.ComparesViews()) {
     view.emplace(frame, labels, turn.id, config_.max_step_voxels * voxel_m);
     sight.view = &*view;
   }

@@ -1,5 +1,4 @@
 // A scene as a TOML file.
-#include <sstream>
 
 #include "sim/config/scene_config.h"
 #include "sim/config/scene_object_config.h"
@@ -45,8 +44,8 @@ toml::table RoomTable(const RoomSpec& spec) {
 
 std::string SceneToToml(const SceneConfig& config) {
   // TOML tables have no order of their own; what a reader looks for first is written first.
-  std::ostringstream text;
-  const auto write = [&](const toml::table& table) { text << table << "\n\n"; };
+  std::string text;
+  const auto write = [&](const toml::table& table) { text += TomlText(table) + "\n\n"; };
   write(toml::table{{"name", config.name}});
   write(toml::table{{"purpose", config.purpose}});
   write(toml::table{{"frames", config.frames},
@@ -60,13 +59,13 @@ std::string SceneToToml(const SceneConfig& config) {
   for (const SceneObject& object : config.objects) {
     write(toml::table{{"object", toml::array{SceneObjectToToml(object)}}});
   }
-  if (config.sensor != SensorConfig{}) text << SensorConfigToToml(config.sensor) << "\n";
+  if (config.sensor != SensorConfig{}) text += SensorConfigToToml(config.sensor) + "\n";
   if (config.experiment) {
     write(toml::table{
         {"experiment", toml::table{{"reveal_frame", config.experiment->reveal_frame},
                                    {"removed", TomlArray(config.experiment->removed)}}}});
   }
-  return text.str();
+  return text;
 }
 
 }  // namespace tsdfpp

@@ -71,7 +71,8 @@ fuzz() {
     { time "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$left" -max_len="$(most_bytes "$target")" \
       -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 -use_value_profile=1 -reload=0 -print_final_stats=1 \
       -artifact_prefix="$to/crashes/" >"$log" 2>&1; } 2>"$to/time.txt" || status=$?
-    used=$(awk '{print int($1 + $2 + 0.5)}' "$to/time.txt")
+    # The last line: before it bash says of a program that a signal ended which one it was.
+    used=$(tail -1 "$to/time.txt" | awk '{print int($1 + $2 + 0.5)}')
     cpu=$((cpu + used))
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -1)
     line=$(grep -a ' cov: ' "$log" | tail -1 || true)

@@ -10,7 +10,7 @@ trap 'rm -rf "$folder"' EXIT
 mkdir -p "$folder/corpus/toy"
 echo seed >"$folder/corpus/toy/seed"
 
-# expect STATUS ARTIFACT RUNS FINDS RC: how the fuzzer ends, whether it leaves a find, the lines of runs.tsv, those of
+# expect END ARTIFACT RUNS FINDS RC: how the fuzzer ends, whether it leaves a find, the lines of runs.tsv, those of
 # finds, how run.sh ends.
 expect() {
   rm -rf "$folder/out"
@@ -20,7 +20,7 @@ expect() {
 if [ $2 = yes ]; then touch "\$TO_CRASHES/crash-\$\$"; fi
 echo '#2 DONE   cov: 5 ft: 7 corp: 1/4b'
 echo 'stat::number_of_executed_units: 3'
-exit $1
+$1
 EOF
   chmod +x "$folder/tsdfpp_fuzz"
   local rc=0
@@ -29,13 +29,14 @@ EOF
   runs=$(wc -l <"$folder/out/toy/runs.tsv")
   finds=$(awk '$6 == 1 && $3 == 3 && $4 == 5 && $5 == 7' "$folder/out/toy/runs.tsv" | wc -l)
   if [ "$runs $finds $rc" != "$3 $4 $5" ]; then
-    echo "run.sh after status $1: $runs runs, $finds finds, exit status $rc; expected $3, $4, $5" >&2
+    echo "run.sh after $1: $runs runs, $finds finds, exit status $rc; expected $3, $4, $5" >&2
     exit 1
   fi
 }
-expect 0 no 2 0 0
-expect 72 no 1 0 0
-expect 77 yes 2 2 1
+expect "exit 0" no 2 0 0
+expect "exit 72" no 1 0 0
+expect "exit 77" yes 2 2 1
+expect "kill -ABRT \$\$" yes 2 2 1
 
 rm "$folder/corpus/toy/seed"
 rc=0

@@ -50,5 +50,15 @@ TEST(Keyframes, AnAnchorHoldsWhatTurns) {
   }
 }
 
+TEST(Keyframes, TermsThatCompareViewsHaveNoAnchor) {
+  SdfTrackConfig track;
+  track.outline_weight = 1;
+  const double with_keyframe = TurnOff_rad(track, kTray);
+  track.anchor_turn_rad = 0;
+  EXPECT_EQ(TurnOff_rad(track, kTray), with_keyframe);
+  track.outline_weight = 0;
+  EXPECT_NE(TurnOff_rad(track, kTray), with_keyframe) << "the outline says nothing";
+}
+
 }  // namespace
 }  // namespace tsdfpp
