@@ -33,6 +33,11 @@ MotionFrame FrameOf(const SdfRegistration& task) {
   return frame;
 }
 
+// Of points with a deviation of this or more a direction is weak up to config.weak_share, of those
+// with half of it or less up to half of that.
+constexpr double kWeakDeviation_voxels = 0.1;
+constexpr double kLeastOfWeakShare = 0.5;
+
 // Of the mean information: keeps directions of which nothing speaks from dividing by nothing.
 constexpr double kNoShare = 1e-9;
 
@@ -112,7 +117,7 @@ class AllTerms {
     const Matrix6 of_distances = distances_.Sums(T_LC).H;
     const KnownDirections known = DirectionsOf(of_distances);
     if (task_->others.empty()) {
-      return PriorFor(of_distances, known, task_->T_LC_expected, config_->weak_share);
+      return PriorFor(of_distances, known, task_->T_LC_expected, WeakShareNow());
     }
     const double weights = std::max(1.0, of_distances.topLeftCorner<3, 3>().trace());
     Matrix6 directions = Matrix6::Zero();
@@ -122,8 +127,7 @@ class AllTerms {
     shares << known.shift_shares, known.turn_shares;
     const Vector6 trust = Trust(T_LC, known, of_distances);
     const Vector6 say = weights * (kWeakOfDistances - shares.array()).max(0) * trust.array();
-    const Vector6 pull =
-        weights * (config_->weak_share - shares.array()).max(0) * (1 - trust.array());
+    const Vector6 pull = weights * (WeakShareNow() - shares.array()).max(0) * (1 - trust.array());
     const Vector6 said = directions.transpose() * SaidByOthers(T_LC, directions, say);
     const Vector6 expected =
         directions.transpose() * frame_->LengthsOf(task_->T_LC_expected * T_LC.inverse());
@@ -138,6 +142,7 @@ class AllTerms {
   DistanceCounts Count(const Pose& T_LC) const { return distances_.Count(T_LC); }
 
  private:
+  double WeakShareNow() const { return WeakShare(deviation_m_, task_->voxel_m, *config_); }
   NormalEquations OfOthers(const Pose& T_LC) const {
     NormalEquations sums;
     for (const auto& term : task_->others) {
@@ -200,7 +205,8 @@ void RegisterCoarsely(const SdfRegistration& task, const SdfTrackConfig& config,
     for (int pass = 0; pass < kCoarsePasses; ++pass) {
       coarse.KeepAt(T_LC);
       const Matrix6 H = coarse.Sums(T_LC).H;
-      const MotionPrior prior = PriorFor(H, DirectionsOf(H), task.T_LC_expected, config.weak_share);
+      const double weak_share = WeakShare(coarse.KeptDeviation_m(), task.voxel_m, config);
+      const MotionPrior prior = PriorFor(H, DirectionsOf(H), task.T_LC_expected, weak_share);
       const LeastSquaresResult found = MinimiseOverPose(sums, T_LC, result.frame, prior, options);
       result.iterations += found.iterations;
       T_LC = found.T;
@@ -247,6 +253,11 @@ LeastSquaresResult RegisterFinely(const SdfRegistration& task, const SdfTrackCon
 
 }  // namespace
 
+double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& config) {
+  const double part = deviation_m / (kWeakDeviation_voxels * voxel_m);
+  return config.weak_share * std::clamp(part, kLeastOfWeakShare, 1.0);
+}
+
 OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
                         const SdfRegistrationResult& found, const SdfTrackConfig& config) {
   DistanceTerm term = TermOf(task, found.frame, config, 1);
@@ -289,6 +300,7 @@ SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
   const Matrix6 floor = (1e-9 + kNoShare * result.information.trace() / 6) * Matrix6::Identity();
   const Matrix6 information = result.information + floor;
   const double deviation_m = result.counts.deviation_m;
+  result.weak_share = WeakShare(deviation_m, task.voxel_m, config);
   result.covariance = deviation_m * deviation_m * information.ldlt().solve(Matrix6::Identity());
   return result;
 }

@@ -41,17 +41,22 @@ struct SdfRegistrationResult {
   // What the terms know, without the expectation: over the six lengths of `frame`, in points.
   MotionFrame frame;
   Matrix6 information = Matrix6::Zero();
-  // Its weak and strong directions.
+  // Its weak and strong directions, and the share below which one is weak.
   KnownDirections known;
+  double weak_share = 0;
   // Of the six lengths, square metres, where the points' errors are independent of each other and
   // of the deviation in `counts`, as a camera's noise is. The expectation counts as nothing: along
   // a direction that the points do not know the variance is large.
   Matrix6 covariance = Matrix6::Zero();
 };
 
+// Of points with this robust deviation: config.weak_share, or less. Where little is known, most of
+// that is what is wrong with the model, by about as much as points differ from it.
+double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& config);
+
 // Registers in two passes: few points and a wide Huber function from every seed, then all points,
 // and the other terms, from where the cost was least. Along directions of which less than
-// config.weak_share of the points' information speaks, a prior pulls towards the expected pose, up
+// WeakShare() of the points' information speaks, a prior pulls towards the expected pose, up
 // to that share. Along directions of which the distances know less than a fifth it pulls, up to
 // that, to where the other terms would have the object, as far as they know the direction
 // (docs/tracking.md, "Terms of the image"). Points that are not finite, and a model or segment

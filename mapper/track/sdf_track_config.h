@@ -43,7 +43,8 @@ struct SdfTrackConfig {
   double settled_voxels = 0.002;  // settled: an iteration moves no point by more than this
 
   // Along a direction of which less than this share of the points' information speaks, the object
-  // is expected to move on as it did; 0 switches this off.
+  // is expected to move on as it did; 0 switches this off. The share is of points that deviate by a
+  // tenth of a voxel or more; of better ones it is less, in proportion, down to half (WeakShare()).
   double weak_share = 0.02;
 
   // A segment is kept, at most keyframe_points of it, and registered along with each later one

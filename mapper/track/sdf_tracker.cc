@@ -36,7 +36,8 @@ Pose Repeated(const Pose& motion, int times) {
 }
 
 // The motion without what it has along directions of which too little is known.
-Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found, double weak_share) {
+Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found) {
+  const double weak_share = found.weak_share;
   if (weak_share <= 0) return motion_L;
   const auto part = [&](const Eigen::Vector3d& shares, const Eigen::Matrix3d& directions,
                         const Eigen::Vector3d& x) -> Eigen::Vector3d {
@@ -271,8 +272,7 @@ void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found
   memory.frame = sight.frame->index;
   memory.centre_O = T_OC * sight.centre_C;
   const Pose motion_L = sight.MotionTo(found.T_LC);
-  memory.motion_L =
-      rest.is_back ? Pose::Identity() : KnownPart(motion_L, found, config_.weak_share);
+  memory.motion_L = rest.is_back ? Pose::Identity() : KnownPart(motion_L, found);
   if (sight.passed > 1) {
     memory.motion_L = found.frame.MotionOf(found.frame.LengthsOf(memory.motion_L) / sight.passed);
   }

@@ -475,6 +475,16 @@ TEST(SdfRegistration, SurvivesWhatIsNoSegment) {
   }
 }
 
+TEST(WeakShare, IsLessOfPointsThatDeviateLess) {
+  SdfTrackConfig config;
+  config.weak_share = 0.04;
+  EXPECT_EQ(WeakShare(0.003, 0.01, config), 0.04);
+  EXPECT_NEAR(WeakShare(0.0007, 0.01, config), 0.028, 1e-12);
+  EXPECT_EQ(WeakShare(0.0001, 0.01, config), 0.02);
+  config.weak_share = 0;
+  EXPECT_EQ(WeakShare(0.003, 0.01, config), 0) << "switched off";
+}
+
 TEST(SdfTrackConfig, RoundTripsThroughToml) {
   SdfTrackConfig config;
   config.curved = false;
