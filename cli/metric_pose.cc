@@ -77,7 +77,13 @@ struct Series {
   const char* unit;
   double in_unit;  // what the number is multiplied with for the text
   std::vector<Measured> errors;
+  std::string gap;  // the first estimate at which it is undefined, and why
 };
+
+std::size_t CountOfDefined(const std::vector<Measured>& errors) {
+  return static_cast<std::size_t>(std::count_if(
+      errors.begin(), errors.end(), [](const Measured& error) { return error.value.has_value(); }));
+}
 
 Measured MeanOfDefined(const std::vector<Measured>& errors) {
   double sum = 0;
@@ -130,16 +136,20 @@ Expected<PoseInputs> ReadInputs(const MetricPoseArguments& options) {
 
 // The errors of all true poses that have an estimate.
 struct PoseErrors {
-  std::vector<Series> series = {{"ADD", "mm", 1e3, {}},         {"ADD-S", "mm", 1e3, {}},
-                                {"MSSD", "mm", 1e3, {}},        {"MSPD", "px", 1, {}},
-                                {"translation", "mm", 1e3, {}}, {"rotation", "deg", 1, {}}};
+  std::vector<Series> series = {{"ADD", "mm", 1e3, {}, {}},         {"ADD-S", "mm", 1e3, {}, {}},
+                                {"MSSD", "mm", 1e3, {}, {}},        {"MSPD", "px", 1, {}, {}},
+                                {"translation", "mm", 1e3, {}, {}}, {"rotation", "deg", 1, {}, {}}};
   nlohmann::json frames = nlohmann::json::array();
   std::size_t found = 0;  // estimates
 
   // `errors` in the order of the series.
   void Add(double stamp_s, const std::array<Measured, 6>& errors) {
     ++found;
-    for (std::size_t k = 0; k < series.size(); ++k) series[k].errors.push_back(errors[k]);
+    for (std::size_t k = 0; k < series.size(); ++k) {
+      series[k].errors.push_back(errors[k]);
+      if (errors[k].value || !series[k].gap.empty()) continue;
+      series[k].gap = fmt::format("the first at {} s: {}", stamp_s, errors[k].why_not);
+    }
     frames.push_back({{"t", stamp_s},
                       {"add_m", ToJson(errors[0])},
                       {"add_s_m", ToJson(errors[1])},
@@ -185,17 +195,35 @@ PoseErrors MeasurePoses(const PoseInputs& inputs, const MetricPoseArguments& opt
   return errors;
 }
 
+// An estimate that a measure says nothing of may be the worst: that mean and max lack it is said.
+std::vector<std::string> RemarksOn(const PoseErrors& errors) {
+  std::vector<std::string> remarks;
+  for (const Series& one : errors.series) {
+    const std::size_t defined = CountOfDefined(one.errors);
+    if (defined == 0 || defined == errors.found) continue;
+    remarks.push_back(
+        fmt::format("{} is undefined at {} of {} estimates, which its mean and max lack, {}",
+                    one.name, errors.found - defined, errors.found, one.gap));
+  }
+  return remarks;
+}
+
 // Adds the mean and the largest error of a measure to the JSON, and returns its line.
-std::string AddSeries(const Series& one, bool has_camera, nlohmann::json& json) {
+std::string AddSeries(const Series& one, std::size_t found, bool has_camera, nlohmann::json& json) {
   const Measured mean = MeanOfDefined(one.errors);
   const Measured largest = LargestOfDefined(one.errors);
+  const std::size_t defined = CountOfDefined(one.errors);
   const std::string key = fmt::format("{}_{}", one.name, one.in_unit == 1 ? one.unit : "m");
   json["mean"][key] = ToJson(mean);
   json["max"][key] = ToJson(largest);
-  return mean.value ? fmt::format("{:<12} {:>12.4f} {:>12.4f} {}\n", one.name,
-                                  one.in_unit * *mean.value, one.in_unit * *largest.value, one.unit)
-                    : fmt::format("{:<12} undefined: {}\n", one.name,
-                                  has_camera ? mean.why_not : "MSPD needs --camera");
+  json["defined"][key] = defined;
+  if (!mean.value) {
+    return fmt::format("{:<12} undefined: {}\n", one.name,
+                       has_camera ? mean.why_not : "MSPD needs --camera");
+  }
+  return fmt::format("{:<12} {:>12.4f} {:>12.4f} {}{}\n", one.name, one.in_unit * *mean.value,
+                     one.in_unit * *largest.value, one.unit,
+                     defined < found ? fmt::format(" (of {} of {})", defined, found) : "");
 }
 
 Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
@@ -205,6 +233,8 @@ Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
     return DataError("{}: none of its {} poses is within {} s of one of {}", options.estimate,
                      inputs.estimate.size(), options.max_difference_s, options.truth);
   }
+  std::vector<std::string> remarks = inputs.remarks;
+  for (const std::string& remark : RemarksOn(errors)) remarks.push_back(remark);
   const Measured auc_add = AreaUnderCurve(errors.series[0].errors, options.greatest_m);
   const Measured auc_add_s = AreaUnderCurve(errors.series[1].errors, options.greatest_m);
   nlohmann::json json = {{"model", options.model},
@@ -217,17 +247,17 @@ Expected<CommandResult> RunPose(const MetricPoseArguments& options) {
                          {"auc_add", ToJson(auc_add)},
                          {"auc_add_s", ToJson(auc_add_s)},
                          {"frames", errors.frames},
-                         {"remarks", inputs.remarks}};
+                         {"remarks", remarks}};
   std::string text =
       fmt::format("{} of {} true poses have an estimate; {} of the model's {} points\n",
                   errors.found, inputs.truth.size(), inputs.points.size(), inputs.model_points);
   text += fmt::format("{:<12} {:>12} {:>12}\n", "", "mean", "max");
   for (const Series& one : errors.series) {
-    text += AddSeries(one, inputs.camera.has_value(), json);
+    text += AddSeries(one, errors.found, inputs.camera.has_value(), json);
   }
   text += fmt::format("AUC to {} m: ADD {}, ADD-S {}\n", options.greatest_m, ShareText(auc_add),
                       ShareText(auc_add_s));
-  for (const std::string& remark : inputs.remarks) spdlog::warn("{}", remark);
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   return CommandResult{json, text};
 }
 

@@ -200,7 +200,7 @@ void LabelOverlap::Observe(const cv::Mat& truth, const cv::Mat& prediction, std:
     frame[labels.first].in_union += pixels;
     if (labels.first == labels.second) {
       frame[labels.first].intersection += pixels;
-    } else {
+    } else if (labels.second != ignored) {
       frame[labels.second].in_union += pixels;
     }
   }

@@ -77,7 +77,8 @@ MeanPanopticQuality MeanQuality(const PanopticCounts& counts, const std::set<int
 class LabelOverlap {
  public:
   // Takes in a frame: images of labels, CV_32SC1, of one size (a programmer's duty). Pixels that
-  // the truth labels `ignored` are left out.
+  // the truth labels `ignored` are left out; those that the prediction alone labels so have no
+  // label, which is missed in the truth's.
   void Observe(const cv::Mat& truth, const cv::Mat& prediction, std::int32_t ignored = -1);
 
   // Sum of intersections / sum of unions over all frames, for each label of either.

@@ -333,9 +333,10 @@ nlohmann::json ToJson(const ObjectScores& scores) {
 }
 
 nlohmann::json ToJson(const SeamScore& score) {
+  const Measured area = score.share.value ? Measured::Of(1e4 * score.area_m2) : score.share;
   return {{"share", tsdfpp::ToJson(score.share)},
           {"in_front", tsdfpp::ToJson(score.in_front)},
-          {"area_cm2", 1e4 * score.area_m2},
+          {"area_cm2", tsdfpp::ToJson(area)},
           {"asked_area_cm2", 1e4 * score.asked_area_m2}};
 }
 

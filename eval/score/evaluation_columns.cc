@@ -158,7 +158,8 @@ const std::vector<EvaluationColumn>& EvaluationColumns() {
        "c_y) / "
        "f_y, 1): its footprint over the cosine of incidence",
        [](const Movers&, const Evaluation& e) {
-         return Measured::Of(1e4 * e.seams.beside_objects.area_m2);
+         const SeamScore& seams = e.seams.beside_objects;
+         return seams.share.value ? Measured::Of(kCm2PerM2 * seams.area_m2) : seams.share;
        }},
       {"bulge", "bulge_share", "background beside objects hidden by bulges", "", Better::kLower, 4,
        "of the pixels that `seam_share` asks, the share at which the cast has "

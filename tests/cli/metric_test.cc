@@ -257,6 +257,28 @@ TEST_F(Metric, PoseAnchorsAndRefuses) {
   ExpectError({"pose", model, truth, estimate, "--symmetry", "w:180"}, kUsage, {"--symmetry"});
 }
 
+// The third estimate lies behind the camera, where MSPD says nothing: the worst of all, and in
+// neither its mean nor its max.
+TEST_F(Metric, PoseSaysOfHowManyItsMeansAre) {
+  const std::string model = WriteMesh("model.ply", testing::Box({0, 0, 0}, {0.1F, 0.1F, 0.1F}));
+  const std::string truth =
+      Write("truth.txt", "1 0 0 1 0 0 0 1\n2 0 0 1 0 0 0 1\n3 0 0 1 0 0 0 1\n");
+  const std::string estimate =
+      Write("estimate.txt", "1 0 0 1 0 0 0 1\n2 0 0 1 0 0 0 1\n3 0 0 -1 0 0 0 1\n");
+  const auto json = Json({"pose", model, truth, estimate, "--camera", "525,525,319.5,239.5"});
+  EXPECT_EQ(json["defined"]["MSPD_px"], 2);
+  EXPECT_EQ(json["defined"]["MSSD_m"], 3);
+  const std::string remark =
+      "MSPD is undefined at 1 of 3 estimates, which its mean and max lack, the first at 3 s: a "
+      "point of the model lies behind the camera";
+  EXPECT_EQ(json["remarks"], nlohmann::json::array({remark}));
+  EXPECT_NE(err_.find(remark), std::string::npos) << err_;
+  const CommandOutput text =
+      Run({"pose", model, truth, estimate, "--camera", "525,525,319.5,239.5"});
+  EXPECT_NE(text.out.find("px (of 2 of 3)\n"), std::string::npos) << text.out;
+  EXPECT_TRUE(Json({"pose", model, truth, estimate})["remarks"].empty());
+}
+
 TEST_F(Metric, NamesWhatIsNoSubcommand) {
   ExpectError({}, kUsage, {"subcommand"});
   ExpectError({"frobnicate"}, kUsage, {"frobnicate"});

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "eval/score/evaluation.h"
+#include "eval/score/evaluation_columns.h"
 #include "eval/score/mapped_pixels.h"
 #include "tests/reference/analytic_scene.h"
 
@@ -182,6 +184,26 @@ TEST(SeamsOfDepth, AreNotAskedAtGrazingIncidence) {
     EXPECT_GT(cosine, LeastSeenCosine() - 1e-3) << u;
   }
   EXPECT_GT(cv::countNonZero(ScoreSeams(nothing, {level}, kSeamVoxel_m).seams), 0);
+}
+
+// An area of 0 would be the best there is; where nothing stands, nothing was asked.
+TEST(SeamsOfDepth, HaveNoAreaWhereNothingWasAsked) {
+  Frame frame = WallOf{}.Seen();
+  frame.mask.setTo(cv::Scalar(kBackground));
+  Evaluation evaluation;
+  evaluation.seams = ScoreSeams(frame.depth, {frame}, kSeamVoxel_m);
+  const std::string why = evaluation.seams.beside_objects.share.why_not;
+  EXPECT_EQ(why, "no mapped background beside an edge");
+  int columns = 0;
+  for (const EvaluationColumn& column : EvaluationColumns()) {
+    if (column.csv != "seam_area_cm2") continue;
+    ++columns;
+    EXPECT_FALSE(column.value({}, evaluation).value);
+    EXPECT_EQ(column.value({}, evaluation).why_not, why);
+  }
+  EXPECT_EQ(columns, 1);
+  const nlohmann::json area = ToJson(evaluation)["seams"]["beside_objects"]["area_cm2"];
+  EXPECT_EQ(area, ToJson(Measured::Undefined(why)));
 }
 
 // A slab under a brick, as a map would show it: without what lies within a gap around the brick.

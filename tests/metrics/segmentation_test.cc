@@ -341,6 +341,18 @@ TEST(LabelOverlap, SumsOverTheSequenceAndAveragesFrames) {
   EXPECT_EQ(ignoring.ByLabel(), (std::map<std::int32_t, double>{{1, 1.0}}));
 }
 
+// What a prediction leaves open is no label of its own, and is missed in the truth's.
+TEST(LabelOverlap, VoidOfThePredictionIsNoLabel) {
+  LabelOverlap overlap;
+  overlap.Observe(Labels({{1, 1, 1, 1}}), Labels({{1, 1, 1, 0}}), 0);
+  EXPECT_EQ(overlap.ByLabel(), (std::map<std::int32_t, double>{{1, 0.75}}));
+  EXPECT_EQ(overlap.PerFrameMean().value, 0.75);
+  // Where none is ignored, 0 is one as any other.
+  LabelOverlap objects;
+  objects.Observe(Labels({{1, 1, 1, 1}}), Labels({{1, 1, 1, 0}}));
+  EXPECT_EQ(objects.ByLabel(), (std::map<std::int32_t, double>{{0, 0.0}, {1, 0.75}}));
+}
+
 TEST(TrackingQuality, EqualsDeeplab2) {
   const auto reference = testing::ReadJson(kPanoptic / "deeplab2_stq.json");
   ASSERT_EQ(reference["cases"].size(), 13U);
