@@ -13,7 +13,8 @@ def title_of(results, metric):
     return words["words"] + (f", {words['unit']}" if words["unit"] else "")
 
 
-def cell_text(results, figure, metric, key="mean", sign="", interval=True):
+def cell_text(results, figure, metric, key="mean", sign="", interval=True, runs=0):
+    """runs: how many the condition has; a mean of fewer says so."""
     mean = number(figure[key])
     if mean is None:
         return "-"
@@ -21,12 +22,32 @@ def cell_text(results, figure, metric, key="mean", sign="", interval=True):
     text = f"{mean:{sign}.{decimals}f}"
     if interval and "low" in figure:
         text += f" [{figure['low']:.{decimals}f}, {figure['high']:.{decimals}f}]"
+    of = figure.get("count", figure.get("pairs"))
+    if of is not None and of < runs:
+        text += f" (of {of} of {runs})"
     return text
 
 
 def difference_text(results, condition, method, metric):
     paired = condition["paired"].get(method, {}).get(metric)
-    return "" if paired is None else cell_text(results, paired, metric, "mean_difference", "+")
+    if paired is None:
+        return ""
+    return cell_text(results, paired, metric, "mean_difference", "+", runs=condition["replicates"])
+
+
+def mean_text(results, condition, method, metric, interval=False):
+    figure = condition["means"][method][metric]
+    return cell_text(results, figure, metric, interval=interval, runs=condition["replicates"])
+
+
+def place(cells, key, condition):
+    """One condition a cell: of two the table would show the last alone."""
+    if key in cells:
+        other = cells[key]["settings"]
+        axes = [axis for axis, value in condition["settings"].items() if other.get(axis) != value]
+        raise ValueError(f"grid '{condition['grid']}' has several conditions in the cell of {', '.join(map(str, key))}, "
+                         f"which differ in {', '.join(axes) or 'nothing'}; expected one")
+    cells[key] = condition
 
 
 def axes_shown(results):
@@ -55,7 +76,7 @@ def comparison_of(results):
             row = [condition["grid"]] if has_grids else []
             row += [f"{condition['settings'][axis]}" for axis in varied] + [f"`{method}`"]
             for i, metric in enumerate(metrics):
-                row.append(cell_text(results, condition["means"][method][metric], metric, interval=i < DIFFERENCES))
+                row.append(mean_text(results, condition, method, metric, interval=i < DIFFERENCES))
                 if i < DIFFERENCES:
                     row.append(difference_text(results, condition, method, metric))
             rows.append(row)
@@ -69,7 +90,7 @@ def scenes_of(results):
     shown = {}
     for condition in results["conditions"]:
         for method in condition["methods"]:
-            shown[condition["settings"]["profile"], method, condition["grid"]] = condition["means"][method]
+            place(shown, (condition["settings"]["profile"], method, condition["grid"]), condition)
     profiles, methods, grids = ([*dict.fromkeys(key[i] for key in shown)] for i in range(3))
     text = ""
     for profile in profiles:
@@ -77,10 +98,10 @@ def scenes_of(results):
             title = title_of(results, metric)
             lines = [[f"`{profile}`: {title}"] + grids, ["---"] * (1 + len(grids))]
             for method in methods:
-                means = [shown.get((profile, method, grid)) for grid in grids]
-                if any(means):
-                    lines.append([f"`{method}`"] + [cell_text(results, of[metric], metric, interval=False) if of else ""
-                                                    for of in means])
+                conditions = [shown.get((profile, method, grid)) for grid in grids]
+                if any(conditions):
+                    lines.append([f"`{method}`"] + [mean_text(results, of, method, metric) if of else ""
+                                                    for of in conditions])
             text += "".join("| " + " | ".join(line) + " |\n" for line in lines) + "\n"
     made = results["experiment"]
     return text + (f"Made by tsdfpp {results['program']} with {results['renderer']}; images of {made['scale']} times the "
@@ -100,21 +121,41 @@ def rules_of(results):
         for method in condition["methods"]:
             if (rule, method) not in rows:
                 rows.append((rule, method))
-            cells[rule, method, profile, scene] = condition["means"][method]
+            place(cells, (rule or "as it is", method, profile, scene), condition)
     profiles, rules = [profile for profile, _ in columns], [rule for rule, _ in rows]
     columns = sorted(columns, key=lambda column: profiles.index(column[0]))
     rows = sorted(rows, key=lambda row: rules.index(row[0]))
     parts = []
-    for shown in (metrics[:DIFFERENCES], metrics[DIFFERENCES:]):
+    for shown in filter(None, (metrics[:DIFFERENCES], metrics[DIFFERENCES:])):
         lines = [["rule", "method"] + [f"{profile}: {scene}" for profile, scene in columns]]
         lines.append(["---"] * len(lines[0]))
         for rule, method in rows:
             line = [rule or "as it is", f"`{method}`"]
             for profile, scene in columns:
-                means = cells.get((rule, method, profile, scene))
-                line.append("" if means is None else " / ".join(
-                    cell_text(results, means[metric], metric, interval=False) for metric in shown))
+                of = cells.get((rule or "as it is", method, profile, scene))
+                line.append("" if of is None else " / ".join(mean_text(results, of, method, metric) for metric in shown))
             lines.append(line)
         words = " / ".join(title_of(results, metric) for metric in shown)
         parts.append(f"{words[0].upper()}{words[1:]}:\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines))
     return "\n".join(parts)
+
+
+def label_of_row(varied, row):
+    """Of results.csv: the method, and the settings that tell its lines in a plot apart."""
+    parts = [row["method"]] + (["observed neighbours"] if row["resampling"] == "observed" else [])
+    for axis in varied:
+        if axis != "resampling":
+            parts.append(f"{axis} {row[axis]}")
+        elif row[axis] not in ("all", "observed"):
+            parts.append(f"{row[axis]} neighbours")
+    return ", ".join(parts)
+
+
+def frame_lines(results, rows, metric):
+    """By label and frame the values of a metric in the rows of results.csv, one a replicate."""
+    lines = {}
+    for row in rows:
+        if row[metric] != "":
+            label = label_of_row(results["varied"], row)
+            lines.setdefault(label, {}).setdefault(int(row["frame"]), []).append(float(row[metric]))
+    return lines

@@ -87,12 +87,23 @@ FIGURES = (("kept", "table_preservation_behind_other"), ("retention", "table_ret
            ("sane least", "sanity_least"))
 
 
+def titles_of(maps):
+    """Of rows of frames.csv or runs of summary.json: method and profile, and the poses where one of these has several."""
+    poses = {}
+    for one in maps:
+        poses.setdefault((one["method"], one["profile"]), set()).add(one.get("poses"))
+    several = {which for which, of in poses.items() if len(of) > 1}
+    named = ((one["method"], one["profile"], one.get("poses")) for one in maps)
+    return [", ".join(filter(None, name if name[:2] in several else name[:2])) for name in named]
+
+
 def maps_of(path):
     """Rows of frames.csv by the map's title, in their order."""
     maps = {}
     with open(path, newline="") as file:
-        for row in csv.DictReader(file):
-            maps.setdefault(", ".join(filter(None, (row["method"], row["profile"]))), []).append(row)
+        rows = list(csv.DictReader(file))
+    for title, row in zip(titles_of(rows), rows):
+        maps.setdefault(title, []).append(row)
     return maps
 
 
@@ -114,8 +125,7 @@ def tracks(path):
     names = {str(one["id"]): one["name"] for one in summary["runs"][0]["examined"]["objects"]}
     rows = [["map"] + [title for title, _ in FIGURES] +
             [f"{names.get(one, one)}, {unit}" for one in ids for unit in ("mm", "deg")]]
-    for run in summary["runs"]:
-        title = f"{run['method']}, {run['profile']}"
+    for title, run in zip(titles_of(summary["runs"]), summary["runs"]):
         frames = {int(row["frame"]): row for row in maps[title]}
         row = frames.get(examined, maps[title][-1])
         cells = [title] + [f"{float(row[column]):.3f}" if row[column] else "-" for _, column in FIGURES]

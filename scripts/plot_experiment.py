@@ -27,7 +27,7 @@ matplotlib.rcParams.update({
 import matplotlib.pyplot as plt  # noqa: E402
 import matplotlib.ticker  # noqa: E402
 
-from experiment_text import number, title_of  # noqa: E402
+from experiment_text import frame_lines, number, title_of  # noqa: E402
 from method_rows import method_line, method_styles  # noqa: E402
 
 METHODS = method_styles()
@@ -238,12 +238,7 @@ def plot_frames(results, rows, folder):
     plot = results["plot"]
     panels = Panels(results, len(plot["metrics"]))
     for axes, metric in zip(panels.axes, plot["metrics"]):
-        lines = {}
-        for row in rows:
-            if row[metric] == "":
-                continue
-            label = row["method"] + (", observed neighbours" if row["resampling"] == "observed" else "")
-            lines.setdefault(label, {}).setdefault(int(row["frame"]), []).append(float(row[metric]))
+        lines = frame_lines(results, rows, metric)
         for label, points in lines.items():
             frames = sorted(points)
             panels.line(axes, label, frames, [sum(points[f]) / len(points[f]) for f in frames],

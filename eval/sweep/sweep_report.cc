@@ -107,6 +107,9 @@ std::string MetricText(const ExperimentConfig& config, const SweepMetric& metric
     const MeanFigure& figure = condition.means.at({method, metric.name});
     text += fmt::format("{}{} {}", first ? "" : "; ", method,
                         WithInterval(metric, figure.mean, figure.interval, false));
+    if (figure.count > 0 && figure.count < condition.replicates) {
+      text += fmt::format(" (of {} of {})", figure.count, condition.replicates);
+    }
     first = false;
     const auto paired = condition.paired.find({method, metric.name});
     if (paired == condition.paired.end() || !paired->second.mean_difference.value) continue;
@@ -117,14 +120,25 @@ std::string MetricText(const ExperimentConfig& config, const SweepMetric& metric
       const double larger = *p.superiority.value;
       const double better = metric.better == Better::kHigher ? larger : 1 - larger;
       text += fmt::format(", better in {:.0f} % of {} pairs", 100 * better, p.pairs);
+    } else if (condition.replicates > 1) {
+      text += ", of one pair";
     }
     text += ")";
   }
   return text + ".\n";
 }
 
-// Where a method's figure is not better than the baseline's: the difference's interval, or the one
-// difference, reaches 0.
+// Whether a method's figure is better than the baseline's: the difference's interval, or the one
+// difference, does not reach 0.
+bool IsAhead(const PairedComparison& paired, Better better) {
+  if (!paired.mean_difference.value) return false;
+  const auto& interval = paired.interval.value;
+  return better == Better::kHigher
+             ? (interval ? interval->low : *paired.mean_difference.value) > 0
+             : (interval ? interval->high : *paired.mean_difference.value) < 0;
+}
+
+// The conditions in which a method is not ahead of the baseline, or in which nobody knows.
 std::string NotAhead(const ExperimentConfig& config, const std::vector<Condition>& conditions,
                      const std::vector<std::string>& varied) {
   const SweepMetric& metric = *FindMetric(config.metrics.front());
@@ -133,16 +147,13 @@ std::string NotAhead(const ExperimentConfig& config, const std::vector<Condition
   for (const Condition& condition : conditions) {
     for (const std::string& method : condition.methods) {
       const auto paired = condition.paired.find({method, metric.name});
-      if (paired == condition.paired.end() || !paired->second.mean_difference.value) continue;
-      const PairedComparison& p = paired->second;
-      const double worst =
-          metric.better == Better::kHigher
-              ? (p.interval.value ? p.interval.value->low : *p.mean_difference.value)
-              : -(p.interval.value ? p.interval.value->high : *p.mean_difference.value);
+      if (paired == condition.paired.end()) continue;
       ++asked[method];
+      if (IsAhead(paired->second, metric.better)) continue;
       std::string text = ConditionText(condition, varied, config.grids.size() > 1);
       if (text.empty()) text = "in its one condition";
-      if (worst <= 0) where[method].push_back(text);
+      if (!paired->second.mean_difference.value) text += " (undefined)";
+      where[method].push_back(text);
     }
   }
   std::string text;

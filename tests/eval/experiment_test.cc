@@ -7,6 +7,7 @@
 
 #include "eval/sweep/cell.h"
 #include "eval/sweep/sweep.h"
+#include "eval/sweep/sweep_report.h"
 #include "eval/sweep/sweep_statistics.h"
 
 namespace tsdfpp {
@@ -270,6 +271,14 @@ TEST(Experiment, ACellIsNamedAfterAllThatDeterminesIt) {
   EXPECT_EQ(MakeCell(renamed, variant, "p", "r").id, cell.id);
 }
 
+// Of an experiment of kGood, with one metric.
+void AddCell(SweepResult& result, const CellSettings& settings, std::optional<double> value) {
+  CellResult cell;
+  cell.examined.assign(SweepMetrics().size(), Measured::Undefined("not asked"));
+  cell.examined[0] = value ? Measured::Of(*value) : Measured::Undefined("nothing hidden");
+  result.entries.push_back({"1", MakeCell(settings, SequenceVariant{}, "p", "r"), cell});
+}
+
 // Two methods on three seeds, one value of one method undefined: means over what is there, pairs
 // where both are; checked by hand.
 TEST(Experiment, ComparesPairByPair) {
@@ -277,16 +286,12 @@ TEST(Experiment, ComparesPairByPair) {
   auto config = Parse(kGood);
   ASSERT_TRUE(config.has_value());
   result.config = *config;
-  const SequenceVariant variant;
   const auto add = [&](const char* method, std::uint64_t seed, std::optional<double> value) {
     CellSettings settings;
     settings.scene = "mini.toml";
     settings.method = method;
     settings.seed = seed;
-    CellResult cell;
-    cell.examined.assign(SweepMetrics().size(), Measured::Undefined("not asked"));
-    cell.examined[0] = value ? Measured::Of(*value) : Measured::Undefined("nothing hidden");
-    result.entries.push_back({"1", MakeCell(settings, variant, "p", "r"), cell});
+    AddCell(result, settings, value);
   };
   add("tsdf", 1, 0.5);
   add("tsdf", 2, 0.6);
@@ -313,6 +318,44 @@ TEST(Experiment, ComparesPairByPair) {
   EXPECT_FALSE(condition.paired.contains({"tsdf", metric}));
   const std::string other = SweepMetrics()[1].name;
   EXPECT_EQ(condition.means.at({"tsdf", other}).mean.why_not, "not asked");
+}
+
+// Three seeds in three profiles. In `paper` one value of tsdf++ is undefined, in `close` all but
+// one, in `fine` all of both: there nobody knows who is ahead.
+TEST(Experiment, TheTextSaysOfHowManyAMeanIsAndWhereNobodyKnows) {
+  SweepResult result;
+  auto config = Parse(kGood);
+  ASSERT_TRUE(config.has_value());
+  result.config = *config;
+  const auto add = [&](const char* profile, const char* method,
+                       const std::vector<std::optional<double>>& values) {
+    CellSettings settings;
+    settings.profile = profile;
+    settings.method = method;
+    for (const std::optional<double>& value : values) {
+      ++settings.seed;
+      AddCell(result, settings, value);
+    }
+  };
+  add("paper", "tsdf", {0.5, 0.6, 0.1});
+  add("paper", "tsdf++", {0.9, 0.8, std::nullopt});
+  add("close", "tsdf", {0.5, 0.4, 0.3});
+  add("close", "tsdf++", {0.49, std::nullopt, std::nullopt});
+  add("fine", "tsdf", {std::nullopt, std::nullopt, std::nullopt});
+  add("fine", "tsdf++", {std::nullopt, std::nullopt, std::nullopt});
+  const std::string text = SweepText(result, ConditionsOf(result));
+  EXPECT_NE(text.find(" (of 2 of 3) ("), std::string::npos) << text;
+  EXPECT_NE(text.find("tsdf++ 0.490 (of 1 of 3) (-0.010 to tsdf, of one pair)."), std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("(of 3 of 3)"), std::string::npos) << text;
+  EXPECT_NE(text.find("tsdf++ is not ahead of tsdf in hidden table kept (2 of 3): profile close; "
+                      "profile fine (undefined).\n"),
+            std::string::npos)
+      << text;
+  // Of those that nobody can compare none is ahead.
+  result.entries.erase(result.entries.begin(), result.entries.end() - 6);
+  const std::string unknown = SweepText(result, ConditionsOf(result));
+  EXPECT_EQ(unknown.find("everywhere"), std::string::npos) << unknown;
 }
 
 }  // namespace
