@@ -26,11 +26,9 @@ def targets_of(lines_program):
 
 
 def add_runs(folder, entry):
-    """What is in runs.tsv, which then counts as taken: counted.tsv."""
+    """Adds what is in runs.tsv, and returns it."""
     runs = folder / "runs.tsv"
-    if not runs.exists():
-        return
-    text = runs.read_text()
+    text = runs.read_text() if runs.exists() else ""
     for line in text.splitlines():
         _, seconds, executions, edges, features, find = (int(word) for word in line.split("\t"))
         for name, value in zip(SUMS, (seconds, executions, find)):
@@ -39,9 +37,21 @@ def add_runs(folder, entry):
         if executions > 0:
             entry["edges"] = max(edges, entry.get("edges", 0))
             entry["features"] = max(features, entry.get("features", 0))
+    return text
+
+
+def take_runs(folder, text):
+    """What is in the record counts as taken: counted.tsv. A run that ended meanwhile stays."""
+    if not text:
+        return
+    runs = folder / "runs.tsv"
     with open(folder / "counted.tsv", "a") as counted:
         counted.write(text)
-    runs.unlink()
+    later = runs.read_text()[len(text):]
+    if later:
+        runs.write_text(later)
+    else:
+        runs.unlink()
 
 
 def lines_of(program, target, sources, inputs):
@@ -72,12 +82,13 @@ def record(options):
     program = pathlib.Path(options.build) / "tsdfpp_fuzz_lines"
     targets = targets_of(program)
     chosen = options.targets.split(",") if options.targets else list(targets)
+    taken = {}
     for target in chosen:
         if target not in targets:
             sys.exit(f"fuzz.py: there is no target '{target}'")
         entry = entries.setdefault(target, {name: 0 for name in SUMS})
         folder = pathlib.Path(options.out) / target
-        add_runs(folder, entry)
+        taken[folder] = add_runs(folder, entry)
         kept = [ROOT / "tests" / "fuzz" / kind / target for kind in ("corpus", "crashes")]
         inputs = [path for path in (*kept, folder / "corpus") if path.is_dir()]
         grown = sum(1 for path in inputs for _ in path.iterdir())
@@ -86,7 +97,12 @@ def record(options):
     for gone in set(entries) - set(targets):
         del entries[gone]
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps({"schema": 1, "targets": dict(sorted(entries.items()))}, indent=1) + "\n")
+    # The runs are taken last: whatever ends the program before leaves them for the next time.
+    beside = file.with_name(file.name + ".new")
+    beside.write_text(json.dumps({"schema": 1, "targets": dict(sorted(entries.items()))}, indent=1) + "\n")
+    beside.replace(file)
+    for folder, text in taken.items():
+        take_runs(folder, text)
 
 
 def table(options):
