@@ -182,7 +182,7 @@ std::string CommandText(const CompareArguments& options, const std::string& pose
   const CompareConfig& config = options.config;
   std::string command = fmt::format(
       "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
-      "--until {}{}",
+      "--until {}{}{}",
       TextOf(options.source), options.out, options.methods, options.profiles, pose_names,
       config.map.voxel_m, config.every, config.until, config.keep_meshes ? " --keep-meshes" : "",
       config.record ? " --record" : "");

@@ -77,6 +77,16 @@ TEST_F(CompareTracking, SaysWhatIsTracked) {
   EXPECT_EQ(command_.find("--track"), std::string::npos) << command_;
 }
 
+TEST_F(CompareTracking, TheCommandHasWhatIsKept) {
+  const auto ends = [&](const std::vector<std::string>& more, const std::string& words) {
+    Compared(more, "1");
+    EXPECT_TRUE(command_.ends_with(" --until 1" + words)) << command_;
+  };
+  ends({}, "");
+  ends({"--record"}, " --record");
+  ends({"--record", "--keep-meshes"}, " --keep-meshes --record");
+}
+
 // One frame is enough to confirm a label where the settings say so.
 TEST_F(CompareTracking, SettingsReachTheRepair) {
   EXPECT_EQ(Compared({"--mask-repair", "on"}, "1")["map"]["blocks"], 0);
