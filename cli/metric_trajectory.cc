@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "cli/metric.h"
@@ -79,6 +80,14 @@ Expected<TrajectoryOptions> MeasureOf(const MetricTrajectoryArguments& options) 
   for (const std::string& word : words) {
     TSDFPP_ASSIGN(const RelativeDelta delta, DeltaFromText(word, options.all_pairs));
     measure.deltas.push_back(delta);
+  }
+  const bool any_overlap =
+      std::any_of(measure.deltas.begin(), measure.deltas.end(),
+                  [](const RelativeDelta& delta) { return delta.overlapping; });
+  if (options.all_pairs && !any_overlap) {
+    return UsageError(
+        "--all-pairs: --delta '{}' has no stretch of frames, expected one at least, as in 10f",
+        options.deltas);
   }
   return measure;
 }

@@ -92,6 +92,11 @@ TEST_F(Metric, TrajectoryRefusesWhatItCannotUse) {
     ExpectError({"trajectory", truth, truth, fmt::format("--delta={}", delta)}, kUsage,
                 {"--delta"});
   }
+  for (const char* delta : {"0.2m", "1s", "0.2m,1s"}) {
+    ExpectError({"trajectory", truth, truth, "--delta", delta, "--all-pairs"}, kUsage,
+                {"--all-pairs", fmt::format("'{}' has no stretch of frames", delta)});
+  }
+  Json({"trajectory", truth, truth, "--delta", "0.2m,1f", "--all-pairs"});
   // Too short for an alignment: null with a reason.
   const auto json = Json({"trajectory", truth, truth, "--align", "se3", "--delta", "5f"});
   EXPECT_TRUE(json["ape"]["translation_m"]["value"].is_null());
