@@ -46,6 +46,18 @@ TEST(SweepMetrics, ADefinitionDoesNotPointAtAnother) {
   }
 }
 
+// Of four times the two in the middle count, not the lower of them alone.
+TEST(SweepMetrics, AStepsMedianIsAMedian) {
+  RunTimes times;
+  times.fuse_s = {0.008, 0.001, 0.004, 0.002};
+  const auto fuse_ms = [&] {
+    return MeasureAll({}, {}, {times, {}, std::nullopt})[MetricIndex("fuse_ms")].value.value();
+  };
+  EXPECT_DOUBLE_EQ(fuse_ms(), 3);
+  times.fuse_s.push_back(0.005);
+  EXPECT_DOUBLE_EQ(fuse_ms(), 4);
+}
+
 // What is lost has no distance; what nobody tells apart is not the moving object's.
 TEST(SweepMetrics, TheMoversDistanceIsOfThoseThatAreThere) {
   Evaluation evaluation;
