@@ -126,11 +126,17 @@ Expected<void> ReportRecorder::WriteStill(const std::string& name, int frame,
 }
 
 nlohmann::json ReportRecorder::AddMesh(const TriangleMesh& mesh, const VertexMeasures& measures) {
-  const PackedMesh packed = Pack(mesh, measures, grid_);
-  return {{"vertices", packed.vertices},
-          {"triangles", packed.triangles},
-          {"vertex_bytes", Add(packed.vertex_bytes)},
-          {"index_bytes", Add(packed.index_bytes)}};
+  // The recording's grid is fixed before anything is mapped, around the first true surface.
+  const Eigen::AlignedBox3f box = BoundsOf(mesh);
+  const bool is_inside = Holds(grid_, box);
+  const PositionGrid grid = is_inside ? grid_ : GridAround(box);
+  const PackedMesh packed = Pack(mesh, measures, grid);
+  nlohmann::json chunk{{"vertices", packed.vertices},
+                       {"triangles", packed.triangles},
+                       {"vertex_bytes", Add(packed.vertex_bytes)},
+                       {"index_bytes", Add(packed.index_bytes)}};
+  if (!is_inside) chunk["grid"] = GridJson(grid);
+  return chunk;
 }
 
 void ReportRecorder::AddChunks(const TriangleMesh& mesh, const char* layer, std::size_t triangles,
@@ -276,12 +282,13 @@ nlohmann::json ReportRecorder::TruthJson() {
     const bool still = !result_.truth->moved().contains(model.info.id);
     TriangleMesh mesh = Decimate(model.mesh_O, kTruthTriangles);
     // What moves stays in its own frame, on a grid of its own.
-    const PositionGrid grid = still ? grid_ : GridAround(BoundsOf(mesh));
     if (still) {
       for (Eigen::Vector3f& p : mesh.vertices) {
         p = (result_.truth->T_WO(i) * p.cast<double>()).cast<float>();
       }
     }
+    const Eigen::AlignedBox3f box = BoundsOf(mesh);
+    const PositionGrid grid = still && Holds(grid_, box) ? grid_ : GridAround(box);
     const PackedMesh packed = Pack(mesh, {}, grid);
     truth.push_back({{"id", model.info.id},
                      {"vertices", packed.vertices},

@@ -93,6 +93,12 @@ PositionGrid GridAround(const Eigen::AlignedBox3f& box) {
   return grid;
 }
 
+bool Holds(const PositionGrid& grid, const Eigen::AlignedBox3f& box) {
+  const Eigen::AlignedBox3f whole(grid.origin,
+                                  grid.origin + Eigen::Vector3f::Constant(kSteps * grid.step_m));
+  return whole.contains(box);
+}
+
 RemovalLayers CutByRemoval(const TriangleMesh& scene_W, const TriangleMesh& revealed_W,
                            const std::vector<InstanceId>& movers) {
   RemovalLayers layers{VerticesOf(scene_W), VerticesOf(scene_W), VerticesOf(revealed_W)};

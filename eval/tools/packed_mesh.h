@@ -19,6 +19,9 @@ struct PositionGrid {
 // A grid that holds `box` and a metre around it.
 PositionGrid GridAround(const Eigen::AlignedBox3f& box);
 
+// Whether all of the box is on the grid.
+bool Holds(const PositionGrid& grid, const Eigen::AlignedBox3f& box);
+
 // What a page shows of a vertex besides its place and colour, in its own steps.
 struct VertexMeasures {
   std::vector<std::uint8_t> error;

@@ -67,6 +67,20 @@ TEST(PackedMesh, ComesBackWithinHalfAStepWithItsColoursAndMeasures) {
   EXPECT_NEAR(AreaOf(back, grid), SurfaceArea(sheet), 1e-3 * SurfaceArea(sheet));
 }
 
+TEST(PackedMesh, AGridHoldsWhatItWasMadeFor) {
+  const Eigen::AlignedBox3f box(Eigen::Vector3f(-1, 2, 0), Eigen::Vector3f(3, 2.5F, 0.1F));
+  const PositionGrid grid = GridAround(box);
+  EXPECT_TRUE(Holds(grid, box));
+  EXPECT_TRUE(Holds(grid, {}));  // nothing
+  for (const float far : {2.0F, 8.0F}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3f by = far * Eigen::Vector3f::Unit(axis);
+      EXPECT_FALSE(Holds(grid, {box.min() - by, box.max()}));
+      EXPECT_EQ(Holds(grid, {box.min(), box.max() + by}), axis > 0 && far == 2) << axis;
+    }
+  }
+}
+
 TEST(PackedMesh, DecimationKeepsTheBorderAndThePlane) {
   const TriangleMesh sheet = Sheet(40, 0.02F, 1);
   const TriangleMesh small = Decimate(sheet, 400);

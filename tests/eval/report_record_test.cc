@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/videoio.hpp>
 
@@ -14,6 +15,7 @@
 #include "eval/run/open_source.h"
 #include "tests/core/temp_folder.h"
 #include "tests/eval/unpacked_mesh.h"
+#include "tests/sequence/box_source.h"
 
 namespace tsdfpp {
 namespace {
@@ -143,6 +145,73 @@ TEST(RecordedComparison, HoldsEachMapWithinItsTrianglesAndTheHoleOfTheScore) {
   ASSERT_FALSE(broken.has_value());
   EXPECT_EQ(broken.error().kind, ErrorKind::kData);
   EXPECT_FALSE(std::filesystem::exists(folder / "other.mp4"));
+}
+
+// As in others' sets: models of the objects, none of the room.
+class SourceWithoutBackground : public test::BoxSource {
+ public:
+  using BoxSource::BoxSource;
+  Expected<std::vector<TrueModel>> Truth() override {
+    TSDFPP_ASSIGN(std::vector<TrueModel> models, BoxSource::Truth());
+    models.erase(models.begin());
+    return models;
+  }
+};
+
+// Heights in the world, z, of a recorded mesh.
+std::vector<float> HeightsOf(const Recording& record, const json& chunk) {
+  const auto slice = [&](const char* name) {
+    return record.bytes.substr(chunk[name][0].get<std::size_t>(),
+                               chunk[name][1].get<std::size_t>());
+  };
+  const json& grid = chunk.contains("grid") ? chunk["grid"] : record.json["grid"];
+  std::vector<float> heights_m;
+  for (const PackedVertex& vertex :
+       Unpack(slice("vertex_bytes"), chunk["vertices"].get<std::size_t>(), slice("index_bytes"),
+              chunk["triangles"].get<std::size_t>())
+           .vertices) {
+    heights_m.push_back(grid["origin_m"][2].get<float>() +
+                        grid["step_m"].get<float>() * static_cast<float>(vertex.position[2]));
+  }
+  return heights_m;
+}
+
+// The wall lies half a metre behind what a grid around the first object holds, and so does that
+// object, where it stands.
+TEST(RecordedComparison, WithoutATrueBackgroundTheMapStaysWhereItIs) {
+  const TempFolder folder;
+  SourceWithoutBackground source(7);
+  CompareConfig config;
+  config.methods = {Method::kTsdfpp};
+  config.profiles = {"close"};
+  config.map.voxel_m = 0.03;
+  config.every = 4;
+  config.record = true;
+  const auto result = RunCompare(source, config, folder.path(), "the command", {});
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  const auto recording = ReadRecording(folder.path());
+  ASSERT_TRUE(recording.has_value()) << recording.error().message;
+  const Recording& record = recording->value();
+  constexpr float kWall_m = 1.5F;
+  int on_wall = 0;
+  int vertices = 0;
+  for (const json& key : record.json["runs"][0]["key_frames"]) {
+    for (const json& chunk : key["chunks"]) {
+      if (chunk["id"] != kBackground) continue;
+      for (const float z_m : HeightsOf(record, chunk)) {
+        ++vertices;
+        on_wall += static_cast<int>(std::abs(z_m - kWall_m) < config.map.voxel_m);
+      }
+    }
+  }
+  EXPECT_GT(vertices, 100);
+  EXPECT_GT(on_wall, 0.9 * vertices);  // the rest is at the boxes' outlines
+  const json& left = record.json["truth"][0];
+  ASSERT_EQ(left["id"], 3);
+  const std::vector<float> heights_m = HeightsOf(record, left);
+  const auto [nearest, farthest] = std::minmax_element(heights_m.begin(), heights_m.end());
+  constexpr float kMiddle_m = 1.2F;
+  EXPECT_NEAR((*nearest + *farthest) / 2, kMiddle_m, 1e-3);
 }
 
 TEST(ReportVideo, ACutFileIsNone) {

@@ -108,7 +108,7 @@ export class View3d {
     frames.set(frame, group);
     group.userData = { chunks: [], truth: [], frame };
     for (const chunk of key?.chunks ?? []) {
-      const object = makeChunk(await run.recording.mesh(chunk), chunk, run.recording);
+      const object = makeChunk(await run.recording.mesh(chunk, chunk.grid), chunk, run.recording);
       group.userData.chunks.push(object);
       group.add(object);
     }
