@@ -2,6 +2,8 @@
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { learnMetrics } from './measures.js';
 
+const kBackground = 0;  // its id
+
 function bytesOf(base64) {
   const text = atob(base64.trim());
   const bytes = new Uint8Array(text.length);
@@ -86,11 +88,12 @@ function nameOf(run, several, letter) {
 }
 
 // The run's rows of frames.csv. Its six digits can round twice where the page rounds again, so the hole
-// of the examined frame is the summary's.
+// of the examined frame is the summary's: that of the background, which comes first where there is a true one.
 function rowsOf(report, run) {
   const rows = report.csv.rows.filter((row) => row.method === run.method && row.profile === run.profile &&
                                                row.poses === run.poses);
-  const exact = measured(run.examined?.objects?.[0]?.hole_area_cm2);
+  const first = run.examined?.objects?.[0];
+  const exact = first?.id === kBackground ? measured(first.hole_area_cm2) : null;
   return rows.map((row) => (row.frame === run.examined?.frame && exact !== null
     ? { ...row, table_hole_area_cm2: exact } : row));
 }

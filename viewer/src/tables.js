@@ -103,6 +103,14 @@ function tracksTable(data) {
   ], rows)];
 }
 
+// What a metric says of two reports, each a value or null where it is undefined.
+function comparedWord(x, y, measure, reports) {
+  if (y === null) return `only in ${reports[0].letter}`;
+  if (x === null) return `only in ${reports[1].letter}`;
+  if (Math.abs(y - x) < 0.5 * 10 ** -measure.decimals) return 'same';
+  return (y - x) * measure.better > 0 ? 'better' : 'worse';
+}
+
 // A row a map that both reports have: the first, the second, and the difference.
 function comparedTable(data) {
   if (data.reports.length < 2) return null;
@@ -116,8 +124,7 @@ function comparedTable(data) {
       const measure = measureOf(column);
       const change = x === null || y === null ? null : y - x;
       rows.push([a.title, measure.title, textOf(x, measure), textOf(y, measure), change,
-        change === null || Math.abs(change) < 0.5 * 10 ** -measure.decimals ? 'same'
-          : change * measure.better > 0 ? 'better' : 'worse']);
+        comparedWord(x, y, measure, data.reports)]);
     }
   }
   const [a, b] = data.reports;

@@ -86,6 +86,27 @@ function makeRuns() {
   command('report', run, '--compare', plain, '--out', join(folder, 'both.html'));
   makeMore(run);
   makeOther(run);
+  makeUnknown(run);
+}
+
+// A run of which no true background is known, as of others' sets, compared with the run both ways round. The hole of its
+// first object is none in the table.
+function makeUnknown(run) {
+  const unknown = join(folder, 'unknown');
+  cpSync(run, unknown, { recursive: true });
+  const [head, ...lines] = readFileSync(join(run, 'frames.csv'), 'utf8').trim().split('\n');
+  const isOfTable = head.split(',').map((column) => column.startsWith('table_'));
+  const emptied = lines.map((line) => line.split(',').map((cell, i) => (isOfTable[i] ? '' : cell)).join(','));
+  writeFileSync(join(unknown, 'frames.csv'), [head, ...emptied].join('\n') + '\n');
+  const summary = JSON.parse(readFileSync(join(unknown, 'summary.json'), 'utf8'));
+  summary.runs.forEach(({ examined }) => { examined.objects.shift(); examined.objects[0].hole_area_cm2 = 7.5; });
+  writeFileSync(join(unknown, 'summary.json'), JSON.stringify(summary));
+  const note = JSON.parse(readFileSync(join(unknown, 'run.json'), 'utf8'));
+  note.files.forEach((file) => { file.bytes = null; });
+  writeFileSync(join(unknown, 'run.json'), JSON.stringify(note));
+  command('report', unknown);
+  command('report', run, '--compare', unknown, '--out', join(folder, 'run-unknown.html'));
+  command('report', unknown, '--compare', run, '--out', join(folder, 'unknown-run.html'));
 }
 
 // A run of other key frames beside the run; it has an object that is nobody's, and much to be said of it.
@@ -393,6 +414,29 @@ test('two comparisons stand beside each other', async (browser) => {
   assert.ok(words.length > 10 && words.every((word) => word === 'same'));
   return page;
 });
+
+test('where no true background is known there is no hole in the table', async (browser) => {
+  const page = await open(browser, report('unknown'));
+  const heads = await page.locator('[data-table="figures"] thead button').allTextContents();
+  const hole = heads.findIndex((head) => head.startsWith('Hole in the table'));
+  assert.ok(hole > 0, `${heads}`);
+  const cells = await page.locator('[data-table="figures"] tbody tr').evaluateAll(
+    (all, at) => all.map((row) => row.children[at].textContent), hole);
+  assert.deepEqual(cells, ['–', '–']);
+  return page;
+});
+
+for (const [file, has, lacks, word] of [['run-unknown', 2, 3, 'only in A'], ['unknown-run', 3, 2, 'only in B']]) {
+  test(`a figure that one comparison has is ${word}`, async (browser) => {
+    const page = await open(browser, join(folder, `${file}.html`));
+    const rows = await page.locator('[data-table="compared"] tbody tr').evaluateAll(
+      (all) => all.map((row) => [...row.children].map((cell) => cell.textContent)));
+    const one = rows.filter((row) => row[lacks] === '–');
+    assert.ok(one.length > 3 && one.every((row) => row[has] !== '–' && row[5] === word), JSON.stringify(one));
+    assert.ok(rows.filter((row) => row[lacks] !== '–').every((row) => row[5] === 'same'));
+    return page;
+  });
+}
 
 test('a metric has the unit, the digits and the direction of its row', async (browser) => {
   const page = await open(browser, join(folder, 'other.html'));
