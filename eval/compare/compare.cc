@@ -125,6 +125,11 @@ void DropMeshes(Evaluation& evaluation) {
   evaluation.table_reconstructed = {};
 }
 
+// Drops what is of later frames.
+void EndAt(int last_frame, Trajectory& trajectory) {
+  trajectory.erase(trajectory.upper_bound(last_frame), trajectory.end());
+}
+
 // Where no map and no adapter is left.
 Error NothingLeft(const CompareResult& result) {
   const FailedRun& first = result.failed.front();
@@ -234,11 +239,13 @@ class FrameWalk {
 
   // Scores the adapters' trajectories and writes figures and recording.
   Expected<void> Finish() {
+    std::map<InstanceId, Trajectory> truth = result_.truth->trajectories();
+    for (auto& [id, trajectory] : truth) EndAt(result_.last_frame, trajectory);
     for (const auto& run : result_.adapters) {
-      ScoreAdapterTrajectories(*run, names_, *result_.truth, result_.camera);
+      ScoreAdapterTrajectories(*run, names_, truth, result_.camera);
     }
     // Figures and the recording are of all frames that were planned, or not at all.
-    if (result_.stopped) return {};
+    if (result_.stopped) return recorder_ ? recorder_->Discard() : Expected<void>{};
     TSDFPP_RETURN_IF_ERROR(Guarded([&] { return pictures_.Finish(); }));
     if (recorder_) TSDFPP_RETURN_IF_ERROR(Guarded([&] { return recorder_->Write(); }));
     return {};
@@ -293,6 +300,7 @@ class FrameWalk {
                                              run.last_seen));
     Evaluation& evaluation = run.evaluations.back();
     run.times.mesh_s.push_back(evaluation.mesh_s);
+    run.TakeNotes();
     TSDFPP_RETURN_IF_ERROR(pictures_.Take(&run, evaluation, frame));
     if (recorder_) TSDFPP_RETURN_IF_ERROR(recorder_->Take(run, evaluation, frame));
     const bool examined = index == result_.reveal_frame.value_or(result_.last_frame);
@@ -336,6 +344,7 @@ class FrameWalk {
     const int seen = LastEvaluated(result_);
     if (seen < result_.info.first_index) return tl::unexpected(*result_.stopped);
     result_.last_frame = seen;
+    EndAt(seen, result_.camera);
     if (result_.reveal_frame && *result_.reveal_frame > seen) result_.reveal_frame.reset();
     return {};
   }

@@ -4,7 +4,9 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "eval/adapters/adapter.h"
@@ -56,6 +58,15 @@ bool IdsAreObjects(const CompareConfig& config, const SequenceInfo& info);
 // What the config says; else by votes where ids of segments are of one frame alone.
 AssociationMode AssociationOf(const CompareConfig& config, const SequenceInfo& info);
 
+// What is known of a run besides its scores, until its last evaluation: later frames do not count.
+struct RunNotes {
+  RunTimes times;
+  CameraLog camera;
+  std::map<InstanceId, Trajectory> trajectories;  // by the map's ids
+  nlohmann::json matched_ids;                     // with votes
+  std::int64_t process_growth_bytes = 0;
+};
+
 // One map of the comparison.
 struct CompareRun {
   CompareRun(const PipelineConfig& config, std::string profile_name,
@@ -70,6 +81,11 @@ struct CompareRun {
   RunTimes times;
   std::int64_t process_growth_bytes = 0;  // of resident memory while this map worked
   std::vector<Evaluation> evaluations;    // meshes kept only where pictures need them
+  std::vector<MapMemory> memory;          // at each of them
+  RunNotes notes;
+
+  // Takes down the map's size and the notes, at each evaluation.
+  void TakeNotes();
 
   // The map's id of a true object, kNoInstance where it has none.
   InstanceId IdOf(InstanceId object) const {

@@ -84,12 +84,12 @@ Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const 
 }
 
 void ScoreAdapterTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
-                              const SceneTruth& truth, const Trajectory& camera) {
+                              const std::map<InstanceId, Trajectory>& truth,
+                              const Trajectory& camera) {
   const std::filesystem::path folder = run.folder / "trajectories";
   std::error_code ignored;
   if (run.failure || run.matches.empty() || !std::filesystem::exists(folder, ignored)) return;
-  auto scores =
-      EvaluateTrajectories(folder, names, run.matches.back(), truth.trajectories(), camera);
+  auto scores = EvaluateTrajectories(folder, names, run.matches.back(), truth, camera);
   if (scores) {
     run.trajectories = std::move(*scores);
   } else {

@@ -19,9 +19,10 @@ Expected<AdapterTask> TaskForAdapters(const CompareResult& result);
 Expected<void> RunAdapters(FrameSource& source, const AdapterTask& given, const RunFolder& folder,
                            CompareResult& result);
 
-// Scores what an adapter wrote of its trajectories, if anything; `camera` is the true one. What is
-// wrong with them is the adapter's failure.
+// Scores what an adapter wrote of its trajectories, if anything, against those of `truth` and the
+// true `camera`. What is wrong with them is the adapter's failure.
 void ScoreAdapterTrajectories(AdapterRun& run, const std::vector<ObjectInfo>& names,
-                              const SceneTruth& truth, const Trajectory& camera);
+                              const std::map<InstanceId, Trajectory>& truth,
+                              const Trajectory& camera);
 
 }  // namespace tsdfpp

@@ -61,7 +61,7 @@ nlohmann::json PairedDifferences(const CompareResult& result, const CompareRun& 
 nlohmann::json CameraJson(const CompareResult& result, const CompareRun& run) {
   nlohmann::json camera{{"source", CameraSourceName(run.config.camera)}};
   if (run.config.camera == CameraSource::kGiven) return camera;
-  const CameraLog& log = run.pipeline.camera_log();
+  const CameraLog& log = run.notes.camera;
   camera["located"] = log.located;
   camera["carried_on"] = log.carried_on;
   camera["lost"] = log.lost;
@@ -82,10 +82,9 @@ nlohmann::json TrackedJson(const CompareRun& run) {
 nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run) {
   nlohmann::json trajectories;
   for (const InstanceId id : result.truth->moved()) {
-    const auto estimate = run.pipeline.trajectories().find(run.IdOf(id));
+    const auto estimate = run.notes.trajectories.find(run.IdOf(id));
     const auto truth = result.truth->trajectories().find(id);
-    if (estimate == run.pipeline.trajectories().end() ||
-        truth == result.truth->trajectories().end()) {
+    if (estimate == run.notes.trajectories.end() || truth == result.truth->trajectories().end()) {
       continue;
     }
     const auto first =
@@ -94,7 +93,7 @@ nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run
     // Where the camera is given, both of its poses are the true one.
     Pose T_WC_estimate = Pose::Identity();
     Pose T_WC_truth = Pose::Identity();
-    const auto& located = run.pipeline.camera_log().T_WC;
+    const auto& located = run.notes.camera.T_WC;
     if (first != estimate->second.end() && located.contains(first->first)) {
       T_WC_estimate = located.at(first->first);
       T_WC_truth = result.camera.at(first->first);
@@ -108,7 +107,7 @@ nlohmann::json TrajectoryJson(const CompareResult& result, const CompareRun& run
 
 nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
   const MapConfig& map = run.config.map;
-  const MapMemory memory = run.pipeline.map().Memory();
+  const MapMemory& memory = ExaminedMemory(result, run);
   nlohmann::json evaluations = nlohmann::json::array();
   for (const Evaluation& evaluation : run.evaluations) evaluations.push_back(ToJson(evaluation));
   return {{"title", run.Title()},
@@ -142,9 +141,9 @@ nlohmann::json RunJson(const CompareResult& result, const CompareRun& run) {
           {"examined", ToJson(Examined(result, run))},
           {"difference_to_tsdf", PairedDifferences(result, run)},
           {"trajectories", TrajectoryJson(result, run)},
-          {"times", run.times.ToJson()},
+          {"times", run.notes.times.ToJson()},
           {"map", {{"blocks", memory.blocks}, {"bytes", memory.bytes}}},
-          {"process_growth_bytes", run.process_growth_bytes},
+          {"process_growth_bytes", run.notes.process_growth_bytes},
           {"evaluations", evaluations}};
 }
 
@@ -228,7 +227,7 @@ nlohmann::json SummaryJson(const CompareResult& result, const std::string& comma
   for (const auto& run : result.runs) {
     runs.push_back(RunJson(result, *run));
     if (run->config.associate == AssociationMode::kVotes) {
-      runs.back()["matched_ids"] = run->matching.ToJson();
+      runs.back()["matched_ids"] = run->notes.matched_ids;
     }
     const std::vector<std::string> remarks = run->pipeline.Remarks();
     if (!remarks.empty()) runs.back()["remarks"] = remarks;

@@ -24,6 +24,12 @@ CompareRun::CompareRun(const PipelineConfig& pipeline_config, std::string profil
       pipeline(config, objects),
       last_seen(MakeLastSeenStores(truth)) {}
 
+void CompareRun::TakeNotes() {
+  memory.push_back(pipeline.map().Memory());
+  notes = {times, pipeline.camera_log(), pipeline.trajectories(), nullptr, process_growth_bytes};
+  if (config.associate == AssociationMode::kVotes) notes.matched_ids = matching.ToJson();
+}
+
 std::string CompareRun::Title() const {
   std::string_view segments;
   if (config.segmentation == Segmentation::kDepth) segments = ", segments of depth";

@@ -75,6 +75,10 @@ const Evaluation& Examined(const CompareResult& result, const CompareRun& run) {
   return Examined(result, run.evaluations);
 }
 
+const MapMemory& ExaminedMemory(const CompareResult& result, const CompareRun& run) {
+  return run.memory[static_cast<std::size_t>(&Examined(result, run) - run.evaluations.data())];
+}
+
 // "open3d (any label)" where it tells no objects apart.
 std::string TitleOf(const AdapterRun& run) {
   return run.config.name + (run.evaluations.back().labelled ? "" : " (any label)");
@@ -94,12 +98,12 @@ std::vector<std::vector<std::string>> TableRows(const CompareResult& result, Tim
       row.push_back(ColumnText(column, result.movers, evaluation));
     }
     if (timed) {
-      const nlohmann::json spread = run->times.ToJson();
+      const nlohmann::json spread = run->notes.times.ToJson();
       row.push_back(fmt::format("{:.1f}", MedianMs(spread["update_poses"])));
       row.push_back(fmt::format("{:.1f}", MedianMs(spread["fuse"])));
     }
     row.push_back(
-        fmt::format("{:.0f}", static_cast<double>(run->pipeline.map().Memory().bytes) / 1e6));
+        fmt::format("{:.0f}", static_cast<double>(ExaminedMemory(result, *run).bytes) / 1e6));
     rows.push_back(std::move(row));
   }
   for (const auto& run : result.adapters) {

@@ -12,6 +12,9 @@ namespace tsdfpp {
 const Evaluation& Examined(const CompareResult& result, const std::vector<Evaluation>& evaluations);
 const Evaluation& Examined(const CompareResult& result, const CompareRun& run);
 
+// The map's size at that frame.
+const MapMemory& ExaminedMemory(const CompareResult& result, const CompareRun& run);
+
 // "open3d", or "open3d (any label)" where it tells no objects apart. It must have evaluations.
 std::string TitleOf(const AdapterRun& run);
 

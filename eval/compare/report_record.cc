@@ -331,6 +331,14 @@ nlohmann::json ReportRecorder::ObjectsJson() const {
   return objects;
 }
 
+Expected<void> ReportRecorder::Discard() const {
+  std::error_code failure;
+  std::filesystem::remove_all(out_ / "record", failure);
+  if (!failure) return {};
+  return EnvironmentError("{} cannot be removed: {}", (out_ / "record").string(),
+                          failure.message());
+}
+
 Expected<void> ReportRecorder::Write() {
   if (failure_) return tl::unexpected(*failure_);
   for (std::size_t r = 0; r < runs_.size(); ++r) {

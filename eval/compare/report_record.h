@@ -40,6 +40,10 @@ class ReportRecorder {
   // Drops a map that failed, before it leaves the result's runs.
   void Forget(const CompareRun& run);
 
+  // Removes what was written: frames that ended early have no recording. Errors: kEnvironment where
+  // the disk refuses.
+  Expected<void> Discard() const;
+
   // The rest: record.json, record.bin. Errors: kEnvironment where the disk refuses.
   Expected<void> Write();
 

@@ -81,7 +81,7 @@ const std::vector<RunMetric>& RunMetrics() {
         "median wall-clock time of the visible scene's mesh"},
        median("mesh_scene")},
       {{"map_mb", "MB", "size of the map", "MB", Better::kLower, 1,
-        "bytes of the map's blocks and tables at the end"},
+        "bytes of the map's blocks and tables at the examined frame"},
        [](const Evaluation&, const std::set<InstanceId>&, const RunCosts& costs) {
          return costs.bytes ? Measured::Of(static_cast<double>(*costs.bytes) / 1e6)
                             : Measured::Undefined("the mapper does not tell its size");

@@ -144,6 +144,61 @@ TEST(CompareFailure, FramesThatEndEarlyLeaveWhatWasEvaluated) {
   }
 }
 
+// Frames 4 and 5 were mapped before frame 6 was found to be gone, and count nowhere.
+TEST(CompareFailure, FramesThatEndEarlyLeaveNothingOfLaterOnes) {
+  const TempFolder folder;
+  CompareConfig config = TwoMaps();
+  config.record = true;
+  config.camera = CameraSource::kRefine;
+  BreakingSource broken(6, BreakingSource::Way::kError);
+  const auto stopped = RunCompare(broken, config, folder / "stopped", "the command", {});
+  ASSERT_TRUE(stopped.has_value()) << stopped.error().message;
+  ASSERT_TRUE(stopped->stopped.has_value());
+  EXPECT_FALSE(std::filesystem::exists(folder / "stopped" / "record"));
+
+  config.until = "3";
+  BoxSource whole(7);
+  const auto planned = RunCompare(whole, config, folder / "planned", "the command", {});
+  ASSERT_TRUE(planned.has_value()) << planned.error().message;
+  const nlohmann::json ended = SummaryOf(folder / "stopped").at("runs");
+  const nlohmann::json expected = SummaryOf(folder / "planned").at("runs");
+  ASSERT_EQ(ended.size(), expected.size());
+  for (std::size_t r = 0; r < expected.size(); ++r) {
+    for (const char* key : {"trajectories", "camera", "map"}) {
+      EXPECT_EQ(ended[r].at(key), expected[r].at(key)) << key;
+    }
+    EXPECT_EQ(ended[r].at("trajectories").at("8").at("frames"), 4);
+    EXPECT_EQ(stopped->runs[r]->notes.times.fuse_s.size(), 4U);
+  }
+}
+
+// Where the comparison goes on after the reveal, the map's size is that of the reveal, as all other
+// figures of the table are.
+TEST(CompareMemory, IsOfTheExaminedFrame) {
+  const TempFolder folder;
+  std::vector<nlohmann::json> sizes;
+  for (const char* until : {"reveal", "end"}) {
+    BoxSource source(7);
+    source.info_.reveal = RevealPlan{3, {8}};
+    CompareConfig config = TwoMaps();
+    config.until = until;
+    const auto result = RunCompare(source, config, folder / until, "the command", {});
+    ASSERT_TRUE(result.has_value()) << result.error().message;
+    const CompareRun& run = *result->runs.front();
+    ASSERT_EQ(run.memory.size(), run.evaluations.size());
+    sizes.push_back(SummaryOf(folder / until).at("runs")[0].at("map"));
+    EXPECT_EQ(sizes.back().at("bytes"), run.memory.front().bytes);
+    const std::string megabytes =
+        fmt::format("{:.0f}", static_cast<double>(run.memory.front().bytes) / 1e6);
+    EXPECT_EQ(TableRows(*result, Times::kLeftOut)[1].back(), megabytes);
+    // The camera goes on and sees more.
+    if (run.memory.size() > 1) {
+      EXPECT_GT(run.memory.back().bytes, run.memory.front().bytes);
+    }
+  }
+  EXPECT_EQ(sizes[0], sizes[1]);
+}
+
 TEST(CompareFailure, FramesThatEndBeforeAnythingWasEvaluatedAreAnError) {
   const TempFolder folder;
   BreakingSource source(2, BreakingSource::Way::kError);
