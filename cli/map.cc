@@ -113,33 +113,27 @@ Expected<MapStart> Start(const MapArguments& options, const CLI::App& app) {
 // Whether the file is, or lies below, what the run itself writes to its folder.
 bool IsOfTheRun(const std::filesystem::path& save, const std::filesystem::path& out) {
   static const std::set<std::string> kOwn{"mesh", "trajectories", "views", "stats.json", kRunNote};
-  std::error_code failure;
-  const auto place = std::filesystem::weakly_canonical(save, failure);
-  const auto folder = std::filesystem::weakly_canonical(out, failure);
-  const std::filesystem::path inside = place.lexically_relative(folder);
-  if (failure || inside.empty() || *inside.begin() == "..") return false;
+  const std::filesystem::path inside = TruePath(save).lexically_relative(TruePath(out));
+  if (inside.empty() || *inside.begin() == "..") return false;
   const std::string first = inside.begin()->string();
   return first.starts_with('.') || kOwn.contains(first);
 }
 
 // What a run reads: files, and folders as a whole. The map of --load may take its own place.
-std::vector<std::string> ReadBeside(const MapArguments& options) {
-  return {options.source.path,
-          options.source.calibration,
-          options.segmentation.depth_config,
-          options.segmentation.model,
-          options.segmentation.masks,
-          options.segmentation.network_config,
-          options.votes,
-          options.repair.config,
-          options.tracking.config};
+std::vector<std::filesystem::path> ReadBeside(const MapArguments& options) {
+  std::vector<std::filesystem::path> places = PlacesOf(options.source);
+  const std::vector<std::filesystem::path> of_segments = options.segmentation.Places();
+  places.insert(places.end(), of_segments.begin(), of_segments.end());
+  places.insert(places.end(), {options.votes, options.repair.config, options.tracking.config});
+  return places;
 }
 
 Expected<void> CheckSaveReplacesNothingRead(const MapArguments& options) {
-  for (const std::string& read : ReadBeside(options)) {
-    if (options.save.empty() || !LiesIn(options.save, read)) continue;
+  if (options.save.empty()) return {};
+  for (const std::filesystem::path& read : ReadBeside(options)) {
+    if (!LiesIn(options.save, read)) continue;
     return UsageError("--save '{}' lies in '{}', which is read, expected another place",
-                      options.save, read);
+                      options.save, read.string());
   }
   return {};
 }
@@ -210,7 +204,7 @@ Expected<RunFolder> BeginRun(const MapArguments& options, const MapStart& start,
       files.insert(fmt::format("trajectories/{}.txt", FileStem(object)));
     }
   }
-  if (options.views > 0) files.insert("views/1");
+  for (const std::string& view : ViewFiles(options.views)) files.insert("views/" + view);
   TSDFPP_RETURN_IF_ERROR(folder.CheckPlaces(files));
   return folder;
 }
@@ -304,6 +298,8 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
     TSDFPP_ASSIGN(stats["saved"], Save(options, start, *map));
   }
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "stats.json", JsonText(stats, 2) + "\n"));
+  // Which objects have files is known only now.
+  TSDFPP_RETURN_IF_ERROR(run_folder.CheckPlaces());
   TSDFPP_RETURN_IF_ERROR(run_folder.Commit());
   return ResultOf(options, start, std::move(stats));
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "eval/report/report_page.h"
 #include "eval/report/report_video.h"
 #include "eval/run/run_folder.h"
@@ -26,11 +27,8 @@ struct ReportArguments {
 Expected<void> CheckOut(const std::filesystem::path& out,
                         const std::vector<std::filesystem::path>& folders,
                         const std::filesystem::path& gates) {
-  std::error_code failure;
-  const auto place = std::filesystem::weakly_canonical(out, failure);
-  const auto is = [&](const std::filesystem::path& file) {
-    return std::filesystem::weakly_canonical(file, failure) == place;
-  };
+  const std::filesystem::path place = TruePath(out);
+  const auto is = [&](const std::filesystem::path& file) { return TruePath(file) == place; };
   const auto wrong = [&] {
     return UsageError("--out '{}' is a file that the page is made of, expected another",
                       out.string());

@@ -122,13 +122,15 @@ std::string ScoreText(const Measured& value) {
   return value.value ? fmt::format("{:.3f}", *value.value) : "-";
 }
 
-// Errors: kUsage where `out` lies in the sequence's folder, or is that of the masks.
+// Errors: kUsage where `out` lies where the sequence is read, or is the folder of the masks.
 Expected<void> CheckOut(const SegmentArguments& options) {
   const auto refused = [&](const std::string& read) {
     return UsageError("--out '{}' lies in '{}', which is read, expected a folder outside",
                       options.out, read);
   };
-  if (LiesIn(options.out, options.source.path)) return refused(options.source.path);
+  for (const std::filesystem::path& read : PlacesOf(options.source)) {
+    if (LiesIn(options.out, read)) return refused(read.string());
+  }
   const std::string& masks = options.segmentation.masks;
   if (LiesIn(options.out, masks) && LiesIn(masks, options.out)) return refused(masks);
   return {};

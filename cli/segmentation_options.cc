@@ -64,6 +64,19 @@ std::string SegmentationOptions::Text() const {
   return text;
 }
 
+std::vector<std::filesystem::path> SegmentationOptions::Places() const {
+  std::vector<std::filesystem::path> places{depth_config, model, masks, network_config};
+  // The graph of a .pb: beside it, or where the settings say.
+  if (!model.empty()) places.push_back(std::filesystem::path(model).replace_extension(".pbtxt"));
+  if (network_config.empty()) return places;
+  const auto table = ParseTomlFile(network_config);
+  if (!table) return places;  // which is said where it is read
+  if (const auto network = NetworkConfig::FromToml(*table, network_config)) {
+    places.emplace_back(network->graph);
+  }
+  return places;
+}
+
 void AddSegmentationOptions(CLI::App& app, const std::string& help, SegmentationOptions& options) {
   auto* const segmentation =
       app.add_option("--segmentation", options.segmentation,

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "mapper/segment/segmenter.h"
@@ -20,6 +22,8 @@ struct SegmentationOptions {
   // The options that were given, as on a command line, each with a space before; `--segmentation`
   // aside.
   std::string Text() const;
+  // What they are read from: files, and the masks' folder.
+  std::vector<std::filesystem::path> Places() const;
 };
 
 // --segmentation, with `help` before the names of those that find segments; its default is what

@@ -8,7 +8,11 @@
 
 #include "cli/command.h"
 #include "core/data_folder.h"
+#include "core/folders.h"
 #include "sequence/calibration.h"
+#include "sequence/open_sequence.h"
+#include "sim/load_scene.h"
+#include "sim/scene/scene_inputs.h"
 
 namespace tsdfpp {
 namespace {
@@ -79,6 +83,21 @@ std::string TextOf(const SequenceArguments& arguments) {
   if (arguments.scene.seed) text += fmt::format(" --seed {}", *arguments.scene.seed);
   if (CurrentLinkPolicy() == LinkPolicy::kAnywhere) text += " --follow-links";
   return text;
+}
+
+std::vector<std::filesystem::path> PlacesOf(const SequenceArguments& arguments) {
+  std::vector<std::filesystem::path> places;
+  const std::filesystem::path path = arguments.path;
+  if (!arguments.calibration.empty()) places.emplace_back(arguments.calibration);
+  if (!IsThere(path)) return places;
+  places.push_back(path);
+  std::vector<std::filesystem::path> others = PlacesBeside(path);
+  if (path.extension() == ".toml") {
+    // Of one that cannot be read, opening it says so.
+    if (const auto scene = LoadSceneConfig(path, arguments.scene.seed)) others = ListInputs(*scene);
+  }
+  places.insert(places.end(), others.begin(), others.end());
+  return places;
 }
 
 Expected<std::unique_ptr<FrameSource>> OpenArguments(const SequenceArguments& arguments) {

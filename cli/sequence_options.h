@@ -2,8 +2,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "core/frame_source.h"
@@ -32,6 +34,11 @@ CLI::Option* AddSequenceArguments(CLI::App& app, const std::string& name,
 
 // What was typed, for commands that print how to run them again.
 std::string TextOf(const SequenceArguments& arguments);
+
+// What the sequence or scene is read from, files and folders as a whole: its path, what lies beside
+// it, the calibration, the files that a scene names. A path that is not there is left out: opening
+// it says so.
+std::vector<std::filesystem::path> PlacesOf(const SequenceArguments& arguments);
 
 // Opens what the arguments name, and logs what the reader assumed. Errors: those of OpenSource; of
 // the calibration's file; kUsage where options for sequences meet a scene.

@@ -64,11 +64,17 @@ fs::path AbsolutePath(const fs::path& path) {
   return code ? path : absolute;
 }
 
-bool LiesIn(const fs::path& path, const fs::path& place) {
+fs::path TruePath(const fs::path& path) {
+  // Of a relative path whose first part is not there the library makes no absolute one.
+  const fs::path absolute = AbsolutePath(path);
   std::error_code code;
-  if (place.empty() || !fs::exists(place, code)) return false;
-  const fs::path way =
-      fs::weakly_canonical(path, code).lexically_relative(fs::weakly_canonical(place, code));
+  const fs::path followed = fs::weakly_canonical(absolute, code);
+  return code ? absolute.lexically_normal() : followed;
+}
+
+bool LiesIn(const fs::path& path, const fs::path& place) {
+  if (place.empty()) return false;
+  const fs::path way = TruePath(path).lexically_relative(TruePath(place));
   return !way.empty() && *way.begin() != "..";
 }
 

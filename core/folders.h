@@ -27,8 +27,10 @@ bool IsFolder(const std::filesystem::path& path);
 // The absolute path; the path as it is where the working folder is gone.
 std::filesystem::path AbsolutePath(const std::filesystem::path& path);
 
-// Whether `path` is, or would be, `place` or in it, links followed; never where `place` is not
-// there.
+// The one absolute path of all that name the same thing, there or not, links followed.
+std::filesystem::path TruePath(const std::filesystem::path& path);
+
+// Whether `path` is, or would be, `place` or in it, links followed; never in the empty path.
 bool LiesIn(const std::filesystem::path& path, const std::filesystem::path& place);
 
 // A folder's own name, also where the path ends with a slash or is "."

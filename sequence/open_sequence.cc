@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "core/data_folder.h"
+#include "core/folders.h"
 #include "sequence/bop_layout.h"
 #include "sequence/cofusion_layout.h"
 #include "sequence/cofusion_reader.h"
@@ -155,6 +156,23 @@ std::vector<DatasetFormat> DetectFormats(const fs::path& path) {
     if (LooksLike(path, format)) fitting.push_back(format);
   }
   return fitting;
+}
+
+std::vector<fs::path> PlacesBeside(const fs::path& path) {
+  const fs::path folder = AbsolutePath(path / "").lexically_normal().parent_path();
+  if (IsFolder(path)) {
+    if (Exists(path / bop::kCamera)) {
+      return {folder.parent_path().parent_path() / fs::path(bop::kModelsInfo).parent_path()};
+    }
+    if (Exists(path / "traj.txt")) return {folder.parent_path() / "cam_params.json"};
+    return {};
+  }
+  std::vector<fs::path> places;
+  if (path.extension() != ".klg") return places;
+  for (const char* name : {"calibration.txt", "groundtruth.txt", "mask", "masks"}) {
+    places.push_back(folder.parent_path() / name);
+  }
+  return places;
 }
 
 Expected<std::unique_ptr<FrameSource>> OpenSequence(const fs::path& path,

@@ -15,6 +15,10 @@ namespace tsdfpp {
 // not clear.
 std::vector<DatasetFormat> DetectFormats(const std::filesystem::path& path);
 
+// What the sequence at `path` is read from besides `path` itself, there or not: it lies beside a
+// .klg, with a BOP scene in its dataset, above a scene of Replica.
+std::vector<std::filesystem::path> PlacesBeside(const std::filesystem::path& path);
+
 // Opens the sequence at `path`: a folder, or a .klg file. The format is detected unless `options`
 // has one; a few frames are read to look for wrong units, inverted poses and the like
 // (sequence/plausibility.h) unless `options` leaves that out or the sequence is our own (then

@@ -26,7 +26,20 @@ cv::Mat NormalPicture(const RaySurface& surface) {
   return picture;
 }
 
+std::string NameOf(const char* what, int number, const char* ending) {
+  return fmt::format("{}-{}.{}", what, number, ending);
+}
+
 }  // namespace
+
+std::vector<std::string> ViewFiles(int surfaces) {
+  std::vector<std::string> files;
+  for (int k = 1; k <= surfaces; ++k) {
+    for (const char* what : {"colour", "normal", "id"}) files.push_back(NameOf(what, k, "png"));
+    files.push_back(NameOf("depth", k, "exr"));
+  }
+  return files;
+}
 
 Expected<void> WriteViews(const MapRepresentation& map, const Intrinsics& camera, const Pose& T_WC,
                           int surfaces, const std::filesystem::path& folder) {
@@ -36,7 +49,7 @@ Expected<void> WriteViews(const MapRepresentation& map, const Intrinsics& camera
   for (const RaySurface& surface : map.CastRays(camera, T_WC, options)) {
     ++number;
     const auto path = [&](const char* what, const char* ending) {
-      return folder / fmt::format("{}-{}.{}", what, number, ending);
+      return folder / NameOf(what, number, ending);
     };
     TSDFPP_ASSIGN(const std::string colour, EncodeColour(surface.colour, path("colour", "png")));
     TSDFPP_RETURN_IF_ERROR(WriteFile(path("colour", "png"), colour));

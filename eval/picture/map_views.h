@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "mapper/map_representation.h"
 
@@ -14,5 +16,8 @@ namespace tsdfpp {
 // the disk refuses.
 Expected<void> WriteViews(const MapRepresentation& map, const Intrinsics& camera, const Pose& T_WC,
                           int surfaces, const std::filesystem::path& folder);
+
+// The names of the files that it writes.
+std::vector<std::string> ViewFiles(int surfaces);
 
 }  // namespace tsdfpp

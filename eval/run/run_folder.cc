@@ -219,6 +219,18 @@ Expected<void> RunFolder::CheckPlaces(const std::set<std::string>& files) const 
   return {};
 }
 
+Expected<void> RunFolder::CheckPlaces() const {
+  std::error_code failure;
+  std::set<std::string> files;
+  for (const fs::path& file : FilesIn(staging_, failure)) {
+    files.insert(file.lexically_relative(staging_).string());
+  }
+  if (failure) {
+    return EnvironmentError("{}: cannot be listed ({})", staging_.string(), failure.message());
+  }
+  return CheckPlaces(files);
+}
+
 // What stands where a file or its folders are to be, but for files.
 Expected<void> RunFolder::CheckWays(std::set<std::string> files) const {
   const std::set<std::string> old = OldFiles();

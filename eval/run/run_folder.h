@@ -50,6 +50,8 @@ class RunFolder {
   // Whether files of these names could take their places: who knows what will be written asks
   // before the work. Errors: kUsage, as Commit, and where a file that no run wrote has such a name.
   Expected<void> CheckPlaces(const std::set<std::string>& files) const;
+  // The same for what has been written, for who knows it only then.
+  Expected<void> CheckPlaces() const;
 
   // Moves everything to its place. Of the files named in `rewritten` the size is not kept. Errors:
   // kUsage where a folder of somebody else's, a pipe or a device stands in a file's place, or a

@@ -22,14 +22,22 @@ bool IsText(const std::string& name) {
 }
 
 // The files that an OBJ refers to and that are there.
+Expected<std::vector<Companion>> ReferredTo(const fs::path& mesh) {
+  if (mesh.extension() != ".obj") return std::vector<Companion>();
+  TSDFPP_ASSIGN(const std::string bytes, ReadFile(mesh));
+  TSDFPP_ASSIGN(RawMesh raw, ReadObj(mesh, bytes));
+  std::erase_if(raw.companions, [](const Companion& companion) {
+    std::error_code code;
+    return !fs::is_regular_file(companion.path, code);
+  });
+  return std::move(raw.companions);
+}
+
+// Those of them that can be taken along.
 Expected<std::vector<fs::path>> Companions(const fs::path& mesh) {
   std::vector<fs::path> found;
-  if (mesh.extension() != ".obj") return found;
-  TSDFPP_ASSIGN(const std::string bytes, ReadFile(mesh));
-  TSDFPP_ASSIGN(const RawMesh raw, ReadObj(mesh, bytes));
-  for (const Companion& companion : raw.companions) {
-    std::error_code code;
-    if (!fs::is_regular_file(companion.path, code)) continue;
+  TSDFPP_ASSIGN(const std::vector<Companion> referred_to, ReferredTo(mesh));
+  for (const Companion& companion : referred_to) {
     if (!companion.inside || !IsText(companion.name)) {
       spdlog::warn(
           "{}: refers to '{}', which a sequence cannot take along: the mesh lacks it; expected a "
@@ -93,6 +101,25 @@ class Collector {
 };
 
 }  // namespace
+
+std::vector<fs::path> ListInputs(const SceneConfig& config) {
+  std::vector<fs::path> files;
+  if (const auto* recorded = std::get_if<RecordedPath>(&config.camera.path)) {
+    files.emplace_back(recorded->file);
+  }
+  for (const SceneObject& object : config.objects) {
+    for (const fs::path& file : {object.model.file, object.model.picture}) {
+      if (file.empty()) continue;
+      files.push_back(file);
+      const auto companions = ReferredTo(file);
+      if (!companions) continue;  // which is said where the mesh is read
+      for (const Companion& companion : *companions) {
+        if (companion.inside) files.push_back(companion.path);
+      }
+    }
+  }
+  return files;
+}
 
 Expected<SceneInputs> CollectInputs(const SceneConfig& config) { return Collector(config).Run(); }
 

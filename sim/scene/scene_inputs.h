@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "sim/config/scene_config.h"
@@ -18,6 +19,9 @@ struct SceneInputs {
   // files of one name; an OBJ's companions keep their places as seen from it.
   std::map<std::string, std::filesystem::path> files;
 };
+
+// The files themselves, with what of an OBJ's is read.
+std::vector<std::filesystem::path> ListInputs(const SceneConfig& config);
 
 // Numbers follow the order in which the scene names files (camera, then objects by id), so what was
 // collected collects to the same again. A file that is named twice is there once. A companion that

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/files.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 
@@ -158,6 +159,19 @@ TEST_F(Associate, IsMatchedToTheTruthByOverlap) {
   for (const nlohmann::json& object : run["examined"]["objects"]) {
     EXPECT_GT(object["completion"].get<double>(), 0.5) << object["name"];
   }
+}
+
+// Which objects there are is known only in the end.
+TEST_F(Associate, AMeshOfSomebodyElseStays) {
+  const fs::path theirs = *folder_ / "theirs/mesh/object1-1.ply";
+  ASSERT_TRUE(WriteFile(theirs, "kept").has_value());
+  const CommandOutput output = Run("map", "theirs", {"--until", "12"});
+  EXPECT_EQ(output.exit_code, test::kUsage) << output.err;
+  EXPECT_NE(output.err.find("object1-1.ply: is of no earlier run and would be replaced"),
+            std::string::npos)
+      << output.err;
+  EXPECT_EQ(ReadFile(theirs), "kept");
+  EXPECT_FALSE(fs::exists(*folder_ / "theirs/stats.json"));
 }
 
 }  // namespace

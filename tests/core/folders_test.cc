@@ -74,6 +74,26 @@ TEST(Folders, WhatLiesInWhat) {
   EXPECT_FALSE(LiesIn(a, ""));
 }
 
+// However a path is spelled that is not there yet.
+TEST(Folders, WhatIsNotThereLiesInWhatIsNotThere) {
+  const TempFolder folder;
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path());
+  const fs::path here = fs::current_path();
+  for (const fs::path& place :
+       {fs::path("new"), here / "new", fs::path("./new/"), here / "new/."}) {
+    for (const fs::path& path : {fs::path("new/a"), here / "new/a", fs::path("./x/../new/a")}) {
+      EXPECT_TRUE(LiesIn(path, place)) << path << place;
+    }
+    EXPECT_FALSE(LiesIn("newer", place)) << place;
+  }
+  EXPECT_TRUE(LiesIn("new.map", "."));
+  EXPECT_TRUE(LiesIn("new/a.map", here));
+  EXPECT_FALSE(LiesIn("../new.map", here));
+  EXPECT_EQ(TruePath("new/../a"), here / "a");
+  fs::current_path(before);
+}
+
 TEST(Folders, AWorkingFolderThatIsGoneIsNoException) {
   const TempFolder folder;
   const fs::path before = fs::current_path();
