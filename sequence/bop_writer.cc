@@ -94,6 +94,7 @@ class BopWriter : public DatasetWriter {
       if (id != last) ids.insert(id);
       last = id;
     }
+    if (ids.contains(kNoInstance)) ++with_no_instance_;
     for (const InstanceId id : ids) {
       const bool is_object = id != kBackground && id != kNoInstance;
       if (is_object && !frame.T_WO.contains(id)) ++without_pose_[id];
@@ -118,6 +119,11 @@ class BopWriter : public DatasetWriter {
     for (const auto& [id, frames] : without_pose_) {
       report.left_out.push_back(
           fmt::format("the mask of object {} on {} frames, where it has no pose", id, frames));
+    }
+    if (with_no_instance_ > 0) {
+      report.left_out.push_back(
+          fmt::format("the pixels of no instance (id {}) on {} frames, which become background",
+                      kNoInstance, with_no_instance_));
     }
     if (models_.empty()) report.left_out.emplace_back("mask/ and what needs true surfaces");
     return {};
@@ -217,6 +223,7 @@ class BopWriter : public DatasetWriter {
   fs::path folder_;
   std::vector<TrueModel> models_;
   std::map<InstanceId, int> without_pose_;  // frames with a mask of it, but no pose
+  int with_no_instance_ = 0;                // frames with pixels that are of no instance
   Json cameras_ = Json::object();
   Json truth_ = Json::object();
   Json infos_ = Json::object();

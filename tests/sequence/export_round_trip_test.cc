@@ -189,6 +189,22 @@ TEST(ExportRoundTrip, Bop) {
   }
 }
 
+// BOP has no pixels that are of no instance.
+TEST(ExportRoundTrip, BopSaysWhereNothingIsKnown) {
+  const TempFolder folder;
+  MemorySource source = Noise(3);
+  source.on_read = [](Frame& frame) -> Expected<void> {
+    if (frame.index < 5) frame.mask.at<InstanceId>(2, 2) = kNoInstance;
+    return {};
+  };
+  ExportReport report;
+  const auto read = ExportAndOpen(source, DatasetFormat::kBop, folder / "out", report);
+  ASSERT_NE(read, nullptr);
+  EXPECT_EQ(read->Read(3).value().mask.at<InstanceId>(2, 2), kBackground);
+  EXPECT_TRUE(Says(report.left_out, "the pixels of no instance (id 65535) on 2 frames"));
+  EXPECT_FALSE(Says(report.left_out, "object 65535"));
+}
+
 TEST(ExportRoundTrip, WithoutMasksAndTruth) {
   const TempFolder folder;
   for (const DatasetFormat format : {DatasetFormat::kTum, DatasetFormat::kBop, DatasetFormat::kKlg,
