@@ -1,5 +1,8 @@
 #include "sequence/integer_images.h"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 
 #include "core/types.h"
@@ -59,6 +62,17 @@ Expected<cv::Mat> ReadIds(const std::filesystem::path& path, cv::Size expected,
   TSDFPP_RETURN_IF_ERROR(CheckImageSize(image, expected, size_source, path.string()));
   if (image.type() == CV_16UC1) return image;
   return ReadMask(path, expected);
+}
+
+IdEnding IdEndingOf(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array kIds{".png", ".pgm", ".ppm", ".pbm", ".pnm", ".tif", ".tiff", ".bmp"};
+  constexpr std::array kOther{".jpg", ".jpeg", ".webp", ".exr"};
+  if (std::find(kIds.begin(), kIds.end(), ending) != kIds.end()) return IdEnding::kIds;
+  return std::find(kOther.begin(), kOther.end(), ending) != kOther.end() ? IdEnding::kOther
+                                                                         : IdEnding::kNone;
 }
 
 }  // namespace tsdfpp

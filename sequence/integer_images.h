@@ -32,6 +32,14 @@ Expected<cv::Mat> ReadIntegerDepth(const std::filesystem::path& path, cv::Size e
                                    const std::string& size_source, double units_per_m,
                                    std::uint16_t no_depth = 0);
 
+// What a file's ending, in whatever case, says of ids in it.
+enum class IdEnding {
+  kNone,   // it is no image
+  kOther,  // an image that changes ids or cannot hold them
+  kIds     // .png, .pgm, .ppm, .pbm, .pnm, .tif, .tiff or .bmp
+};
+IdEnding IdEndingOf(const std::filesystem::path& file);
+
 // CV_16UC1 ids from 8-bit or 16-bit grey, or 8-bit RGB with equal channels. An empty size accepts
 // any.
 Expected<cv::Mat> ReadIds(const std::filesystem::path& path, cv::Size expected,

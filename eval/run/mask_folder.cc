@@ -1,10 +1,10 @@
 #include "eval/run/mask_folder.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <charconv>
 #include <optional>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -62,16 +62,9 @@ Expected<std::optional<NamedMask>> NameOf(const fs::path& file) {
   return NamedMask{MaskKind::kInstance, *frame, *last, file};
 }
 
-bool IsImage(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  constexpr std::array kEndings{".png", ".pgm", ".tif", ".tiff", ".bmp"};
-  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
-}
-
-// The images in a folder that is named after a frame; none where it is not.
-Expected<std::vector<NamedMask>> MasksIn(const fs::path& folder) {
+// The images in a folder that is named after a frame; none where it is not. `others` are images
+// that hold no ids.
+Expected<std::vector<NamedMask>> MasksIn(const fs::path& folder, std::vector<NamedMask>& others) {
   std::vector<NamedMask> masks;
   const std::string name = folder.filename().string();
   if (name.find_first_not_of("0123456789.") != std::string::npos) return masks;
@@ -80,25 +73,52 @@ Expected<std::vector<NamedMask>> MasksIn(const fs::path& folder) {
   if (!frame || !digits.empty()) return masks;
   TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFolder(folder));
   for (const fs::path& file : files) {
-    if (!IsImage(file)) continue;
-    masks.push_back({MaskKind::kInstanceInFolder, *frame, static_cast<int>(masks.size()), file});
+    const IdEnding ending = IdEndingOf(file);
+    if (ending == IdEnding::kNone) continue;
+    std::vector<NamedMask>& images = ending == IdEnding::kIds ? masks : others;
+    images.push_back({MaskKind::kInstanceInFolder, *frame, static_cast<int>(images.size()), file});
   }
   return masks;
 }
 
+// A frame whose only image is passed over would have no instance, and nobody would know. Beside the
+// mask that it belongs to it may be a picture for people.
+Expected<void> CheckPassedOver(const std::vector<NamedMask>& masks,
+                               const std::vector<NamedMask>& others) {
+  std::set<std::pair<int, std::string>> there;  // frames, and names in them
+  for (const NamedMask& mask : masks) {
+    there.emplace(mask.frame, "");
+    there.emplace(mask.frame, mask.file.stem().string());
+  }
+  for (const NamedMask& other : others) {
+    const std::string name =
+        other.kind == MaskKind::kIds ? std::string() : other.file.stem().string();
+    if (there.contains({other.frame, name})) continue;
+    return DataError(
+        "{}: is of frame {} and does not hold ids exactly, expected a mask of that name as .png, "
+        ".pgm, .ppm, .pbm, .pnm, .tif, .tiff or .bmp",
+        other.file.string(), other.frame);
+  }
+  return {};
+}
+
 Expected<std::vector<NamedMask>> ListMasks(const fs::path& folder) {
   std::vector<NamedMask> masks;
+  std::vector<NamedMask> others;
   TSDFPP_ASSIGN(const std::vector<fs::path> entries, ListFolder(folder));
   for (const fs::path& entry : entries) {
     if (IsFolder(entry)) {
-      TSDFPP_ASSIGN(const std::vector<NamedMask> inside, MasksIn(entry));
+      TSDFPP_ASSIGN(const std::vector<NamedMask> inside, MasksIn(entry, others));
       masks.insert(masks.end(), inside.begin(), inside.end());
       continue;
     }
-    if (!IsImage(entry)) continue;
-    TSDFPP_ASSIGN(std::optional<NamedMask> named, NameOf(entry));
-    if (named) masks.push_back(std::move(*named));
+    const IdEnding ending = IdEndingOf(entry);
+    if (ending == IdEnding::kNone) continue;
+    Expected<std::optional<NamedMask>> named = NameOf(entry);
+    if (!named && ending == IdEnding::kIds) return tl::unexpected(named.error());
+    if (named && *named) (ending == IdEnding::kIds ? masks : others).push_back(std::move(**named));
   }
+  TSDFPP_RETURN_IF_ERROR(CheckPassedOver(masks, others));
   return masks;
 }
 

@@ -9,6 +9,7 @@
 #include "core/one_line.h"
 #include "eval/score/evaluation.h"
 #include "eval/score/label_image.h"
+#include "sequence/integer_images.h"
 
 namespace tsdfpp {
 namespace {
@@ -45,7 +46,11 @@ Expected<MaskEvaluator> MaskEvaluator::Open(const fs::path& folder) {
   evaluator.folder_ = folder;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
        entry.increment(failure)) {
-    if (entry->path().extension() != ".png") continue;
+    const IdEnding ending = IdEndingOf(entry->path());
+    if (ending == IdEnding::kOther) {
+      evaluator.not_ids_.push_back(entry->path().filename().string());
+    }
+    if (ending != IdEnding::kIds) continue;
     const auto frame = NumberAtEnd(entry->path().stem().string());
     if (!frame) {
       evaluator.unnumbered_.push_back(entry->path().filename().string());
@@ -63,6 +68,7 @@ Expected<MaskEvaluator> MaskEvaluator::Open(const fs::path& folder) {
                      folder.string());
   }
   std::ranges::sort(evaluator.unnumbered_);
+  std::ranges::sort(evaluator.not_ids_);
   return evaluator;
 }
 
@@ -104,6 +110,12 @@ Expected<MaskEvaluation> MaskEvaluator::Result(const SequenceInfo& info,
     out.remarks.push_back(
         fmt::format("{}: {} images, {} among them, end in no frame's number: left out",
                     folder_.string(), unnumbered_.size(), Quoted(unnumbered_.front())));
+  }
+  if (!not_ids_.empty()) {
+    out.remarks.push_back(
+        fmt::format("{}: {} images, {} among them, do not hold ids exactly: left "
+                    "out, expected e.g. .png",
+                    folder_.string(), not_ids_.size(), Quoted(not_ids_.front())));
   }
   std::map<int, std::pair<std::int64_t, InstanceId>> most;  // of each predicted id
   for (const auto& [pair, pixels] : pairs_) {

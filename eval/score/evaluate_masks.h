@@ -36,9 +36,10 @@ class MaskEvaluator {
   // image cannot be read or has another size than the true mask.
   Expected<void> Observe(const Frame& frame);
 
-  // Images of frames that the sequence `info` does not have are remarked on, and those that no
-  // number names. With kNames ids are the sequence's objects where it has them; else an id is the
-  // object with which it shares most pixels. Errors: kData where no frame had an image.
+  // Images of frames that the sequence `info` does not have are remarked on, those that no number
+  // names, and those that hold no ids. With kNames ids are the sequence's objects where it has
+  // them; else an id is the object with which it shares most pixels. Errors: kData where no frame
+  // had an image.
   Expected<MaskEvaluation> Result(const SequenceInfo& info, const std::vector<ObjectInfo>& objects,
                                   MatchMode mode) const;
 
@@ -46,6 +47,7 @@ class MaskEvaluator {
   std::filesystem::path folder_;
   std::map<int, std::filesystem::path> images_;  // by frame
   std::vector<std::string> unnumbered_;          // names of others, in order
+  std::vector<std::string> not_ids_;             // names of images with another ending, in order
   LabelPairs pairs_;
   PanopticCounts counts_;
   int observed_ = 0;

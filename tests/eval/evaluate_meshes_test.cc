@@ -349,7 +349,7 @@ TEST(EvaluateMeshes, MasksAreComparedUnderTheirOwnIds) {
   EXPECT_EQ(result.masks->mean_iou.value, 1.0);
   EXPECT_EQ(result.masks->quality.pq.value, 1.0);
   EXPECT_TRUE(result.masks->remarks.empty());
-  fs::copy(folder / "own/Mask0002.png", folder / "own/Mask0017.png");
+  fs::copy(folder / "own/Mask0002.png", folder / "own/Mask0017.PNG");
   EXPECT_TRUE(Evaluated(config).masks->remarks.at(0).ends_with(
       "1 images are of no frame of the sequence, which has 0 to 5: left out"));
   fs::copy(folder / "own/Mask0002.png", folder / "own/first.png");

@@ -5,6 +5,8 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/files.h"
+#include "eval/score/evaluate_masks.h"
 #include "tests/core/temp_folder.h"
 
 namespace tsdfpp {
@@ -123,6 +125,59 @@ TEST_F(MaskFolderTest, WhatIsThereTwiceIsRefused) {
   EXPECT_EQ(OpenError(), "");
   Write("02/a.png", {0, 0, 1, 1}, 1);
   EXPECT_NE(OpenError().find("are both of frame 2"), std::string::npos) << OpenError();
+}
+
+// A frame whose image was passed over would have no instance.
+TEST_F(MaskFolderTest, NoImageOfAFrameIsPassedOver) {
+  Write("1.png", {0, 0, 2, 2}, 5);
+  Write("2.PNG", {0, 0, 2, 2}, 5);
+  const cv::Mat grey(4, 6, CV_8UC3, cv::Scalar::all(5));
+  ASSERT_TRUE(cv::imwrite((folder_ / "3.ppm").string(), grey));
+  for (const int frame : {1, 2, 3}) EXPECT_EQ(Find(frame).size(), 1U) << frame;
+  // The first is of a frame that has its mask, the others are of none.
+  for (const char* name : {"shown1.jpg", "cover.jpg", "1305031453.50.jpg"}) {
+    ASSERT_TRUE(WriteFile(folder_ / name, "").has_value());
+  }
+  EXPECT_EQ(OpenError(), "");
+  for (const char* name : {"4.jpg", "5.JPEG", "6.webp"}) {
+    ASSERT_TRUE(WriteFile(folder_ / name, "").has_value());
+    EXPECT_NE(OpenError().find(std::string(name) + ": is of frame "), std::string::npos)
+        << OpenError();
+    fs::remove(folder_ / name);
+  }
+  EXPECT_EQ(OpenError(), "");
+}
+
+TEST_F(MaskFolderTest, NoImageOfAnInstanceIsPassedOver) {
+  Write("12/0.png", {0, 0, 2, 2}, 255);
+  ASSERT_TRUE(WriteFile(folder_ / "12/0.jpg", "").has_value());
+  EXPECT_EQ(OpenError(), "");
+  ASSERT_TRUE(WriteFile(folder_ / "12/1.jpg", "").has_value());
+  EXPECT_NE(OpenError().find("12/1.jpg: is of frame 12 "), std::string::npos) << OpenError();
+}
+
+TEST_F(MaskFolderTest, WhoScoresMasksTakesTheSameEndings) {
+  Write("1.PNG", {0, 0, 2, 2}, 5);
+  Write("2.pgm", {0, 0, 2, 2}, 5);
+  ASSERT_TRUE(WriteFile(folder_ / "3.jpg", "").has_value());
+  MaskEvaluator evaluator = MaskEvaluator::Open(folder_.path()).value();
+  SequenceInfo info;
+  info.first_index = 1;
+  info.frame_count = 3;
+  info.objects = {{kBackground, "background", "background"}, {5, "cup", "cup"}};
+  for (int i = 1; i <= 3; ++i) {
+    Frame frame = FrameNumber(i);
+    frame.mask = cv::Mat(4, 6, CV_16UC1, cv::Scalar(0));
+    frame.mask(cv::Rect(0, 0, 2, 2)).setTo(5);
+    ASSERT_TRUE(evaluator.Observe(frame).has_value());
+  }
+  const MaskEvaluation scores = evaluator.Result(info, info.objects, MatchMode::kNames).value();
+  EXPECT_EQ(scores.images, 2);
+  EXPECT_EQ(scores.mean_iou.value, 1.0);
+  ASSERT_EQ(scores.remarks.size(), 1U);
+  EXPECT_NE(scores.remarks[0].find("1 images, '3.jpg' among them, do not hold ids exactly"),
+            std::string::npos)
+      << scores.remarks[0];
 }
 
 // Each id gets a mask of its box: ids that lie all over the image would take memory without bound.
