@@ -186,6 +186,7 @@ void LogStart(const MapStart& start) {
                  TrackChoiceText(start.pipeline->tracked().choice()));
   }
   if (!start.pose_remark.empty()) spdlog::info("{}", start.pose_remark);
+  for (const std::string& remark : start.load_remarks) spdlog::warn("{}", remark);
   if (start.by_votes()) {
     spdlog::info("{}: the map's ids are its own, found by votes; poses are tracked ({})",
                  start.info.name, PoseSourceName(start.config.poses));
@@ -211,18 +212,28 @@ Expected<RunFolder> BeginRun(const MapArguments& options, const MapStart& start,
 
 struct MappedFrames {
   RunTimes times;
-  Pose T_WC = Pose::Identity();  // of the last frame
+  std::optional<std::uint64_t> last_depth;  // HashOfDepth()
+  // Of the last frame whose camera is known, if there is one.
+  Intrinsics intrinsics;
+  std::optional<Pose> T_WC;
 };
 
 Expected<MappedFrames> MapFrames(const MapStart& start) {
   MappedFrames mapped;
+  mapped.intrinsics = start.info.intrinsics;
+  if (const auto& place = start.pipeline->camera_place()) mapped.T_WC = place->T_WC;
   ProgressBar bar("map");
   for (int index = start.first; index <= start.last; ++index) {
     TSDFPP_ASSIGN(const Frame frame, ReadToMap(start, index));
     TSDFPP_ASSIGN(const StepTimes step, start.pipeline->Process(frame));
     mapped.times.Add(step);
     const auto& located = start.pipeline->camera_log().T_WC;
-    mapped.T_WC = located.empty() ? frame.T_WC : located.rbegin()->second;
+    const bool is_given = start.config.camera == CameraSource::kGiven;
+    if (is_given || located.contains(frame.index)) {
+      mapped.intrinsics = frame.intrinsics;
+      mapped.T_WC = is_given ? frame.T_WC : located.at(frame.index);
+    }
+    if (index == start.last) mapped.last_depth = HashOfDepth(frame);
     bar.Show(index - start.first + 1, start.frames());
   }
   return mapped;
@@ -241,8 +252,8 @@ void LogRemarks(const MapArguments& options, const MapStart& start) {
 
 // Writes the map, after the removals, to --save, and says so.
 Expected<nlohmann::json> Save(const MapArguments& options, const MapStart& start,
-                              const MapRepresentation& map) {
-  const MappedRun run = RunOf(start, start.last);
+                              const MappedFrames& mapped, const MapRepresentation& map) {
+  const MappedRun run = RunOf(start, start.last, mapped.last_depth);
   TSDFPP_RETURN_IF_ERROR(SaveMap(options.save, map, &run));
   std::error_code ignored;
   return nlohmann::json{{"file", options.save},
@@ -287,15 +298,17 @@ Expected<CommandResult> RunMap(const MapArguments& options, const CLI::App& app)
   for (const InstanceId id : removed) map->Remove(id);
 
   TSDFPP_RETURN_IF_ERROR(WriteMap(*map, *start.pipeline, info, out, mesh_format));
-  if (options.views > 0) {
+  if (options.views > 0 && mapped.T_WC) {
     TSDFPP_RETURN_IF_ERROR(
-        WriteViews(*map, info.intrinsics, mapped.T_WC, options.views, out / "views"));
+        WriteViews(*map, mapped.intrinsics, *mapped.T_WC, options.views, out / "views"));
+  } else if (options.views > 0) {
+    spdlog::warn("--views {}: writes none, as the camera was found in no frame", options.views);
   }
   nlohmann::json stats = StatsOf(start, mapped.times, removed, map->Memory());
   stats["run"] = run_folder.id();
   if (!options.load.empty()) stats["loaded"] = options.load;
   if (!options.save.empty()) {
-    TSDFPP_ASSIGN(stats["saved"], Save(options, start, *map));
+    TSDFPP_ASSIGN(stats["saved"], Save(options, start, mapped, *map));
   }
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "stats.json", JsonText(stats, 2) + "\n"));
   // Which objects have files is known only now.
@@ -352,7 +365,8 @@ Run AddMap(CLI::App& app, const CommonOptions&) {
   app.add_option("--voxel", options->map.voxel_m, "Voxel size, metres")->capture_default_str();
   app.add_option("--until", options->until, "Last frame to map")->check(NotNegative());
   app.add_option("--remove", options->remove,
-                 "Objects to remove from the map at the end: ids or names, by commas");
+                 "Objects to remove from the map at the end: ids or names, by commas")
+      ->check(NotEmpty("ids or names"));
   app.add_option("--mesh-format", options->mesh_format,
                  "Meshes as ply or as glb (binary glTF, with names and a node an object)")
       ->capture_default_str();

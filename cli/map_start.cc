@@ -1,13 +1,18 @@
 #include "cli/map_start.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
 #include "cli/pose_choice.h"
+#include "sequence/sequence_json.h"
 
 namespace tsdfpp {
 namespace {
+
+// Files of calibrations have two decimals at least.
+constexpr double kSameLens_px = 0.01;
 
 // Opens the sequence and says where its masks come from.
 Expected<void> OpenInto(MapStart& start, const SequenceArguments& arguments,
@@ -104,6 +109,68 @@ bool AreOfSequence(const std::vector<ObjectInfo>& objects, const std::vector<Obj
                      });
 }
 
+bool IsSameLens(const Intrinsics& a, const Intrinsics& b) {
+  const auto is_near = [](double x, double y) { return std::abs(x - y) <= kSameLens_px; };
+  return a.width == b.width && a.height == b.height && is_near(a.fx, b.fx) && is_near(a.fy, b.fy) &&
+         is_near(a.cx, b.cx) && is_near(a.cy, b.cy);
+}
+
+std::string TextOf(const Intrinsics& k) {
+  return fmt::format("{}x{} (fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g})", k.width, k.height, k.fx,
+                     k.fy, k.cx, k.cy);
+}
+
+// Whether the opened sequence can go on with a loaded map.
+Expected<void> CheckGoesOn(const MapStart& start, const std::string& file, const MappedRun& run,
+                           const std::string& path) {
+  // One that another program saved is of no sequence; with votes the map's objects are its own.
+  if (run.sequence.empty() || start.info.name != run.sequence ||
+      (!start.by_votes() && !AreOfSequence(run.objects, start.info.objects))) {
+    return UsageError("--load {} is a map of '{}', expected one of {}, '{}'", file, run.sequence,
+                      path, start.info.name);
+  }
+  if (run.recording && !IsSameLens(run.recording->intrinsics, start.info.intrinsics)) {
+    return UsageError("--load {} is a map of images of {}, expected one of {}, whose are {}", file,
+                      TextOf(run.recording->intrinsics), path, TextOf(start.info.intrinsics));
+  }
+  if (start.by_votes() || start.ids_are_objects() ||
+      start.config.segmentation == Segmentation::kNone) {
+    return {};
+  }
+  return UsageError(
+      "--load {} is a map by given ids, and the ids in the masks of {} are drawn anew in every "
+      "frame, expected --segmentation none, or a map by votes",
+      file, path);
+}
+
+// What is no reason to refuse: the same scene has other depth on another machine.
+Expected<void> RemarkOnRecording(MapStart& start, const std::string& file, const MappedRun& run) {
+  const bool is_there = run.last_frame >= start.info.first_index &&
+                        run.last_frame < start.info.first_index + start.info.frame_count;
+  if (run.recording && is_there) {
+    TSDFPP_ASSIGN(const Frame last, start.source->Read(run.last_frame));
+    if (HashOfDepth(last) != run.recording->last_depth) {
+      start.load_remarks.push_back(fmt::format(
+          "--load {}: frame {} of {} has another depth image than the map was made of, expected "
+          "the same recording, with the same sensor",
+          file, run.last_frame, start.info.name));
+    }
+  }
+  const bool is_given = start.config.camera == CameraSource::kGiven;
+  if (is_given && run.recording && run.recording->camera) {
+    start.load_remarks.push_back(fmt::format(
+        "--load {}: its camera was found by the map; from frame {} on it is where it is given "
+        "(--camera track or refine goes on)",
+        file, start.first));
+  }
+  if (!is_given && !run.recording) {
+    start.load_remarks.push_back(fmt::format(
+        "--load {}: it does not say where its camera was, so that of frame {} is taken as given",
+        file, start.first));
+  }
+  return {};
+}
+
 // What the segments' ids stand for.
 std::vector<ObjectInfo> ObjectsOfSegments(const MapStart& start) {
   return start.ids_are_objects() ? start.info.objects : std::vector<ObjectInfo>{};
@@ -174,13 +241,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   if (!source.path.empty()) {
     TSDFPP_RETURN_IF_ERROR(OpenInto(start, source, wishes.segmentation));
     TSDFPP_RETURN_IF_ERROR(start.config.Validate());
-    // With votes the map's objects are its own.
-    const bool is_other = start.info.name != run.sequence ||
-                          (!votes && !AreOfSequence(run.objects, start.info.objects));
-    if (!loaded.run || is_other) {
-      return UsageError("--load {} is a map of '{}', expected one of {}, '{}'", file, run.sequence,
-                        source.path, start.info.name);
-    }
+    TSDFPP_RETURN_IF_ERROR(CheckGoesOn(start, file, run, source.path));
     const int end = start.info.first_index + start.info.frame_count - 1;
     start.last = until < 0 ? end : until;
     if (until < 0 && start.last < start.first) {
@@ -192,6 +253,7 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
           "--until {} is out of range: {} has frames up to {}, and --load {} goes to {}",
           start.last, start.info.name, end, file, run.last_frame);
     }
+    TSDFPP_RETURN_IF_ERROR(RemarkOnRecording(start, file, run));
   } else if (until >= 0) {
     return UsageError("--until {} needs a sequence to map", until);
   } else if (const char* option = source.Option(); option != nullptr) {
@@ -214,6 +276,8 @@ Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments&
   start.pipeline = std::make_unique<Pipeline>(
       start.config, votes ? ObjectsOfSegments(start) : run.objects, std::move(loaded.map),
       std::move(run.trajectories), votes ? run.objects : nobody);
+  start.recording = run.recording;
+  if (run.recording && run.recording->camera) start.pipeline->GoOnFrom(*run.recording->camera);
   return start;
 }
 
@@ -242,7 +306,12 @@ std::vector<ObjectInfo> ObjectsOf(const MapStart& start) {
   return objects;
 }
 
-MappedRun RunOf(const MapStart& start, int last_frame) {
+std::uint64_t HashOfDepth(const Frame& frame) {
+  const cv::Mat depth = frame.depth.isContinuous() ? frame.depth : frame.depth.clone();
+  return Fnv1a64({reinterpret_cast<const char*>(depth.data), depth.total() * depth.elemSize()});
+}
+
+MappedRun RunOf(const MapStart& start, int last_frame, std::optional<std::uint64_t> last_depth) {
   MappedRun run;
   run.sequence = start.info.name;
   run.objects = ObjectsOf(start);
@@ -250,6 +319,10 @@ MappedRun RunOf(const MapStart& start, int last_frame) {
   run.poses = PoseSourceName(start.config.poses);
   run.last_frame = last_frame;
   run.trajectories = start.pipeline->trajectories();
+  run.recording = start.recording;
+  if (last_depth) {
+    run.recording = {start.info.intrinsics, *last_depth, start.pipeline->camera_place()};
+  }
   return run;
 }
 

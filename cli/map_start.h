@@ -1,9 +1,11 @@
 // What `tsdfpp map` begins with: an empty map and a sequence, a map from a file, or both.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "cli/mapping_options.h"
 #include "cli/sequence_options.h"
@@ -27,12 +29,14 @@ struct MapWishes {
 
 struct MapStart {
   PipelineConfig config;
-  std::unique_ptr<FrameSource> source;  // none where a map alone is loaded
-  std::string mask_remark;              // why all of it is taken for background, or empty
-  std::string pose_remark;              // why poses are tracked unasked, or empty
-  std::optional<bool> has_masks;        // what each frame must have or lack; nothing: no matter
-  SequenceInfo info;                    // of the source, or what the map's file says
-  int first = 1;                        // frames to map, none where last < first
+  std::unique_ptr<FrameSource> source;       // none where a map alone is loaded
+  std::string mask_remark;                   // why all of it is taken for background, or empty
+  std::string pose_remark;                   // why poses are tracked unasked, or empty
+  std::vector<std::string> load_remarks;     // why a loaded map may not go on well
+  std::optional<MappedRecording> recording;  // what the loaded map's file says of it
+  std::optional<bool> has_masks;  // what each frame must have or lack; nothing: no matter
+  SequenceInfo info;              // of the source, or what the map's file says
+  int first = 1;                  // frames to map, none where last < first
   int last = 0;
   std::unique_ptr<Pipeline> pipeline;
 
@@ -59,7 +63,10 @@ Expected<MapStart> StartNew(const PipelineConfig& config, const SequenceArgument
 // With the map in `file`; goes on after its last frame where `source` names a sequence. Of `wishes`
 // only segmentation, votes, bleeding, repair, camera and tracking are looked at, as the file has
 // the rest. Errors: those of LoadMap and StartNew; kUsage where the sequence is another one than
-// the map's, or nothing is left to map; kData where what the file says does not go together.
+// the map's (its name, objects, images' size or lens), ids of one frame would be those of objects,
+// or nothing is left to map; kData where what the file says does not go together. What may be
+// meant is said in `load_remarks`: another depth image of the map's last frame, a camera whose
+// place nobody knows or asks for.
 Expected<MapStart> StartLoaded(const std::string& file, const SequenceArguments& source,
                                const MapWishes& wishes, int until);
 
@@ -71,7 +78,11 @@ Expected<Frame> ReadToMap(const MapStart& start, int index);
 // or with votes the map's own.
 std::vector<ObjectInfo> ObjectsOf(const MapStart& start);
 
-// What a file says beside the map, so that the run can go on.
-MappedRun RunOf(const MapStart& start, int last_frame);
+// Of MappedRecording.
+std::uint64_t HashOfDepth(const Frame& frame);
+
+// What a file says beside the map, so that the run can go on. `last_depth` is the last frame's;
+// nothing where none was mapped.
+MappedRun RunOf(const MapStart& start, int last_frame, std::optional<std::uint64_t> last_depth);
 
 }  // namespace tsdfpp

@@ -2,11 +2,13 @@
 
 #include <set>
 
+#include "core/farthest.h"
 #include "core/files.h"
 #include "core/plain_name.h"
 #include "mapper/map_persistence.h"
 #include "mapper/store/section_file.h"
 #include "mapper/store/volume_store.h"
+#include "mapper/volume/lattice_range.h"
 
 namespace tsdfpp {
 namespace {
@@ -22,6 +24,38 @@ void PutText(std::string_view text, std::string& bytes) {
 std::string GetText(ByteReader& bytes) {
   const auto size = bytes.Get<std::uint32_t>();
   return std::string(bytes.Take(size));
+}
+
+void PutRecording(const MappedRecording& recording, std::string& bytes) {
+  const Intrinsics& k = recording.intrinsics;
+  for (const int size : {k.width, k.height}) PutBytes(static_cast<std::int32_t>(size), bytes);
+  for (const double lens : {k.fx, k.fy, k.cx, k.cy}) PutBytes(lens, bytes);
+  PutBytes(recording.last_depth, bytes);
+  if (!recording.camera) return;
+  SavePose(recording.camera->T_WC_given, bytes);
+  SavePose(recording.camera->T_WC, bytes);
+}
+
+// Of a camera, which may be where no voxel can.
+Pose GetAnyPose(ByteReader& bytes) {
+  Pose T = Pose::Identity();
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 4; ++c) T.matrix()(r, c) = bytes.Get<double>();
+  }
+  return T;
+}
+
+MappedRecording GetRecording(ByteReader& bytes) {
+  MappedRecording recording;
+  Intrinsics& k = recording.intrinsics;
+  for (int* size : {&k.width, &k.height}) *size = bytes.Get<std::int32_t>();
+  for (double* lens : {&k.fx, &k.fy, &k.cx, &k.cy}) *lens = bytes.Get<double>();
+  recording.last_depth = bytes.Get<std::uint64_t>();
+  if (!bytes.ok() || bytes.AtEnd()) return recording;
+  recording.camera.emplace();
+  recording.camera->T_WC_given = GetAnyPose(bytes);
+  recording.camera->T_WC = GetAnyPose(bytes);
+  return recording;
 }
 
 std::string RunToBytes(const MappedRun& run) {
@@ -44,8 +78,11 @@ std::string RunToBytes(const MappedRun& run) {
       SavePose(T_WO, bytes);
     }
   }
-  // Absent where ids are given, as in files from before.
-  if (run.associate != AssociationMode::kGiven) PutText(AssociationModeName(run.associate), bytes);
+  // In files from before, these are absent: the first where ids are given.
+  if (run.recording || run.associate != AssociationMode::kGiven) {
+    PutText(AssociationModeName(run.associate), bytes);
+  }
+  if (run.recording) PutRecording(*run.recording, bytes);
   return bytes;
 }
 
@@ -83,8 +120,17 @@ Expected<MappedRun> RunFromBytes(std::string_view all, const LatticeRange& range
     if (!associate) return DataError("it has another length than it says");
     run.associate = *associate;
   }
+  if (bytes.ok() && !bytes.AtEnd()) run.recording = GetRecording(bytes);
   if (!bytes.AtEnd()) return DataError("it has another length than it says");
   return run;
+}
+
+Expected<void> CheckCameraPose(const Pose& T_WC) {
+  TSDFPP_RETURN_IF_ERROR(CheckRigid(T_WC, "the camera's"));
+  const double far_m = T_WC.translation().cwiseAbs().maxCoeff();
+  if (far_m <= kFarthest_m) return {};
+  return DataError("the camera is {:.6g} m from the origin along an axis, expected at most {:.6g}",
+                   far_m, kFarthest_m);
 }
 
 // What is wrong with a run beside a map of these objects, as a fragment.
@@ -95,6 +141,10 @@ Expected<void> CheckRun(const MappedRun& run, const std::vector<InstanceId>& map
   if (run.last_frame < -1 || run.last_frame > kGreatestSavedFrame) {
     return DataError("its last frame is {}, expected -1 to {}", run.last_frame,
                      kGreatestSavedFrame);
+  }
+  if (run.recording && run.recording->camera) {
+    TSDFPP_RETURN_IF_ERROR(CheckCameraPose(run.recording->camera->T_WC_given));
+    TSDFPP_RETURN_IF_ERROR(CheckCameraPose(run.recording->camera->T_WC));
   }
   std::set<InstanceId> listed;
   for (const ObjectInfo& object : run.objects) listed.insert(object.id);

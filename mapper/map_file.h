@@ -1,6 +1,7 @@
 // A whole map in one file (docs/map.md, "The map file").
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -11,11 +12,19 @@
 #include "core/error.h"
 #include "mapper/associate/associator.h"
 #include "mapper/map_representation.h"
+#include "mapper/track/camera_source.h"
 
 namespace tsdfpp {
 
 // The greatest number of a frame that a file's run has: one that its users can add to.
 inline constexpr int kGreatestSavedFrame = 1'000'000'000;
+
+// Of which recording a map is: what tells it from another of the same name.
+struct MappedRecording {
+  Intrinsics intrinsics;
+  std::uint64_t last_depth = 0;       // a hash of the last frame's depth image
+  std::optional<CameraPlace> camera;  // after the last frame, where poses were not taken as given
+};
 
 // What a run of the pipeline knows beside its map: needed to continue it, and to name the objects.
 struct MappedRun {
@@ -25,6 +34,7 @@ struct MappedRun {
   int last_frame = 0;               // the file number of the last frame in the map
   std::map<InstanceId, std::map<int, Pose>> trajectories;  // T_WO by frame, as the map had it
   AssociationMode associate = AssociationMode::kGiven;     // whose ids the map's are
+  std::optional<MappedRecording> recording;                // nothing in files from before
 };
 
 struct LoadedMap {

@@ -168,9 +168,12 @@ Pipeline::Pipeline(const PipelineConfig& config, const std::vector<ObjectInfo>& 
   // Frame numbers may have gone back: the map knows which pose was the last one.
   const MapPersistence* kept = std::as_const(*map_).persistence();
   for (const auto& [id, poses] : trajectories_) {
-    // One that was lost is nowhere.
-    if (lost_ != nullptr && !ModelOf(*map_, id)) continue;
     if (poses.empty()) continue;
+    // One that was lost, or removed, is nowhere until it is seen again.
+    if (lost_ != nullptr && !ModelOf(*map_, id)) {
+      T_WO_gone_[id] = poses.rbegin()->second;
+      continue;
+    }
     const std::optional<Pose> last = kept == nullptr ? std::nullopt : kept->LastPose(id);
     T_WO_[id] = last.value_or(poses.rbegin()->second);
   }
@@ -181,6 +184,8 @@ Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
 const CameraLog& Pipeline::camera_log() const { return camera_->log(); }
+const std::optional<CameraPlace>& Pipeline::camera_place() const { return camera_->place(); }
+void Pipeline::GoOnFrom(const CameraPlace& place) { camera_->GoOnFrom(place); }
 
 Expected<StepTimes> Pipeline::Process(const Frame& given) {
   StepTimes times;
@@ -232,10 +237,20 @@ Expected<Pipeline::TrackedFrame> Pipeline::Track(const Frame& frame,
                                                  const AssociatedObjects& association) {
   TrackedObjects chosen = tracked_;
   for (const auto& [id, name] : association.classes) chosen.Learn(id, name);
-  TrackedPoses tracked = tracker_->Track(frame, chosen.Select(association.labels), *map_, T_WO_);
+  ObjectPoses before = T_WO_;
+  before.insert(T_WO_gone_.begin(), T_WO_gone_.end());
+  TrackedPoses tracked = tracker_->Track(frame, chosen.Select(association.labels), *map_, before);
+  const auto is_back = [&](const auto& gone) {
+    const auto status = tracked.seen.find(gone.first);
+    return status != tracked.seen.end() && status->second == TrackStatus::kBegun;
+  };
+  for (const auto& gone : T_WO_gone_) {
+    if (!is_back(gone)) tracked.T_WO.erase(gone.first);
+  }
   const cv::Mat labels = LabelsToFuse(frame, association.labels, *map_, tracked);
   TSDFPP_RETURN_IF_ERROR(CheckReach(*map_, frame, labels, tracked.T_WO));
   associator_->Accept();
+  std::erase_if(T_WO_gone_, is_back);
   tracked_ = std::move(chosen);
   if (config_.poses != PoseSource::kGiven) track_log_.Add(frame.index, tracked);
   return TrackedFrame{std::move(tracked.T_WO), labels, std::move(tracked.seen)};
@@ -364,36 +379,6 @@ void Pipeline::CountWhileEmpty(const Frame& frame, const cv::Mat& labels) {
   if (!is_empty_) return;
   is_empty_ = map_->Memory().blocks == 0;
   if (is_empty_) in_vain_.Add(frame, labels);
-}
-
-std::vector<ObjectInfo> Pipeline::Objects() const {
-  std::vector<ObjectInfo> objects = objects_;
-  const bool votes = config_.associate == AssociationMode::kVotes;
-  std::set<InstanceId> ids;
-  std::set<std::string> names;
-  for (const ObjectInfo& object : objects) {
-    ids.insert(object.id);
-    names.insert(object.name);
-  }
-  if (votes && ids.insert(kBackground).second) {
-    objects.push_back({kBackground, NameOfUnlisted(kBackground), ""});
-  }
-  std::set<InstanceId> others;
-  for (const InstanceId id : map_->Objects()) others.insert(id);
-  for (const auto& [id, poses] : trajectories_) others.insert(id);
-  for (const InstanceId id : others) {
-    if (!ids.insert(id).second) continue;
-    std::string name = NameOfUnlisted(id);
-    while (!names.insert(name).second) name += "_";
-    objects.push_back({id, name, ""});
-  }
-  if (!votes) return objects;
-  std::sort(objects.begin(), objects.end(),
-            [](const ObjectInfo& a, const ObjectInfo& b) { return a.id < b.id; });
-  for (ObjectInfo& object : objects) {
-    if (object.id != kBackground) object.semantic_class = tracked_.ClassOf(object.id);
-  }
-  return objects;
 }
 
 }  // namespace tsdfpp

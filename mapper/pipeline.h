@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -124,6 +125,12 @@ class Pipeline {
   // Where the camera was; empty with given poses of it.
   const CameraLog& camera_log() const;
 
+  // What another run goes on from (MappedRun); nothing where the last pose was taken as given.
+  const std::optional<CameraPlace>& camera_place() const;
+  // Goes on from a map whose last frame's camera was found there. To be told before the first
+  // frame.
+  void GoOnFrom(const CameraPlace& place);
+
   // Which objects are tracked where poses are not given.
   const TrackedObjects& tracked() const { return tracked_; }
 
@@ -165,6 +172,7 @@ class Pipeline {
   std::unique_ptr<MaskRepair> repair_;  // nullptr where masks are not repaired
   std::unique_ptr<MapRepresentation> map_;
   ObjectPoses T_WO_;
+  ObjectPoses T_WO_gone_;  // where those of a loaded map were last that it has nothing of
   std::map<InstanceId, std::map<int, Pose>> trajectories_;
   TrackLog track_log_;
   std::vector<ObjectInfo> objects_;

@@ -1,5 +1,7 @@
-// What a pipeline says of a run that its user should know.
+// What a pipeline says of a run that its user should know, and of its objects.
+#include <algorithm>
 #include <limits>
+#include <set>
 
 #include "mapper/pipeline.h"
 #include "mapper/track/camera_tracker.h"
@@ -55,6 +57,36 @@ std::vector<std::string> Pipeline::Remarks() const {
   }
   for (std::string& remark : associator_->Remarks()) remarks.push_back(std::move(remark));
   return remarks;
+}
+
+std::vector<ObjectInfo> Pipeline::Objects() const {
+  std::vector<ObjectInfo> objects = objects_;
+  const bool votes = config_.associate == AssociationMode::kVotes;
+  std::set<InstanceId> ids;
+  std::set<std::string> names;
+  for (const ObjectInfo& object : objects) {
+    ids.insert(object.id);
+    names.insert(object.name);
+  }
+  if (votes && ids.insert(kBackground).second) {
+    objects.push_back({kBackground, NameOfUnlisted(kBackground), ""});
+  }
+  std::set<InstanceId> others;
+  for (const InstanceId id : map_->Objects()) others.insert(id);
+  for (const auto& [id, poses] : trajectories_) others.insert(id);
+  for (const InstanceId id : others) {
+    if (!ids.insert(id).second) continue;
+    std::string name = NameOfUnlisted(id);
+    while (!names.insert(name).second) name += "_";
+    objects.push_back({id, name, ""});
+  }
+  if (!votes) return objects;
+  std::sort(objects.begin(), objects.end(),
+            [](const ObjectInfo& a, const ObjectInfo& b) { return a.id < b.id; });
+  for (ObjectInfo& object : objects) {
+    if (object.id != kBackground) object.semantic_class = tracked_.ClassOf(object.id);
+  }
+  return objects;
 }
 
 }  // namespace tsdfpp

@@ -61,7 +61,7 @@ Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,
       return UsageError("object '{}' may be {} ({}) or {} ({}) of sequence {}", wanted, found->name,
                         found->id, other->name, other->id, info.name);
     }
-    ids.push_back(found->id);
+    if (std::ranges::count(ids, found->id) == 0) ids.push_back(found->id);
   }
   return ids;
 }

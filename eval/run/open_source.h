@@ -29,8 +29,8 @@ Expected<std::unique_ptr<FrameSource>> OpenSource(const std::filesystem::path& s
                                                   SequenceNotes* notes = nullptr,
                                                   const SceneOptions& scene = {});
 
-// The ids that a list of ids or names stands for. Errors: kUsage, naming the objects there
-// are, or the two that one word may mean.
+// The ids that a list of ids or names stands for, each once. Errors: kUsage, naming the objects
+// there are, or the two that one word may mean.
 Expected<std::vector<InstanceId>> FindObjects(const SequenceInfo& info,
                                               const std::vector<std::string>& names_or_ids);
 

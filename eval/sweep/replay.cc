@@ -300,7 +300,7 @@ Expected<ReplayResult> Replay(const ReplayOptions& options) {
   std::string why_no_slice;
   if (const MapRepresentation* map = mapper.map()) {
     TSDFPP_RETURN_IF_ERROR(
-        WriteViews(*map, source.info().intrinsics, remade.both.frame.T_WC, 2, out / "views"));
+        WriteViews(*map, remade.both.frame.intrinsics, remade.both.frame.T_WC, 2, out / "views"));
     const auto slice = CutMap(*map, SliceOf(remade.both, recorded.removed));
     if (slice) {
       TSDFPP_RETURN_IF_ERROR(WriteSlice(*slice, out));

@@ -31,4 +31,11 @@ struct CameraLog {
   int lost = 0;              // kTrack, not registered: not mapped
 };
 
+// Where the camera of the frame that was mapped last was given (kTrack, which does not look at it:
+// found), and where it was found.
+struct CameraPlace {
+  Pose T_WC_given = Pose::Identity();
+  Pose T_WC = Pose::Identity();
+};
+
 }  // namespace tsdfpp

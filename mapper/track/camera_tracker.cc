@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mapper/segment/segmenter.h"
+#include "mapper/volume/lattice_range.h"
 
 namespace tsdfpp {
 namespace {
@@ -77,12 +78,20 @@ CameraTracker::CameraTracker(CameraSource source, const SdfTrackConfig& config)
                  return model;
                }) {}
 
+void CameraTracker::GoOnFrom(const CameraPlace& place) {
+  place_ = place;
+  T_WC_first_ = place.T_WC_given;
+  T_WB_ = MadeRigid(place.T_WC_given * place.T_WC.inverse());
+}
+
 std::optional<Frame> CameraTracker::Locate(const Frame& frame, const cv::Mat& segments,
                                            const MapRepresentation& map) {
   located_ = {};
+  place_located_.reset();
   if (source_ == CameraSource::kGiven) return frame;
   const bool begins = !ModelOf(map, kBackground);
   if (begins || !T_WC_first_) T_WC_first_ = frame.T_WC;
+  if (begins) T_WB_ = Pose::Identity();
   Frame assumed = frame;
   if (source_ == CameraSource::kTrack) assumed.T_WC = *T_WC_first_;
   ObjectPoses before;
@@ -102,6 +111,8 @@ std::optional<Frame> CameraTracker::Locate(const Frame& frame, const cv::Mat& se
   }
   assumed.T_WC = T_WB_.inverse() * assumed.T_WC;
   located_.T_WC[frame.index] = assumed.T_WC;
+  const bool is_corrected = source_ == CameraSource::kRefine;
+  place_located_ = CameraPlace{is_corrected ? frame.T_WC : assumed.T_WC, assumed.T_WC};
   return assumed;
 }
 
@@ -110,6 +121,7 @@ void CameraTracker::Accept() {
   log_.located += located_.located;
   log_.carried_on += located_.carried_on;
   located_ = {};
+  place_ = place_located_;
 }
 
 }  // namespace tsdfpp

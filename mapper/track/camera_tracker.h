@@ -17,6 +17,10 @@ class CameraTracker {
   CameraTracker(const CameraTracker&) = delete;
   CameraTracker& operator=(const CameraTracker&) = delete;
 
+  // Goes on from a map whose last frame's camera was found there. To be told before the first
+  // frame.
+  void GoOnFrom(const CameraPlace& place);
+
   // The frame with T_WC as the map's background says: its pixels that `segments` (CV_16UC1) calls
   // kBackground, or all where it says nothing at all, are registered to it by the terms of
   // SdfTracker, whose gates hold. A frame has the given pose if the map begins with its background;
@@ -31,6 +35,9 @@ class CameraTracker {
   // Empty with kGiven.
   const CameraLog& log() const { return log_; }
 
+  // What to go on from after the frame mapped last; nothing where its pose was taken as given.
+  const std::optional<CameraPlace>& place() const { return place_; }
+
  private:
   CameraSource source_;
   // The camera is taken to be where it is given (kTrack: where it was given at first), and the
@@ -39,7 +46,9 @@ class CameraTracker {
   std::optional<Pose> T_WC_first_;
   SdfTracker tracker_;
   CameraLog log_;
+  std::optional<CameraPlace> place_;
   CameraLog located_;  // what the frame located last adds
+  std::optional<CameraPlace> place_located_;
 };
 
 }  // namespace tsdfpp
