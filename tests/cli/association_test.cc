@@ -52,7 +52,7 @@ class Associate : public testing::Test {
 std::unique_ptr<test::TempFolder> Associate::folder_;
 
 TEST_F(Associate, IsByVotesWhereIdsAreOfOneFrame) {
-  const CommandOutput output = Run("map", "map", {"--until", "12", "--remove", "object2"});
+  const CommandOutput output = Run("map", "map", {"--until", "12", "--remove", "object2,2"});
   ASSERT_EQ(output.exit_code, 0) << output.err;
   EXPECT_NE(output.err.find("mini: the map's ids are its own, found by votes; poses are tracked"),
             std::string::npos)
@@ -76,6 +76,23 @@ TEST_F(Associate, GoesOnFromASavedMap) {
   EXPECT_EQ(Json("rest/stats.json")["associate"], "votes");
   EXPECT_TRUE(fs::exists(*folder_ / "rest/mesh/object2-2.ply"));
   EXPECT_FALSE(fs::exists(*folder_ / "rest/mesh/object3-3.ply")) << "a known object was born again";
+}
+
+// A map by given ids takes none that are drawn anew.
+TEST_F(Associate, AMapByGivenIdsTakesNoOthers) {
+  const fs::path saved = *folder_ / "given.map";
+  ASSERT_EQ(
+      Run("map", "given", {"--segmentation", "none", "--until", "4", "--save", saved}).exit_code,
+      0);
+  const CommandOutput output = Run("map", "drawn", {"--load", saved, "--until", "6"});
+  EXPECT_EQ(output.exit_code, kUsage);
+  EXPECT_NE(output.err.find("is a map by given ids, and the ids in the masks of"),
+            std::string::npos)
+      << output.err;
+  EXPECT_FALSE(fs::exists(*folder_ / "drawn"));
+  const CommandOutput none =
+      Run("map", "none", {"--segmentation", "none", "--load", saved, "--until", "6"});
+  EXPECT_EQ(none.exit_code, 0) << none.err;
 }
 
 // What needs more frames than there are to be confirmed is never born.

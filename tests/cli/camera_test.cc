@@ -1,10 +1,13 @@
 // `--camera` of map and compare: what it finds, what it leaves behind, and what it refuses.
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
@@ -34,6 +37,14 @@ class CameraCommand : public testing::Test {
   static fs::path Sequence() { return *folder_ / "mini"; }
   static CommandOutput Run(std::vector<std::string> arguments) {
     return test::RunTsdfpp(arguments, folder_->path());
+  }
+  // The set in another dataset's format.
+  static fs::path Exported(const std::string& format) {
+    const fs::path folder = *folder_ / (format + "-set");
+    if (fs::exists(folder)) return folder;
+    const CommandOutput made = Run({"export", Sequence(), "--to", format, "--out", folder});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return folder;
   }
   static std::unique_ptr<test::TempFolder> folder_;
 };
@@ -102,6 +113,127 @@ TEST_F(CameraCommand, GoesOnWithALoadedMap) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto stats = nlohmann::json::parse(std::ifstream(out / "stats.json"));
   EXPECT_EQ(stats["camera_frames"]["located"], 3);
+}
+
+// Where the camera was in the last frame of a trajectory's file.
+Eigen::Vector3d LastPlace(const fs::path& file) {
+  std::ifstream lines(file);
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream numbers(line);
+    double frame = 0;
+    Eigen::Vector3d read;
+    if (numbers >> frame >> read.x() >> read.y() >> read.z()) place = read;
+  }
+  return place;
+}
+
+// A recording without poses: after 23 frames the camera is far from where it began.
+TEST_F(CameraCommand, GoesOnWhereTheCameraWasFound) {
+  const fs::path fixed = *folder_ / "fixed";
+  fs::copy(Exported("tum"), fixed, fs::copy_options::recursive);
+  fs::remove(fixed / "groundtruth.txt");
+  const fs::path saved = *folder_ / "found.map";
+  const auto map = [&](const std::string& out, std::vector<std::string> more) {
+    more.insert(more.begin(), {"map", fixed, "--fixed-camera", "--out", *folder_ / out});
+    const CommandOutput run = Run(more);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.err;
+  };
+  map("one", {"--camera", "track", "--until", "26"});
+  map("begun", {"--camera", "track", "--until", "24", "--save", saved});
+  map("gone-on", {"--camera", "track", "--load", saved, "--until", "26"});
+  const Eigen::Vector3d one = LastPlace(*folder_ / "one/trajectories/camera.txt");
+  EXPECT_GT(one.norm(), 0.1);
+  EXPECT_LT((LastPlace(*folder_ / "gone-on/trajectories/camera.txt") - one).norm(), kMost_m);
+  EXPECT_NE(map("given", {"--load", saved, "--until", "25"})
+                .find("its camera was found by the map; from frame 25 on it is where it is given"),
+            std::string::npos);
+}
+
+// Sequences of one name with other images.
+TEST_F(CameraCommand, AnotherRecordingIsNotTheMaps) {
+  const fs::path saved = *folder_ / "two.map";
+  const auto go_on = [&](const fs::path& sequence, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"map",     sequence, "--load", saved,
+                                       "--until", "4",      "--out",  *folder_ / "other-out"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return Run(arguments);
+  };
+  ASSERT_EQ(Run({"map", Sequence(), "--until", "2", "--out", *folder_ / "two", "--save", saved})
+                .exit_code,
+            0);
+  std::ofstream(*folder_ / "lens.txt") << "188.2 188.1 160 90";
+  const CommandOutput lens = go_on(Sequence(), {"--calibration", *folder_ / "lens.txt"});
+  EXPECT_EQ(lens.exit_code, kUsage);
+  EXPECT_NE(lens.err.find("is a map of images of 320x180 (fx 188.1, fy 188.1, cx 160, cy 90), "
+                          "expected one of " +
+                          Sequence().string() + ", whose are 320x180 (fx 188.2,"),
+            std::string::npos)
+      << lens.err;
+  const std::string words = "frame 2 of mini has another depth image than the map was made of";
+  const CommandOutput same = go_on(Sequence());
+  EXPECT_EQ(same.exit_code, 0) << same.err;
+  EXPECT_EQ(same.err.find(words), std::string::npos) << same.err;
+  const fs::path other = *folder_ / "other/mini";
+  fs::create_directories(other.parent_path());
+  fs::copy(Sequence(), other, fs::copy_options::recursive);
+  fs::copy_file(other / "depth_original/Depth0007.exr", other / "depth_original/Depth0002.exr",
+                fs::copy_options::overwrite_existing);
+  const CommandOutput shifted = go_on(other);
+  EXPECT_EQ(shifted.exit_code, 0) << shifted.err;
+  EXPECT_NE(shifted.err.find(words), std::string::npos) << shifted.err;
+}
+
+// The pictures of --views have the lens of the last frame, where each has its own: here its image
+// is that of the first one's, moved.
+TEST_F(CameraCommand, ViewsHaveTheLensOfTheLastFrame) {
+  constexpr int kShift_px = 40;
+  const fs::path set = *folder_ / "lenses";
+  fs::copy(Exported("bop"), set, fs::copy_options::recursive);
+  const fs::path scene = set / "test/000000";
+  // It adds nothing to the map.
+  const fs::path depth = scene / "depth/000002.png";
+  cv::Mat nothing = cv::imread(depth.string(), cv::IMREAD_UNCHANGED);
+  nothing.setTo(0);
+  ASSERT_TRUE(cv::imwrite(depth.string(), nothing));
+  const auto view = [&](const std::string& out) {
+    const CommandOutput run =
+        Run({"map", set, "--unchecked", "--until", "2", "--views", "1", "--out", *folder_ / out});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return cv::imread((*folder_ / out / "views/id-1.png").string(), cv::IMREAD_UNCHANGED);
+  };
+  const cv::Mat before = view("one-lens");
+  auto cameras = nlohmann::json::parse(std::ifstream(scene / "scene_camera.json"));
+  auto& centre = cameras["2"]["cam_K"][2];
+  centre = centre.get<double>() + kShift_px;
+  std::ofstream(scene / "scene_camera.json") << cameras;
+  const cv::Mat after = view("two-lenses");
+  ASSERT_EQ(before.size(), after.size());
+  ASSERT_FALSE(before.empty());
+  const cv::Mat moved = after.colRange(kShift_px, after.cols);
+  const int other = cv::countNonZero(before.colRange(0, after.cols - kShift_px) != moved);
+  EXPECT_LT(other, static_cast<int>(moved.total()) / 100);
+  EXPECT_GT(cv::countNonZero(before != after), static_cast<int>(moved.total()) / 100);
+}
+
+// No frame shows the room: the camera is nowhere, and not where it was given.
+TEST_F(CameraCommand, ViewsAreOfACameraThatWasFound) {
+  const fs::path set = *folder_ / "roomless";
+  fs::copy(Exported("tum"), set, fs::copy_options::recursive);
+  for (const auto& image : fs::directory_iterator(set / "mask")) {
+    cv::Mat mask = cv::imread(image.path().string(), cv::IMREAD_UNCHANGED);
+    mask.setTo(1);
+    ASSERT_TRUE(cv::imwrite(image.path().string(), mask));
+  }
+  const fs::path out = *folder_ / "nowhere";
+  const CommandOutput run =
+      Run({"map", set, "--camera", "track", "--until", "2", "--views", "1", "--out", out});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.err.find("--views 1: writes none, as the camera was found in no frame"),
+            std::string::npos)
+      << run.err;
+  EXPECT_FALSE(fs::exists(out / "views"));
 }
 
 }  // namespace

@@ -152,6 +152,8 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
       {{"compare", scene, "--out", "@/o", "--methods", "anchored,tsdf++/anchored"},
        "--methods names tsdf++/anchored twice"},
       {{"map", scene, "--out", "@/o", "--remove", ","}, "--remove ',' names no object"},
+      {{"map", scene, "--out", "@/o", "--remove", ""},
+       "--remove: found nothing, expected ids or names" + see("map")},
       {{"bench-set", "v1", "--sets", sets, "--run", "tsdf,tsdf", "--out", "@/o"},
        "method tsdf is named twice"},
       {{"bench-set", "v1", "--sets", sets, "--run", "anchored,tsdf++/anchored", "--out", "@/o"},

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "core/units.h"
+#include "mapper/map_file.h"
 #include "mapper/pipeline.h"
 #include "mapper/volume/lattice_range.h"
 #include "mapper/voxel_inspection.h"
@@ -119,6 +120,36 @@ TEST(CameraTracker, FindsTheCameraFromItsFirstPoseAlone) {
     ASSERT_TRUE(pipeline.Process(frame));
   }
   ExpectFound(pipeline, kFrames);
+}
+
+// In two goes, with the map and what its file has of the camera.
+TEST(CameraTracker, GoesOnWhereTheCameraWasFound) {
+  for (const CameraSource source : {CameraSource::kTrack, CameraSource::kRefine}) {
+    SCOPED_TRACE(CameraSourceName(source));
+    // Given poses that are off by the same, or are none.
+    const auto given = [&](int index) {
+      const Frame room = Room(index);
+      if (index == 1) return room;
+      Frame frame = room;
+      frame.T_WC = source == CameraSource::kRefine
+                       ? MakePose(0.05, Eigen::Vector3d::UnitZ(), {0.1, 0, 0}) * room.T_WC
+                       : MakePose(2, {1, 1, 0}, {10, 0, 0.1 * index});
+      return frame;
+    };
+    Pipeline first(ConfigOf(source), Toys());
+    EXPECT_FALSE(first.camera_place().has_value());
+    for (int i = 1; i <= kFrames / 2; ++i) ASSERT_TRUE(first.Process(given(i)));
+    const auto place = first.camera_place();
+    ASSERT_TRUE(place.has_value());
+    EXPECT_EQ(place->T_WC.matrix(), first.camera_log().T_WC.at(kFrames / 2).matrix());
+    auto file = MapFromBytes(MapToBytes(first.map()).value(), "map.tsdf");
+    ASSERT_TRUE(file.has_value());
+    Pipeline second(ConfigOf(source), Toys(), std::move(file->map), first.trajectories());
+    second.GoOnFrom(*place);
+    for (int i = kFrames / 2 + 1; i <= kFrames; ++i) ASSERT_TRUE(second.Process(given(i)));
+    ExpectFound(second, kFrames / 2);
+    EXPECT_EQ(second.camera_log().located, kFrames / 2);
+  }
 }
 
 // Between the frames that a network looks at nobody knows what is of an object, and the room is

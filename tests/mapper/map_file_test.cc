@@ -119,6 +119,30 @@ TEST_P(MapFile, ARunByVotesComesBack) {
   EXPECT_EQ(Loaded(votes).run->trajectories.size(), 1U);
 }
 
+// Of which recording it is, and where its camera was, which may be where no voxel can.
+TEST(MapFileNames, ARecordingComesBack) {
+  const auto map = MakeMap(Method::kTsdf, ToyConfig());
+  MappedRun run = SomeRun();
+  const auto loaded = [&] { return MapFromBytes(MapToBytes(*map, &run).value(), "map.tsdf"); };
+  EXPECT_FALSE(loaded()->run->recording.has_value());
+  run.recording = {{320, 180, 188.1, 188.2, 160, 90.5}, 0x123456789ABCDEF0, std::nullopt};
+  EXPECT_EQ(loaded()->run->recording->intrinsics, run.recording->intrinsics);
+  EXPECT_EQ(loaded()->run->recording->last_depth, run.recording->last_depth);
+  EXPECT_FALSE(loaded()->run->recording->camera.has_value());
+  run.recording->camera = {MakePose(1, {1, 2, 3}, {4, 5, 6e5}), MakePose(2, {3, 2, 1}, {7, 8, 9})};
+  EXPECT_EQ(loaded()->run->recording->camera->T_WC_given.matrix(),
+            run.recording->camera->T_WC_given.matrix());
+  EXPECT_EQ(loaded()->run->recording->camera->T_WC.matrix(), run.recording->camera->T_WC.matrix());
+  EXPECT_EQ(loaded()->run->associate, AssociationMode::kGiven);
+  run.recording->camera->T_WC.translation().x() = 1e8;
+  EXPECT_EQ(loaded().error().message,
+            "map.tsdf: section 'RUN ' is wrong: the camera is 1e+08 m from the origin along an "
+            "axis, expected at most 1e+07");
+  run.recording->camera->T_WC = Pose(Eigen::Scaling(2.0));
+  EXPECT_NE(loaded().error().message.find("the camera's pose is no rigid motion"),
+            std::string::npos);
+}
+
 // Names become file names of what is written; the checksums of such a file are right.
 TEST(MapFileNames, ObjectsWithNamesThatEscapeAreRefused) {
   const auto map = MakeMap(Method::kTsdf, ToyConfig());

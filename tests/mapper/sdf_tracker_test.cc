@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/units.h"
+#include "mapper/map_file.h"
 #include "mapper/pipeline.h"
 #include "mapper/voxel_inspection.h"
 #include "tests/mapper/every_method.h"
@@ -54,6 +55,32 @@ TEST(SdfTracker, FollowsAMovingObject) {
     EXPECT_EQ(span.frozen, 0);
     EXPECT_TRUE(pipeline.Remarks().empty());
   }
+}
+
+// One that was removed before the map was saved is seen again: its poses have one origin.
+TEST(SdfTracker, GoesOnFromTheLastPoseOfWhatTheMapHasNoMore) {
+  Pipeline before(TrackConfig(), Toys());
+  for (int i = 1; i <= 8; ++i) ASSERT_TRUE(before.Process(MovingToys(i)));
+  const Pose last = before.trajectories().at(kBrick).at(8);
+  ASSERT_GT(last.translation().norm(), kToyVoxel_m);
+  const auto removed = before.map().Clone();
+  removed->Remove(kBrick);
+  auto file = MapFromBytes(MapToBytes(*removed).value(), "map.tsdf");
+  ASSERT_TRUE(file.has_value());
+  Pipeline pipeline(TrackConfig(), Toys(), std::move(file->map), before.trajectories());
+  // As long as it is not seen it is nowhere.
+  Frame hidden = MovingToys(9);
+  hidden.depth.setTo(0, hidden.mask == kBrick);
+  ASSERT_TRUE(pipeline.Process(hidden));
+  EXPECT_FALSE(pipeline.trajectories().at(kBrick).contains(9));
+  ASSERT_TRUE(pipeline.Process(MovingToys(10)));
+  EXPECT_EQ(pipeline.trajectories().at(kBrick).at(10).matrix(), last.matrix());
+  for (int i = 11; i <= kFrames; ++i) ASSERT_TRUE(pipeline.Process(MovingToys(i)));
+  const Pose truth =
+      MovingToys(kFrames).T_WO.at(kBrick) * MovingToys(10).T_WO.at(kBrick).inverse() * last;
+  const Eigen::Vector3d at = MovingToys(1).T_WO.at(kBrick).translation();
+  const Pose& found = pipeline.trajectories().at(kBrick).at(kFrames);
+  EXPECT_LT((found * at - truth * at).norm(), kPixel_voxels * kToyVoxel_m);
 }
 
 TEST(SdfTracker, FreezesObjectsThatTheMaskSwaps) {
