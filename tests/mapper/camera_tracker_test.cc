@@ -126,14 +126,16 @@ TEST(CameraTracker, FindsTheCameraFromItsFirstPoseAlone) {
 TEST(CameraTracker, GoesOnWhereTheCameraWasFound) {
   for (const CameraSource source : {CameraSource::kTrack, CameraSource::kRefine}) {
     SCOPED_TRACE(CameraSourceName(source));
-    // Given poses that are off by the same, or are none.
+    // Given poses that drift, or are none.
     const auto given = [&](int index) {
-      const Frame room = Room(index);
-      if (index == 1) return room;
-      Frame frame = room;
-      frame.T_WC = source == CameraSource::kRefine
-                       ? MakePose(0.05, Eigen::Vector3d::UnitZ(), {0.1, 0, 0}) * room.T_WC
-                       : MakePose(2, {1, 1, 0}, {10, 0, 0.1 * index});
+      Frame frame = Room(index);
+      if (source == CameraSource::kTrack && index > 1) {
+        frame.T_WC = MakePose(2, {1, 1, 0}, {10, 0, 0.1 * index});
+      } else {
+        frame.T_WC =
+            MakePose(0.1 * kDegree * (index - 1), {1, 2, -1}, {0.002 * (index - 1), 0, 0}) *
+            frame.T_WC;
+      }
       return frame;
     };
     Pipeline first(ConfigOf(source), Toys());
