@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "core/files.h"
 #include "tests/cli/run_command.h"
 #include "tests/core/temp_folder.h"
 
@@ -231,23 +232,36 @@ TEST_F(CameraCommand, ViewsHaveTheLensOfTheLastFrame) {
   EXPECT_GT(cv::countNonZero(before != after), static_cast<int>(moved.total()) / 100);
 }
 
-// No frame shows the room: the camera is nowhere, and not where it was given.
+// Where no frame shows the room, the camera is where it was found last, and not where it is given.
 TEST_F(CameraCommand, ViewsAreOfACameraThatWasFound) {
-  const fs::path set = *folder_ / "roomless";
-  fs::copy(Exported("tum"), set, fs::copy_options::recursive);
-  for (const auto& image : fs::directory_iterator(set / "mask")) {
+  const fs::path set = Exported("tum");
+  const fs::path roomless = *folder_ / "roomless" / set.filename();
+  fs::create_directories(roomless.parent_path());
+  fs::copy(set, roomless, fs::copy_options::recursive);
+  for (const auto& image : fs::directory_iterator(roomless / "mask")) {
     cv::Mat mask = cv::imread(image.path().string(), cv::IMREAD_UNCHANGED);
     mask.setTo(1);
     ASSERT_TRUE(cv::imwrite(image.path().string(), mask));
   }
-  const fs::path out = *folder_ / "nowhere";
-  const CommandOutput run =
-      Run({"map", set, "--camera", "track", "--until", "2", "--views", "1", "--out", out});
-  ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_NE(run.err.find("--views 1: writes none, as the camera was found in no frame"),
-            std::string::npos)
-      << run.err;
-  EXPECT_FALSE(fs::exists(out / "views"));
+  const auto map = [&](const fs::path& sequence, const std::string& out,
+                       std::vector<std::string> more) {
+    more.insert(more.begin(),
+                {"map", sequence, "--camera", "track", "--views", "1", "--out", *folder_ / out});
+    const CommandOutput run = Run(more);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.err;
+  };
+  const std::string remark = "--views 1: writes none, as the camera was found in no frame";
+  EXPECT_NE(map(roomless, "nowhere", {"--until", "2"}).find(remark), std::string::npos);
+  EXPECT_FALSE(fs::exists(*folder_ / "nowhere/views"));
+  const fs::path saved = *folder_ / "seen.map";
+  map(set, "seen", {"--until", "2", "--save", saved});
+  map(roomless, "seen-last", {"--load", saved, "--until", "9"});
+  for (const char* view : {"views/id-1.png", "views/colour-1.png"}) {
+    const auto bytes = ReadFile(*folder_ / "seen" / view);
+    ASSERT_TRUE(bytes.has_value());
+    EXPECT_TRUE(*bytes == ReadFile(*folder_ / "seen-last" / view)) << view;
+  }
 }
 
 }  // namespace
