@@ -320,36 +320,36 @@ TEST(Experiment, ComparesPairByPair) {
   EXPECT_EQ(condition.means.at({"tsdf", other}).mean.why_not, "not asked");
 }
 
-// Three seeds in three profiles. In `paper` one value of tsdf++ is undefined, in `close` all but
-// one, in `fine` all of both: there nobody knows who is ahead.
+// Three seeds in three voxel sizes. In 10 mm one value of tsdf++ is undefined, in 20 mm all but
+// one, in 40 mm all of both: there nobody knows who is ahead.
 TEST(Experiment, TheTextSaysOfHowManyAMeanIsAndWhereNobodyKnows) {
   SweepResult result;
   auto config = Parse(kGood);
   ASSERT_TRUE(config.has_value());
   result.config = *config;
-  const auto add = [&](const char* profile, const char* method,
+  const auto add = [&](double voxel_m, const char* method,
                        const std::vector<std::optional<double>>& values) {
     CellSettings settings;
-    settings.profile = profile;
+    settings.voxel_m = voxel_m;
     settings.method = method;
     for (const std::optional<double>& value : values) {
       ++settings.seed;
       AddCell(result, settings, value);
     }
   };
-  add("paper", "tsdf", {0.5, 0.6, 0.1});
-  add("paper", "tsdf++", {0.9, 0.8, std::nullopt});
-  add("close", "tsdf", {0.5, 0.4, 0.3});
-  add("close", "tsdf++", {0.49, std::nullopt, std::nullopt});
-  add("fine", "tsdf", {std::nullopt, std::nullopt, std::nullopt});
-  add("fine", "tsdf++", {std::nullopt, std::nullopt, std::nullopt});
+  add(0.01, "tsdf", {0.5, 0.6, 0.1});
+  add(0.01, "tsdf++", {0.9, 0.8, std::nullopt});
+  add(0.02, "tsdf", {0.5, 0.4, 0.3});
+  add(0.02, "tsdf++", {0.49, std::nullopt, std::nullopt});
+  add(0.04, "tsdf", {std::nullopt, std::nullopt, std::nullopt});
+  add(0.04, "tsdf++", {std::nullopt, std::nullopt, std::nullopt});
   const std::string text = SweepText(result, ConditionsOf(result));
   EXPECT_NE(text.find(" (of 2 of 3) ("), std::string::npos) << text;
   EXPECT_NE(text.find("tsdf++ 0.490 (of 1 of 3) (-0.010 to tsdf, of one pair)."), std::string::npos)
       << text;
   EXPECT_EQ(text.find("(of 3 of 3)"), std::string::npos) << text;
-  EXPECT_NE(text.find("tsdf++ is not ahead of tsdf in hidden table kept (2 of 3): profile close; "
-                      "profile fine (undefined).\n"),
+  EXPECT_NE(text.find("tsdf++ is not ahead of tsdf in hidden table kept (2 of 3): voxel_m 0.02; "
+                      "voxel_m 0.04 (undefined).\n"),
             std::string::npos)
       << text;
   // Of those that nobody can compare none is ahead.
