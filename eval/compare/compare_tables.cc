@@ -56,7 +56,7 @@ const EvaluationColumn& ColumnOf(const char* csv) {
 
 // The method, and where its poses come from if that differs among the runs.
 std::string FrontTitle(const CompareResult& result, const CompareRun& run) {
-  const std::string method(MethodName(run.config.method));
+  std::string method(MethodName(run.config.method));
   if (result.config.poses.size() < 2) return method;
   return fmt::format("{}, {} poses", method, PoseSourceName(run.config.poses));
 }
