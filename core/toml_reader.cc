@@ -17,6 +17,16 @@ std::string TypeName(const toml::node& node) {
   return fmt::format("{} {}", type.find_first_of("aeiou") == 0 ? "an" : "a", type);
 }
 
+// Whether a string in it has more than one line.
+bool HasLineEnd(const toml::node& node) {
+  const auto has = [](const toml::node& inner) { return HasLineEnd(inner); };
+  if (const auto* text = node.as_string()) return text->get().find('\n') != std::string::npos;
+  if (const auto* array = node.as_array()) return std::any_of(array->begin(), array->end(), has);
+  const auto* table = node.as_table();
+  return table != nullptr && std::any_of(table->begin(), table->end(),
+                                         [&](const auto& entry) { return has(entry.second); });
+}
+
 // A finite number, integer or float; nothing otherwise.
 std::optional<double> Number(const toml::node& node) {
   if (!node.is_number()) return std::nullopt;
@@ -102,11 +112,15 @@ Expected<toml::table> ParseTomlFile(const std::filesystem::path& path) {
 }
 
 std::string TomlText(const toml::table& table) {
-  constexpr auto kFlags =
-      toml::toml_formatter::default_flags &
-      ~(toml::format_flags::allow_multi_line_strings | toml::format_flags::allow_literal_strings);
+  // What has no such string keeps the text that it always had: scenes are known by their text's
+  // hash.
+  auto flags = toml::toml_formatter::default_flags;
+  if (HasLineEnd(table)) {
+    flags &=
+        ~(toml::format_flags::allow_multi_line_strings | toml::format_flags::allow_literal_strings);
+  }
   std::ostringstream text;
-  text << toml::toml_formatter(table, kFlags);
+  text << toml::toml_formatter(table, flags);
   return text.str();
 }
 

@@ -19,8 +19,8 @@ namespace tsdfpp {
 Expected<toml::table> ParseTomlFile(const std::filesystem::path& path);
 Expected<toml::table> ParseToml(std::string_view text, std::string_view name);
 
-// Of finite numbers and strings of any bytes that UTF-8 allows; ends without a newline. Strings
-// have escapes: toml++ writes the others without a look at quotes and line ends in them.
+// Of finite numbers and strings of any bytes that UTF-8 allows; ends without a newline. Where a
+// string has several lines, all have escapes: toml++ puts it between quotes that may be in it.
 std::string TomlText(const toml::table& table);
 
 // Reads one table. Getters leave `value` untouched where the key is absent (so it keeps its

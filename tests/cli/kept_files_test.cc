@@ -29,7 +29,7 @@ class KeptFiles : public testing::Test {
 
   fs::path Export(DatasetFormat format) {
     test::BoxSource source(4);
-    const fs::path place = folder_ / DatasetFormatName(format);
+    fs::path place = folder_ / DatasetFormatName(format);
     const auto exported = ExportSequence(source, format, place);
     EXPECT_TRUE(exported.has_value()) << exported.error().message;
     return place;
