@@ -36,12 +36,12 @@ class CameraCommand : public testing::Test {
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static fs::path Sequence() { return *folder_ / "mini"; }
-  static CommandOutput Run(std::vector<std::string> arguments) {
+  static CommandOutput Run(const std::vector<std::string>& arguments) {
     return test::RunTsdfpp(arguments, folder_->path());
   }
   // The set in another dataset's format.
   static fs::path Exported(const std::string& format) {
-    const fs::path folder = *folder_ / (format + "-set");
+    fs::path folder = *folder_ / (format + "-set");
     if (fs::exists(folder)) return folder;
     const CommandOutput made = Run({"export", Sequence(), "--to", format, "--out", folder});
     EXPECT_EQ(made.exit_code, 0) << made.err;
