@@ -19,7 +19,7 @@ struct Calibration {
 // of many that took over each other's errors. `far` is of fewer: it corrects those along which the
 // place found is known as well as by it. Where that knows less, by the share: a box seen from
 // the front alone slides along itself, and a segment that showed its corner knows nothing of that.
-// And it corrects nothing that it does not know itself: of a ball's turns, which colours may tell.
+// And it corrects nothing that it does not know itself, as a ball's turns.
 Pose Joined(const Calibration& near, const Calibration& far, const SdfRegistrationResult& found);
 
 }  // namespace tsdfpp
