@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 #include <string>
-#include <unordered_set>
 #include <vector>
 
 #include "core/files.h"
@@ -36,6 +37,44 @@ std::int64_t DepthOf(std::string_view text) {
   return deepest;
 }
 
+// Looks through a text for an object that names a member twice, of which the library would take the
+// last one in silence. A pass of its own: what the library parses with a callback takes time with
+// the square of a list's objects.
+class MemberNames : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override {
+    open_.emplace_back();
+    return true;
+  }
+  bool key(string_t& name) override {
+    if (!twice_ && !open_.back().insert(name).second) twice_ = name;
+    return true;
+  }
+  bool end_object() override {
+    open_.pop_back();
+    return true;
+  }
+  bool start_array(std::size_t) override { return true; }
+  bool end_array() override { return true; }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+    return false;
+  }
+
+  // The first name that is there twice.
+  const std::optional<std::string>& twice() const { return twice_; }
+
+ private:
+  std::vector<std::set<std::string>> open_;  // of the objects that are open
+  std::optional<std::string> twice_;
+};
+
 // What the text holds; discarded where it is no JSON. Errors: too much of it, or an object that
 // names a member twice.
 Expected<nlohmann::json> ParseWithinLimits(std::string_view text, std::string_view where) {
@@ -43,26 +82,13 @@ Expected<nlohmann::json> ParseWithinLimits(std::string_view text, std::string_vi
                                     where, "bytes of JSON"));
   TSDFPP_RETURN_IF_ERROR(
       CheckLimit(&Limits::nesting, DepthOf(text), where, "lists and objects within one another"));
-  std::vector<std::unordered_set<std::string>> names;  // of the objects that are open
-  std::string twice;
-  bool is_twice = false;
-  const auto look = [&](int, nlohmann::json::parse_event_t event, const nlohmann::json& parsed) {
-    using Event = nlohmann::json::parse_event_t;
-    if (event == Event::object_start) names.emplace_back();
-    if (event == Event::object_end) names.pop_back();
-    if (event == Event::key && !is_twice) {
-      const auto& name = parsed.get_ref<const std::string&>();
-      is_twice = !names.back().insert(name).second;
-      if (is_twice) twice = name;
-    }
-    return true;
-  };
-  nlohmann::json value = nlohmann::json::parse(text, look, false);
-  // The library would take the last one in silence.
-  if (is_twice && !value.is_discarded()) {
-    return DataError("{}: an object has {} twice", where, Quoted(twice));
+  MemberNames names;
+  if (!nlohmann::json::sax_parse(text, &names))
+    return nlohmann::json(nlohmann::json::value_t::discarded);
+  if (names.twice()) {
+    return DataError("{}: an object has {} twice", where, Quoted(*names.twice()));
   }
-  return value;
+  return nlohmann::json::parse(text, nullptr, false);
 }
 
 template <typename Json>
