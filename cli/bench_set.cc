@@ -5,6 +5,7 @@
 #include "cli/command.h"
 #include "cli/sweep_progress.h"
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/sweep/bench_result.h"
 
@@ -69,22 +70,40 @@ Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments&
   return result;
 }
 
-// Errors: kUsage where the page would be one of the results that it is made of.
+// Errors: kUsage where what is written would change the benchmark, in whose folder nothing ever
+// changes.
+Expected<void> CheckOutsideOfSet(const BenchSet& set, const BenchSetArguments& options) {
+  const std::filesystem::path folder = set.file.parent_path();
+  std::vector<std::filesystem::path> places{folder, set.file};
+  for (const BenchSequence& sequence : set.sequences) places.push_back(folder / sequence.scene);
+  for (const std::filesystem::path& read : places) {
+    if (!LiesIn(options.out, read)) continue;
+    return UsageError("--out '{}' lies in '{}', which is read, expected another place", options.out,
+                      read.string());
+  }
+  return {};
+}
+
+// Errors: kUsage where the page would be one of the results that it is made of, now or when it is
+// made again.
 Expected<void> CheckPlaceOfPage(const BenchSetArguments& options) {
   const std::filesystem::path out(options.out);
-  std::error_code ignored;
-  const bool is_beside = std::filesystem::equivalent(
-      out.has_parent_path() ? out.parent_path() : ".", options.leaderboard, ignored);
-  if (!is_beside || out.extension() != ".json") return {};
+  const std::filesystem::path folder = AbsolutePath(out).parent_path();
+  bool is_result = out.extension() == ".json" && TruePath(folder) == TruePath(options.leaderboard);
+  for (const std::filesystem::path& entry : EntriesOf(options.leaderboard)) {
+    is_result |= entry.extension() == ".json" && LiesIn(out, entry);
+  }
+  if (!is_result) return {};
   return UsageError("--out '{}' would be one of the results of '{}', expected another place",
                     options.out, options.leaderboard);
 }
 
 Expected<CommandResult> RunBenchSet(const BenchSetArguments& options) {
   TSDFPP_ASSIGN(const BenchSet set, BenchSet::Load(options.sets, options.name));
+  if (!options.out.empty()) TSDFPP_RETURN_IF_ERROR(CheckOutsideOfSet(set, options));
   if (!options.run.empty()) return RunMethods(set, options);
   if (!options.leaderboard.empty()) {
-    TSDFPP_RETURN_IF_ERROR(CheckPlaceOfPage(options));
+    if (!options.out.empty()) TSDFPP_RETURN_IF_ERROR(CheckPlaceOfPage(options));
     TSDFPP_ASSIGN(const std::string page, Leaderboard(set, options.leaderboard));
     if (options.out.empty()) return CommandResult{{{"page", page}}, page};
     TSDFPP_RETURN_IF_ERROR(WriteFile(options.out, page));

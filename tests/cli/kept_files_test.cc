@@ -37,6 +37,17 @@ class KeptFiles : public testing::Test {
   void Write(const fs::path& file) {
     ASSERT_TRUE(WriteFile(folder_ / file.string(), "kept").has_value());
   }
+  // Two sequences, of which one is no file of the benchmark's folder.
+  void WriteBenchmark() {
+    std::string text =
+        "name = \"s\"\nscale = 1\nvoxel_m = 0.02\ntrunc_front = 10\ntrunc_back = 3\n"
+        "metrics = [\"visible_completion\"]\n";
+    for (const char* scene : {"a.toml", "../../elsewhere.toml"}) {
+      text += "[[sequence]]\nname = \"" + std::string(scene) + "\"\nscene = \"" + scene +
+              "\"\nscene_hash = \"?\"\ntruth_hash = \"?\"\n";
+    }
+    ASSERT_TRUE(WriteFile(folder_ / "sets/s/set.toml", text).has_value());
+  }
   void ExpectRefused(const std::vector<std::string>& arguments, const std::string& words) {
     const CommandOutput run = test::RunTsdfpp(arguments, folder_.path());
     EXPECT_EQ(run.exit_code, kUsage) << arguments.back() << run.err;
@@ -128,6 +139,37 @@ TEST_F(KeptFiles, OfTheFilesOfASceneAndANetwork) {
     ExpectSaveRefused({"scene.toml", "--segmentation", "network", "--model", "net.pb",
                        "--network-config", "net.toml"},
                       save);
+  }
+}
+
+// Its folder is frozen, and a page is none of the results that it is made of.
+TEST_F(KeptFiles, OfABenchmarkAndItsResults) {
+  WriteBenchmark();
+  const fs::path set = folder_ / "sets/s";
+  for (const char* file : {"sets/s/a.toml", "elsewhere.toml", "result.txt"}) Write(file);
+  fs::create_directories(folder_ / "results");
+  fs::create_symlink(folder_ / "result.txt", folder_ / "results/link.json");
+  fs::create_directory_symlink(set, folder_ / "to-set");
+  fs::create_directory_symlink(folder_ / "results", folder_ / "to-results");
+  const std::string text = ReadFile(set / "set.toml").value();
+  const auto refused = [&](const std::string& option, const std::string& of, const fs::path& out,
+                           const std::string& words) {
+    ExpectRefused({"bench-set", "s", "--sets", "sets", option, of, "--out", out}, words);
+  };
+  for (const char* page : {"sets/s/set.toml", "sets/s/a.toml", "sets/s/new.md", "sets/s/../s/x",
+                           "to-set/a.toml", "elsewhere.toml"}) {
+    refused("--leaderboard", "results", page, "which is read, expected another place");
+  }
+  for (const char* out : {"sets/s", "sets/s/new", "to-set"}) {
+    refused("--run", "tsdf", out, "which is read, expected another place");
+  }
+  for (const char* page : {"results/new.json", "to-results/new.json", "./results/../results/n.json",
+                           "results/link.json", "result.txt"}) {
+    refused("--leaderboard", "results", page, "would be one of the results of 'results'");
+  }
+  EXPECT_EQ(ReadFile(set / "set.toml"), text);
+  for (const char* file : {"sets/s/a.toml", "elsewhere.toml", "result.txt"}) {
+    EXPECT_EQ(ReadFile(folder_ / file), "kept") << file;
   }
 }
 
