@@ -42,8 +42,8 @@ Expected<BenchSequence> HashSequence(const BenchSet& set, const BenchSequence& s
 // Errors: kData, naming the first sequence that is not what was frozen, with both hashes.
 Expected<void> CheckFrozen(const BenchSet& set);
 
-// The set as an experiment of these methods, each scene with its own seed. Errors: kUsage, a method
-// that is unknown or, in whatever words, there twice; those of scenes.
+// The set as an experiment of these methods of ours, each scene with its own seed. Errors: kUsage,
+// a method that is none of them or, in whatever words, there twice; those of scenes.
 Expected<ExperimentConfig> ExperimentOf(const BenchSet& set,
                                         const std::vector<std::string>& methods);
 

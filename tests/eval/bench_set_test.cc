@@ -8,6 +8,7 @@
 
 #include "core/files.h"
 #include "eval/sweep/bench_result.h"
+#include "mapper/method_info.h"
 #include "sequence/sequence_json.h"
 #include "sim/load_scene.h"
 #include "tests/cli/run_command.h"
@@ -158,6 +159,11 @@ TEST_F(SmallSet, TheExperimentHasItsSettings) {
   EXPECT_EQ(cells[1].settings.trunc_back, 3);
   EXPECT_FALSE(ExperimentOf(set_, {"kinfu"}).has_value());
   EXPECT_FALSE(ExperimentOf(set_, {}).has_value());
+  // Its band is not the set's, and it has no labels.
+  const auto open3d = ExperimentOf(set_, {"tsdf", "open3d/3"});
+  ASSERT_FALSE(open3d.has_value());
+  EXPECT_EQ(open3d.error().message,
+            "method 'open3d/3' is unknown, expected one of " + MethodNames());
   EXPECT_FALSE(ExperimentOf(set_, {"anchored", "tsdf", "tsdf++/anchored"}).has_value());
 }
 
