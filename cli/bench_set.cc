@@ -46,22 +46,32 @@ Expected<CommandResult> Describe(const BenchSet& set) {
   return result;
 }
 
+// Where a method's result is written.
+std::filesystem::path FileOf(std::string method, const BenchSetArguments& options) {
+  std::replace(method.begin(), method.end(), '/', '-');
+  return std::filesystem::path(options.out) / (method + ".json");
+}
+
 Expected<CommandResult> RunMethods(const BenchSet& set, const BenchSetArguments& options) {
   if (options.out.empty()) return UsageError("--out is required with --run");
   TSDFPP_ASSIGN(const ExperimentConfig config, ExperimentOf(set, SplitList(options.run)));
+  const std::vector<AxisValue>& methods = config.grids.front().values.at("method");
+  const std::filesystem::path work = "work";
+  TSDFPP_RETURN_IF_ERROR(CheckWay(options.out, work / "any"));
+  for (const AxisValue& method : methods) {
+    const std::string name = AxisText(method);
+    TSDFPP_RETURN_IF_ERROR(CheckPlaceOfResult(set, name, FileOf(name, options)));
+  }
   TSDFPP_RETURN_IF_ERROR(CheckFrozen(set));
   SweepOptions sweep;
-  sweep.out = std::filesystem::path(options.out) / "work";
+  sweep.out = options.out / work;
   sweep.jobs = JobsOrCores(options.jobs);
   TSDFPP_ASSIGN(const SweepResult made,
                 WithSweepBar("bench-set", sweep, [&] { return RunSweep(config, sweep); }));
   CommandResult result{nlohmann::json::array(), ""};
-  for (const AxisValue& method : config.grids.front().values.at("method")) {
+  for (const AxisValue& method : methods) {
     const std::string name = AxisText(method);
-    std::string stem = name;
-    std::replace(stem.begin(), stem.end(), '/', '-');
-    const std::filesystem::path file =
-        std::filesystem::path(options.out) / fmt::format("{}.json", stem);
+    const std::filesystem::path file = FileOf(name, options);
     nlohmann::json json = BenchResultJson(set, made, name, options.commit);
     TSDFPP_RETURN_IF_ERROR(WriteFile(file, JsonText(json, 1) + "\n"));
     result.json.push_back(std::move(json));

@@ -78,6 +78,24 @@ bool LiesIn(const fs::path& path, const fs::path& place) {
   return !way.empty() && *way.begin() != "..";
 }
 
+Expected<void> CheckWay(const fs::path& folder, const fs::path& place,
+                        const std::set<std::string>& going) {
+  std::error_code failure;
+  fs::path way;
+  for (const fs::path& part : place.parent_path()) {
+    way /= part;
+    if (going.contains(way.string())) continue;
+    if (fs::is_symlink(fs::symlink_status(folder / way, failure))) {
+      return UsageError("{}: is a link, expected a folder or nothing", (folder / way).string());
+    }
+    const fs::file_status status = fs::status(folder / way, failure);
+    if (fs::exists(status) && !fs::is_directory(status)) {
+      return UsageError("{}: is a file, expected a folder or nothing", (folder / way).string());
+    }
+  }
+  return {};
+}
+
 std::string OwnName(const fs::path& folder) {
   return AbsolutePath(folder / "").lexically_normal().parent_path().filename().string();
 }

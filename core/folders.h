@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,12 @@ std::filesystem::path TruePath(const std::filesystem::path& path);
 
 // Whether `path` is, or would be, `place` or in it, links followed; never in the empty path.
 bool LiesIn(const std::filesystem::path& path, const std::filesystem::path& place);
+
+// Whether a file can be put at `place`, a path within `folder`. Errors: kUsage where a folder on
+// the way is a link, which would lead the file elsewhere, or is a file. What of these is `going`,
+// paths within `folder` as well, is removed before and may be anything.
+Expected<void> CheckWay(const std::filesystem::path& folder, const std::filesystem::path& place,
+                        const std::set<std::string>& going = {});
 
 // A folder's own name, also where the path ends with a slash or is "."
 std::string OwnName(const std::filesystem::path& folder);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/gate/gate_times.h"
 #include "eval/sweep/sweep_metrics.h"
@@ -264,6 +265,7 @@ Expected<void> RunNeeds(const GatesConfig& config, const Needs& needs, const Swe
     sweep.out = options.out / name;
     sweep.threads = 1;  // Open3D's, so that a ratio of times means the same on any machine
     const ExperimentConfig experiment = WithCells(config.FindExperiment(name)->config, settings);
+    TSDFPP_RETURN_IF_ERROR(CheckWay(options.out, std::filesystem::path(name) / "any"));
     TSDFPP_ASSIGN(SweepResult result, RunSweep(experiment, sweep));
     if (ForgetTimedApart(needs.TimedTogether(name), result, sweep.out)) {
       TSDFPP_ASSIGN(result, RunSweep(experiment, sweep));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/folders.h"
 #include "core/json_text.h"
 #include "core/one_line.h"
 
@@ -237,19 +238,7 @@ Expected<void> RunFolder::CheckWays(std::set<std::string> files) const {
   files.insert({kRunNote, kRunMoving});
   std::error_code failure;
   for (const std::string& name : files) {
-    fs::path folder;
-    for (const fs::path& part : fs::path(name).parent_path()) {
-      folder /= part;
-      // A link would lead the run's files out of its folder.
-      if (fs::is_symlink(fs::symlink_status(out_ / folder, failure)) &&
-          !old.contains(folder.string())) {
-        return UsageError("{}: is a link, expected a folder or nothing", (out_ / folder).string());
-      }
-      const fs::file_status status = fs::status(out_ / folder, failure);
-      if (fs::exists(status) && !fs::is_directory(status) && !old.contains(folder.string())) {
-        return UsageError("{}: is a file, expected a folder or nothing", (out_ / folder).string());
-      }
-    }
+    TSDFPP_RETURN_IF_ERROR(CheckWay(out_, name, old));
     const fs::file_status there = fs::symlink_status(out_ / name, failure);
     if (fs::is_other(there)) {
       return UsageError("{}: is no regular file, expected one or nothing", (out_ / name).string());

@@ -20,6 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+constexpr const char* kKind = "tsdfpp bench result";
+
 // A text of a result in a table's cell: one line, and nothing that Markdown or a browser would read
 // as more than text.
 std::string InMarkdown(std::string_view text) {
@@ -60,8 +62,7 @@ std::string Text(const Measured& value, int decimals) {
 
 // Is it a result of this benchmark? Errors: kData.
 Expected<void> CheckHead(const json& root, const BenchSet& set, const std::string& where) {
-  if (root.value("kind", json()) != "tsdfpp bench result" ||
-      root.value("schema", json()) != kBenchResultSchema) {
+  if (root.value("kind", json()) != kKind || root.value("schema", json()) != kBenchResultSchema) {
     return DataError("{}: is no benchmark result of schema {}", where, kBenchResultSchema);
   }
   if (root.value("bench_set", json()) != set.name || root.value("bench_hash", json()) != set.hash) {
@@ -241,13 +242,30 @@ json BenchResultJson(const BenchSet& set, const SweepResult& result, const std::
     entries.push_back({{"sequence", entry.grid}, {"scores", scores}});
   }
   return {{"schema", kBenchResultSchema},
-          {"kind", "tsdfpp bench result"},
+          {"kind", kKind},
           {"bench_set", set.name},
           {"bench_hash", set.hash},
           {"method", {{"name", method}, {"version", result.program}, {"commit", commit}}},
           {"hardware", HardwareJson()},
           {"renderer", result.renderer},
           {"entries", entries}};
+}
+
+Expected<void> CheckPlaceOfResult(const BenchSet& set, const std::string& method,
+                                  const fs::path& file) {
+  std::error_code failure;
+  const fs::file_status there = fs::symlink_status(file, failure);
+  if (!fs::exists(there)) return {};
+  const auto result = ReadJsonObject(file);
+  if (result && fs::is_regular_file(there)) {
+    const json maker = result->value("method", json());
+    if (result->value("kind", json()) == kKind && result->value("bench_set", json()) == set.name &&
+        maker.is_object() && maker.value("name", json()) == method) {
+      return {};
+    }
+  }
+  return UsageError("{}: is of no earlier run and would be replaced, expected another folder",
+                    file.string());
 }
 
 Expected<BenchResult> ReadBenchResult(const BenchSet& set, const fs::path& file) {

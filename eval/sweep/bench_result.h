@@ -18,6 +18,11 @@ inline constexpr int kBenchResultSchema = 1;
 nlohmann::json BenchResultJson(const BenchSet& set, const SweepResult& result,
                                const std::string& method, const std::string& commit);
 
+// Whether the result of a method can be written to `file`. Errors: kUsage where something else is
+// there than a result of this method on a benchmark of this name.
+Expected<void> CheckPlaceOfResult(const BenchSet& set, const std::string& method,
+                                  const std::filesystem::path& file);
+
 // A result as a leaderboard reads it.
 struct BenchResult {
   std::string file;

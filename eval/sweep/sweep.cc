@@ -27,6 +27,10 @@ namespace fs = std::filesystem;
 // Maps that one worker holds in memory at a time; more cells of a sequence render it again.
 constexpr std::size_t kMapsAtOnce = 16;
 
+// In the folder of the results.
+constexpr const char* kCells = "cells";
+constexpr const char* kSequences = "sequences";
+
 // What a worker does in one go.
 struct Task {
   const SequenceVariant* variant = nullptr;
@@ -82,7 +86,7 @@ std::vector<Task> TasksOf(const SweepPlan& plan, const CellStore& store) {
 
 Expected<void> WriteSequences(const SweepPlan& plan, const fs::path& out) {
   for (const auto& [id, variant] : plan.sequences) {
-    const fs::path folder = out / "sequences" / id;
+    const fs::path folder = out / kSequences / id;
     std::error_code ignored;
     if (fs::exists(folder / "scene.toml", ignored)) continue;
     for (const auto& [place, file] : variant.inputs) {
@@ -94,14 +98,50 @@ Expected<void> WriteSequences(const SweepPlan& plan, const fs::path& out) {
   return {};
 }
 
-// What killed processes were just writing (core/files.h).
+// Whether an experiment ran here before: each left its sequences first.
+bool RanBefore(const fs::path& out) {
+  constexpr std::size_t kIdLength = 16;
+  const std::vector<fs::path> entries = EntriesOf(out / kSequences);
+  return std::any_of(entries.begin(), entries.end(), [](const fs::path& entry) {
+    const std::string id = entry.filename().string();
+    return id.size() == kIdLength && id.find_first_not_of("0123456789abcdef") == id.npos &&
+           IsThere(entry / "scene.toml");
+  });
+}
+
+// Errors: kUsage where a link would lead results out of the folder, or where one of them would
+// replace a file that no experiment left.
+Expected<void> CheckPlaces(const SweepPlan& plan, const fs::path& out) {
+  TSDFPP_RETURN_IF_ERROR(CheckWay(out, fs::path(kCells) / "any"));
+  for (const auto& [id, variant] : plan.sequences) {
+    const fs::path folder = fs::path(kSequences) / id;
+    TSDFPP_RETURN_IF_ERROR(CheckWay(out, folder / "scene.toml"));
+    for (const auto& [place, file] : variant.inputs) {
+      TSDFPP_RETURN_IF_ERROR(CheckWay(out, folder / place));
+    }
+  }
+  const bool ran_before = RanBefore(out);
+  for (const char* name : kSweepFiles) {
+    std::error_code failure;
+    const fs::file_status there = fs::symlink_status(out / name, failure);
+    if (!fs::exists(there) || (ran_before && fs::is_regular_file(there))) continue;
+    return UsageError("{}: is of no earlier run and would be replaced, expected another folder",
+                      (out / name).string());
+  }
+  return {};
+}
+
+// What killed processes were just writing (core/files.h). Beside these folders somebody else's may
+// lie, and what is written there takes over its own halves.
 void RemoveHalves(const fs::path& out) {
-  std::error_code ignored;
-  const auto files = ListFilesBelow(out);
-  if (!files) return;
-  for (const fs::path& file : *files) {
-    if (file.extension() != ".part" || file.filename().string().front() != '.') continue;
-    fs::remove(file, ignored);
+  for (const char* folder : {kCells, kSequences}) {
+    const auto files = ListFilesBelow(out / folder);
+    if (!files) continue;
+    for (const fs::path& file : *files) {
+      std::error_code ignored;
+      if (file.extension() != ".part" || file.filename().string().front() != '.') continue;
+      fs::remove(file, ignored);
+    }
   }
 }
 
@@ -195,8 +235,9 @@ Expected<SweepResult> RunSweep(const ExperimentConfig& config, const SweepOption
   TSDFPP_ASSIGN(const SweepPlan plan, PlanSweep(config));
   TSDFPP_RETURN_IF_ERROR(MakeWritableFolder(options.out));
   TSDFPP_ASSIGN(const FolderLock lock, FolderLock::Take(options.out));
+  TSDFPP_RETURN_IF_ERROR(CheckPlaces(plan, options.out));
   RemoveHalves(options.out);
-  const CellStore store(options.out / "cells");
+  const CellStore store(options.out / kCells);
   TSDFPP_RETURN_IF_ERROR(WriteSequences(plan, options.out));
   const std::vector<Task> tasks = TasksOf(plan, store);
   TSDFPP_RETURN_IF_ERROR(RunTasks(tasks, store, options));

@@ -59,8 +59,9 @@ Expected<SweepPlan> PlanSweep(const ExperimentConfig& config);
 // Runs what is not yet below `options.out`: cells/<id>.json a cell, sequences/<id>/scene.toml a
 // sequence (with its inputs). Each file is whole or not there. Then writes what
 // eval/sweep/sweep_report.h says. Call it while the process has one thread.
-// Errors: those of PlanSweep; kEnvironment where it was stopped, a worker died, the disk refuses,
-// or another process works in the folder; those of RunCells.
+// Errors: those of PlanSweep; kUsage where a link would lead results out of the folder, or one of
+// them would replace a file that no experiment left; kEnvironment where it was stopped, a worker
+// died, the disk refuses, or another process works in the folder; those of RunCells.
 Expected<SweepResult> RunSweep(const ExperimentConfig& config, const SweepOptions& options);
 
 }  // namespace tsdfpp

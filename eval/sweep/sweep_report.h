@@ -2,6 +2,7 @@
 // (docs/experiments.md).
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,6 +13,8 @@
 namespace tsdfpp {
 
 inline constexpr int kResultsSchema = 1;
+// What WriteSweep writes.
+inline constexpr std::array kSweepFiles{"results.csv", "results.json", "summary.txt"};
 
 // A row an entry and evaluated frame: grid, cell, settings, frame, whether it is the examined one,
 // and every metric; empty where one is undefined or not known at that frame.

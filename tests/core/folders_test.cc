@@ -94,6 +94,33 @@ TEST(Folders, WhatIsNotThereLiesInWhatIsNotThere) {
   fs::current_path(before);
 }
 
+TEST(Folders, AWayLeadsThroughNoLinkAndNoFile) {
+  const TempFolder folder;
+  fs::create_directories(folder / "out/a/b");
+  fs::create_directories(folder / "elsewhere");
+  ASSERT_TRUE(WriteFile(folder / "out/file", "").has_value());
+  fs::create_directory_symlink(folder / "elsewhere", folder / "out/a/link");
+  fs::create_symlink("nowhere", folder / "out/dangling");
+  fs::create_directory_symlink(folder / "out", folder / "typed");
+  for (const char* place : {"new", "a/b/new", "not/there/new", "a/link", "file", "dangling"}) {
+    EXPECT_TRUE(CheckWay(folder / "out", place).has_value()) << place;
+    EXPECT_TRUE(CheckWay(folder / "typed", place).has_value()) << place;
+  }
+  const auto refused = [&](const std::string& way, const std::string& kind) {
+    for (const char* below : {"/new", "/new/er"}) {
+      const auto checked = CheckWay(folder / "out", way + below);
+      ASSERT_FALSE(checked.has_value()) << way;
+      EXPECT_EQ(checked.error().kind, ErrorKind::kUsage);
+      EXPECT_EQ(checked.error().message, (folder / "out" / way).string() + ": is a " + kind +
+                                             ", expected a folder or nothing");
+      EXPECT_TRUE(CheckWay(folder / "out", way + below, {way}).has_value()) << way;
+    }
+  };
+  refused("a/link", "link");
+  refused("dangling", "link");
+  refused("file", "file");
+}
+
 TEST(Folders, AWorkingFolderThatIsGoneIsNoException) {
   const TempFolder folder;
   const fs::path before = fs::current_path();

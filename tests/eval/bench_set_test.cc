@@ -216,8 +216,59 @@ TEST_F(SmallSet, OurMethodsRunOnItAndEnterThePage) {
   const auto page = run({"--leaderboard", folder_ / "r", "--out", folder_ / "page.md"});
   ASSERT_EQ(page.exit_code, 0) << page.err;
   EXPECT_NE(ReadFile(folder_ / "page.md")->find("| tsdf++/anchored | "), std::string::npos);
+  // The same command replaces its own results.
+  const auto again = run({"--run", "tsdf,anchored", "--commit", "d", "--out", folder_ / "r"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(ReadBenchResult(set_, folder_ / "r/tsdf.json")->commit, "d");
   EXPECT_EQ(run({}).exit_code, 0);
   EXPECT_EQ(run({"--run", "kinfu", "--out", folder_ / "x"}).exit_code, 2);
+}
+
+// A run replaces results of its own methods alone, and writes nothing behind a link.
+TEST_F(SmallSet, FilesOfOthersStay) {
+  const fs::path out = folder_ / "o";
+  const fs::path file = out / "tsdf.json";
+  json of_another = Result("tsdf", 1, 1);
+  of_another["bench_set"] = "v9";
+  json of_nobody = Result("tsdf", 1, 1);
+  of_nobody["method"] = "tsdf";
+  const std::string mine = "mine";
+  for (const std::string& theirs : {mine, json::array().dump(), of_another.dump(), of_nobody.dump(),
+                                    Result("better", 1, 1).dump()}) {
+    ASSERT_TRUE(WriteFile(file, theirs).has_value());
+    const auto place = CheckPlaceOfResult(set_, "tsdf", file);
+    ASSERT_FALSE(place.has_value()) << theirs;
+    EXPECT_EQ(place.error().message,
+              file.string() +
+                  ": is of no earlier run and would be replaced, expected another "
+                  "folder");
+  }
+  ASSERT_TRUE(WriteFile(file, Result("tsdf", 1, 1).dump()).has_value());
+  EXPECT_TRUE(CheckPlaceOfResult(set_, "tsdf", file).has_value());
+  EXPECT_TRUE(CheckPlaceOfResult(set_, "tsdf", out / "new.json").has_value());
+  fs::create_symlink(file, out / "link.json");
+  EXPECT_FALSE(CheckPlaceOfResult(set_, "tsdf", out / "link.json").has_value());
+
+  const auto refused = [&](const std::string& words) {
+    const auto run = test::RunTsdfpp(
+        {"bench-set", "s", "--sets", folder_ / "sets", "--run", "anchored,tsdf", "--out", out},
+        folder_.path());
+    EXPECT_EQ(run.exit_code, test::kUsage) << words << run.err;
+    EXPECT_NE(run.err.find(words), std::string::npos) << run.err;
+  };
+  ASSERT_TRUE(WriteFile(file, mine).has_value());
+  refused("tsdf.json: is of no earlier run");
+  EXPECT_EQ(ReadFile(file), mine);
+  fs::remove(file);
+  fs::create_directories(folder_ / "elsewhere");
+  fs::create_directory_symlink(folder_ / "elsewhere", out / "work");
+  refused("work: is a link, expected a folder or nothing");
+  fs::remove(out / "work");
+  fs::create_directories(out / "work");
+  fs::create_directory_symlink(folder_ / "elsewhere", out / "work/cells");
+  refused("cells: is a link, expected a folder or nothing");
+  EXPECT_TRUE(fs::is_empty(folder_ / "elsewhere"));
+  EXPECT_FALSE(fs::exists(out / "tsdf++-anchored.json"));
 }
 
 TEST_F(SmallSet, AnUnsoundResultIsRefusedInASentence) {

@@ -185,6 +185,44 @@ TEST_F(Sweep, NothingRunsTwiceAndJobsChangeNothing) {
             4);
 }
 
+// What no experiment left is not replaced, and nothing is written behind a link.
+TEST_F(Sweep, FilesOfOthersStay) {
+  const fs::path file = Experiment("method = \"tsdf\"\nvoxel_m = 0.03", "");
+  const fs::path out = folder_ / "out";
+  const auto refused = [&](const std::string& words) {
+    const auto run = RunTsdfpp({"sweep", file, "--out", out}, folder_.path());
+    EXPECT_EQ(run.exit_code, test::kUsage) << words << run.err;
+    EXPECT_NE(run.err.find(words), std::string::npos) << run.err;
+  };
+  // Folders of these names may be anybody's.
+  ASSERT_TRUE(WriteFile(out / "cells/blood.json", "{}").has_value());
+  ASSERT_TRUE(WriteFile(out / "sequences/mini/scene.toml", "").has_value());
+  for (const char* name : {"results.json", "results.csv", "summary.txt"}) {
+    ASSERT_TRUE(WriteFile(out / name, "theirs").has_value());
+    refused(std::string(name) + ": is of no earlier run and would be replaced");
+    EXPECT_EQ(ReadFile(out / name), "theirs");
+    fs::remove(out / name);
+  }
+  const fs::path elsewhere = folder_ / "elsewhere";
+  fs::create_directories(elsewhere);
+  for (const char* name : {"cells", "sequences"}) {
+    fs::rename(out / name, out / "aside");
+    fs::create_directory_symlink(elsewhere, out / name);
+    refused(std::string(name) + ": is a link, expected a folder or nothing");
+    fs::remove(out / name);
+    fs::rename(out / "aside", out / name);
+  }
+  EXPECT_TRUE(fs::is_empty(elsewhere));
+  // A download, say.
+  ASSERT_TRUE(WriteFile(out / ".film.mp4.part", "half").has_value());
+  EXPECT_EQ(RunSweep(file, "out").at("run_now"), 1);
+  EXPECT_EQ(ReadFile(out / ".film.mp4.part"), "half");
+  EXPECT_EQ(RunSweep(file, "out").at("run_now"), 0);
+  fs::remove(out / "summary.txt");
+  fs::create_directory(out / "summary.txt");
+  refused("summary.txt: is of no earlier run");
+}
+
 // Cells that differ in what is scored alone are mapped once, and say what each says by itself.
 TEST_F(Sweep, OneMapIsLookedAtInManyWays) {
   const auto grid = [](const std::string& sabotage) {
