@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <limits>
+#include <optional>
 #include <thread>
 
 #include "core/folders.h"
@@ -21,6 +21,9 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kKind = "tsdfpp bench result";
+
+// More than any scene or machine can give, and so little that sums of them have an end.
+constexpr double kMostOfAny = 1e15;
 
 // A text of a result in a table's cell: one line, and nothing that Markdown or a browser would read
 // as more than text.
@@ -83,29 +86,42 @@ std::string HardwareText(const json& hardware) {
 // A score of the metric `name`, in the range that the metric has where we know it.
 Expected<Measured> ReadScore(const std::string& name, const json& value, const json& sequence,
                              const std::string& where) {
-  const Measured score =
-      value.is_number() ? Measured::Of(value.get<double>()) : Measured::Undefined(value.at("why"));
-  if (!value.is_number() && !value.at("value").is_null()) {
-    return DataError("{}: {} is neither a number nor null with a reason", where, OneLine(name));
-  }
-  const SweepMetric* metric = FindMetric(name);
-  constexpr double kNoEnd = std::numeric_limits<double>::infinity();
-  const double most = metric == nullptr ? kNoEnd : MostOf(*metric).value_or(kNoEnd);
-  if (score.value.value_or(0) < 0 || score.value.value_or(0) > most) {
+  const auto wrong = [&](const std::string& expected) {
     return DataError("{}: {} of sequence {} is {}, expected {}", where, OneLine(name),
-                     JsonShown(sequence), JsonShown(value),
-                     most < kNoEnd ? fmt::format("0 to {}", most) : "0 or more");
+                     JsonShown(sequence), JsonShown(value), expected);
+  };
+  if (value.is_number()) {
+    const SweepMetric* metric = FindMetric(name);
+    const std::optional<double> most = metric == nullptr ? std::nullopt : MostOf(*metric);
+    const auto number = value.get<double>();
+    if (!(number >= 0 && number <= most.value_or(kMostOfAny) + kShareRounding)) {
+      return wrong(fmt::format("0 to {}", most.value_or(kMostOfAny)));
+    }
+    return Measured::Of(number);
   }
-  return score;
+  const json why = value.is_object() ? value.value("why", json()) : json();
+  if (!why.is_string() || !value.value("value", json(0)).is_null()) {
+    return wrong("a number or {\"value\": null, \"why\": \"...\"}");
+  }
+  return Measured::Undefined(why.get<std::string>());
 }
 
 Expected<void> ReadEntry(const json& entry, const std::string& where, BenchResult& result) {
-  auto& scores = result.scores[entry.at("sequence").get<std::string>()];
-  if (!scores.empty()) {
-    return DataError("{}: sequence {} is there twice", where, JsonShown(entry.at("sequence")));
+  const auto field = [&](const char* name) {
+    return entry.is_object() ? entry.value(name, json()) : json();
+  };
+  const json sequence = field("sequence");
+  const json named = field("scores");
+  if (!sequence.is_string() || !named.is_object()) {
+    return DataError(
+        "{}: an entry is {}, expected an object with the name 'sequence' and the "
+        "object 'scores'",
+        where, JsonShown(entry));
   }
-  for (const auto& [name, value] : entry.at("scores").items()) {
-    TSDFPP_ASSIGN(scores[name], ReadScore(name, value, entry.at("sequence"), where));
+  const auto [place, is_new] = result.scores.try_emplace(sequence.get<std::string>());
+  if (!is_new) return DataError("{}: sequence {} is there twice", where, JsonShown(sequence));
+  for (const auto& [name, value] : named.items()) {
+    TSDFPP_ASSIGN(place->second[name], ReadScore(name, value, sequence, where));
   }
   return {};
 }

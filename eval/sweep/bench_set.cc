@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/files.h"
 #include "core/folders.h"
+#include "core/one_line.h"
 #include "eval/sweep/sweep_metrics.h"
 #include "mapper/method_info.h"
 #include "sequence/sequence_json.h"
@@ -33,13 +35,18 @@ std::string Rounded(const Pose& T) {
   return text;
 }
 
-Expected<BenchSequence> ReadSequence(const toml::table& table, const std::string& where) {
+// `taken` are the names of those before it.
+Expected<BenchSequence> ReadSequence(const toml::table& table, const std::string& where,
+                                     std::set<std::string>& taken) {
   BenchSequence sequence;
   TomlReader reader(table, where, "sequence");
   reader.Get("name", sequence.name, true)
       .Get("scene", sequence.scene, true)
       .Get("scene_hash", sequence.scene_hash, true)
       .Get("truth_hash", sequence.truth_hash, true);
+  if (!taken.insert(sequence.name).second) {
+    reader.Fault("name", fmt::format("is {}, a second time", Quoted(sequence.name)));
+  }
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   return sequence;
 }
@@ -92,15 +99,25 @@ Expected<BenchSet> BenchSet::Load(const fs::path& folder, const std::string& nam
       .Get("trunc_front", set.trunc_front, true)
       .Get("trunc_back", set.trunc_back, true)
       .Get("metrics", set.metrics, true);
+  // The results are of this name, and are looked for by it.
+  if (const std::string folder_name = OwnName(folder / name); set.name != folder_name) {
+    reader.Fault("name", fmt::format("is {}, expected '{}', as the folder is called",
+                                     Quoted(set.name), folder_name));
+  }
+  std::set<std::string> metrics;
   for (const std::string& metric : set.metrics) {
     if (FindMetric(metric) == nullptr) {
       reader.Fault("metrics", fmt::format("holds '{}', which is no metric", metric));
     }
+    if (!metrics.insert(metric).second) {
+      reader.Fault("metrics", fmt::format("holds '{}' twice", metric));
+    }
   }
   CheckValues(reader, set);
   if (set.metrics.empty()) reader.Fault("metrics", "is empty, expected one name at least");
+  std::set<std::string> taken;
   for (const toml::table* table : reader.Tables("sequence", true)) {
-    TSDFPP_ASSIGN(BenchSequence sequence, ReadSequence(*table, where));
+    TSDFPP_ASSIGN(BenchSequence sequence, ReadSequence(*table, where, taken));
     set.sequences.push_back(std::move(sequence));
   }
   TSDFPP_RETURN_IF_ERROR(reader.Finish());

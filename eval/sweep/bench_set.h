@@ -32,7 +32,8 @@ struct BenchSet {
   std::vector<BenchSequence> sequences;
 
   // Reads `folder`/`name`/set.toml. Errors: kUsage, with file, line and key, also where a value is
-  // out of its axis's range; naming the sets there are where there is none of this name.
+  // out of its axis's range, a metric or a sequence is there twice, or the name is not the
+  // folder's; naming the sets there are where there is none of this name.
   static Expected<BenchSet> Load(const std::filesystem::path& folder, const std::string& name);
 };
 

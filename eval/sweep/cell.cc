@@ -35,9 +35,6 @@ nlohmann::json Named(const std::vector<Measured>& values) {
   return named;
 }
 
-// Sums of areas in another order may make a share that is whole a little more than 1.
-constexpr double kRounding = 1e-6;
-
 // Throws what says why, as the next ones do, where it is no value that the metric can have.
 Measured ValueFromJson(const nlohmann::json& value, const SweepMetric& metric) {
   if (!value.is_number()) {
@@ -48,7 +45,7 @@ Measured ValueFromJson(const nlohmann::json& value, const SweepMetric& metric) {
   }
   const double number = value.get<double>();
   const std::optional<double> most = MostOf(metric);
-  if (!std::isfinite(number) || number < 0 || (most && number > *most + kRounding)) {
+  if (!std::isfinite(number) || number < 0 || (most && number > *most + kShareRounding)) {
     throw std::out_of_range(fmt::format("{} is {}", metric.name, JsonShown(value)));
   }
   return Measured::Of(number);

@@ -34,6 +34,8 @@ struct SweepMetric {
 const std::vector<SweepMetric>& SweepMetrics();
 // The most that a metric can be; nothing where there is no end. None can be below 0.
 std::optional<double> MostOf(const SweepMetric& metric);
+// Sums of areas in another order may make a share that is whole a little more than 1.
+inline constexpr double kShareRounding = 1e-6;
 // nullptr where there is none of this name.
 const SweepMetric* FindMetric(std::string_view name);
 // The place of the metric of this name, which must be there.

@@ -132,6 +132,30 @@ TEST_F(SmallSet, ValuesThatNoMapHasAreRefused) {
   }
 }
 
+// What no result could be of is said before the hours that one takes.
+TEST_F(SmallSet, NamesAreThereOnceAndTheSetHasItsFoldersName) {
+  const fs::path file = folder_ / "sets/s/set.toml";
+  const std::string good = ReadFile(file).value();
+  const std::vector<std::array<std::string, 3>> cases{
+      {"name = \"b\"", "name = \"a\"", ":13: 'sequence.name' is 'a', a second time"},
+      {"\"ghost_area_cm2\"", "\"visible_completion\"",
+       ":6: 'metrics' holds 'visible_completion' twice"},
+      {"name = \"s\"", "name = \"v1\"",
+       ":1: 'name' is 'v1', expected 's', as the folder is called"}};
+  for (const auto& [old, text, sentence] : cases) {
+    std::string changed = good;
+    changed.replace(changed.find(old), old.size(), text);
+    ASSERT_TRUE(WriteFile(file, changed).has_value());
+    const auto set = BenchSet::Load(folder_ / "sets", "s");
+    ASSERT_FALSE(set.has_value()) << text;
+    EXPECT_EQ(set.error().kind, ErrorKind::kUsage);
+    EXPECT_NE(set.error().message.find("set.toml" + sentence), std::string::npos)
+        << set.error().message;
+  }
+  ASSERT_TRUE(WriteFile(file, good).has_value());
+  EXPECT_TRUE(BenchSet::Load(folder_ / "sets", "s/").has_value());
+}
+
 TEST_F(SmallSet, WhatIsNotAsFrozenIsNamed) {
   EXPECT_TRUE(CheckFrozen(set_).has_value());
   // The same text with a space in a comment is the same scene; a car that drives otherwise is not.
@@ -188,6 +212,15 @@ TEST_F(SmallSet, ALeaderboardIsBestFirst) {
   EXPECT_LT(with_half->find("| good | 0.800"), last);
   EXPECT_NE(with_half->find(" (of 1 of 2) |", last), std::string::npos) << *with_half;
   EXPECT_NE(page->find("| best | 1.000 | 0.800 |"), std::string::npos) << *page;
+}
+
+// The areas of a share are summed in another order than those of the whole.
+TEST_F(SmallSet, AWholeShareMayBeARoundingAboveOne) {
+  ASSERT_TRUE(
+      WriteFile(folder_ / "r/1.json", Result("whole", 1, 1.0000000000000002).dump()).has_value());
+  const auto page = Leaderboard(set_, folder_ / "r");
+  ASSERT_TRUE(page.has_value()) << page.error().message;
+  EXPECT_NE(page->find("| whole | 1.000 | 1.000 |"), std::string::npos) << *page;
 }
 
 // Whoever wrote a result does not write the page.
@@ -300,13 +333,30 @@ TEST_F(SmallSet, AnUnsoundResultIsRefusedInASentence) {
   refused(result, "has 3 metrics, the benchmark 2");
   result = Result("m", 1, 1);
   result["entries"][0]["scores"]["visible_completion"] = nullptr;
-  refused(result, "a field is missing or wrong");
+  refused(result,
+          "visible_completion of sequence \"a\" is null, expected a number or {\"value\": null, "
+          "\"why\": \"...\"}");
+  for (const json& score :
+       {json("1"), json(true), json::array(), json::object(), json{{"value", 1}, {"why", "x"}},
+        json{{"value", nullptr}}, json{{"value", nullptr}, {"why", 1}}, json{{"why", "x"}}}) {
+    result["entries"][0]["scores"]["visible_completion"] = score;
+    refused(result,
+            "visible_completion of sequence \"a\" is " + score.dump() + ", expected a number or {");
+  }
+  for (const json& entry : {json(1), json("a"), json{{"sequence", "a"}},
+                            json{{"sequence", 1}, {"scores", json::object()}}}) {
+    result["entries"][0] = entry;
+    refused(result, "an entry is " + entry.dump() + ", expected an object with the name");
+  }
   result = Result("m", 1, 1);
   result["entries"][0]["scores"]["visible_completion"] = 1.5;
   refused(result, "visible_completion of sequence \"a\" is 1.5, expected 0 to 1");
   result = Result("m", 1, 1);
   result["entries"][0]["scores"]["ghost_area_cm2"] = -1;
-  refused(result, "ghost_area_cm2 of sequence \"a\" is -1, expected 0 or more");
+  refused(result, "ghost_area_cm2 of sequence \"a\" is -1, expected 0 to 1e+15");
+  // Two such have no sum.
+  result["entries"][0]["scores"]["ghost_area_cm2"] = 1.7e308;
+  refused(result, "ghost_area_cm2 of sequence \"a\" is 1.7e+308, expected 0 to 1e+15");
   result = Result("m", 1, 1);
   result["hardware"].erase("cpu");
   refused(result, "a field is missing or wrong");
