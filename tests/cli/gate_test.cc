@@ -127,6 +127,18 @@ TEST_F(GateCommand, FromTheFirstReferencesToAFailure) {
   EXPECT_NE(explained.out.find("\nvalue: "), std::string::npos) << explained.out;
 }
 
+TEST_F(GateCommand, WritesNothingBehindALink) {
+  const std::filesystem::path elsewhere = folder_.path() / "elsewhere";
+  std::filesystem::create_directories(elsewhere);
+  std::filesystem::create_directories(folder_.path() / "out");
+  std::filesystem::create_directory_symlink(elsewhere, folder_.path() / "out" / "tiny");
+  const auto refused = Gate({});
+  EXPECT_EQ(refused.exit_code, test::kUsage) << refused.out << refused.err;
+  EXPECT_NE(refused.err.find("tiny: is a link, expected a folder or nothing"), std::string::npos)
+      << refused.err;
+  EXPECT_TRUE(std::filesystem::is_empty(elsewhere));
+}
+
 // An edited cell is no figure of a gate: it is run anew.
 TEST_F(GateCommand, AnEditedCellIsRunAgain) {
   const std::string gates = kGates;
