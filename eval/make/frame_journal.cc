@@ -9,6 +9,7 @@
 #include "core/json_text.h"
 #include "core/one_line.h"
 #include "core/pose_text.h"
+#include "sequence/cofusion_layout.h"
 
 namespace tsdfpp {
 namespace fs = std::filesystem;
@@ -75,6 +76,13 @@ Expected<JournalEntry> FrameJournal::Read(int index) const {
   } catch (const std::exception& exception) {
     return DataError("{}: not a frame's entry ({})", path.string(), WithoutTag(exception.what()));
   }
+}
+
+int FrameJournal::Count() const {
+  const std::vector<fs::path> files = EntriesOf(notes_);
+  return static_cast<int>(std::count_if(files.begin(), files.end(), [](const fs::path& file) {
+    return cofusion::NumberOf(file.filename().string(), "", ".json").has_value();
+  }));
 }
 
 std::map<int, JournalEntry> FrameJournal::ReadSound() const {

@@ -32,6 +32,8 @@ class FrameJournal {
   Expected<void> Add(const JournalEntry& entry) const;
   // Errors: kData where the frame has no entry that can be read.
   Expected<JournalEntry> Read(int index) const;
+  // How many entries there are, sound or not.
+  int Count() const;
   // The entries of the frames whose files are all there with the bytes that were written.
   std::map<int, JournalEntry> ReadSound() const;
 

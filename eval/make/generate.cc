@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "core/guard.h"
 #include "core/json_text.h"
 #include "eval/make/frame_journal.h"
 #include "eval/run/workers.h"
@@ -115,6 +116,20 @@ class Generator {
     TSDFPP_RETURN_IF_ERROR(CheckPlace());
     TSDFPP_RETURN_IF_ERROR(Collect());
     TSDFPP_RETURN_IF_ERROR(staging_.Make());
+    auto made = Guarded([this] { return MakeSequence(); });
+    const int frames = journal_.Count();
+    if (made || frames == 0) return made;
+    // Whatever ended the run, whole frames are not lost; those of no use have been removed.
+    staging_.Keep();
+    made.error().message +=
+        begun_ ? fmt::format("; {} of {} frames are kept, from which the same command goes on",
+                             frames, scene_.frames)
+               : "; the frames that an earlier run made are kept";
+    return made;
+  }
+
+ private:
+  Expected<GenerateResult> MakeSequence() {
     // Another process may have finished it while this one waited.
     TSDFPP_RETURN_IF_ERROR(CheckPlace());
     const auto start = Clock::now();
@@ -122,17 +137,12 @@ class Generator {
     TSDFPP_ASSIGN(SequenceRecord record, Finish());
     result_.render_s = SecondsSince(start);
     TSDFPP_RETURN_IF_ERROR(Verify(record));
-    // It took a while, in which somebody may have put something there. What was made is kept for
-    // when that is away.
-    if (const auto place = CheckPlace(); !place) {
-      staging_.Keep();
-      return tl::unexpected(place.error());
-    }
+    // It took a while, in which somebody may have put something there.
+    TSDFPP_RETURN_IF_ERROR(CheckPlace());
     TSDFPP_RETURN_IF_ERROR(staging_.TakeThePlace());
     return result_;
   }
 
- private:
   Expected<void> CheckPlace() const {
     auto place = CheckReplaceable(options_.out, options_.overwrite);
     if (!place && !options_.overwrite && IsOurSequence(options_.out)) {
@@ -155,11 +165,8 @@ class Generator {
 
   bool Stopped() const { return options_.stop != nullptr && *options_.stop; }
 
-  Expected<void> StoppedError() {
-    staging_.Keep();
-    return EnvironmentError(
-        "{}: stopped with {} of {} frames made; the same command goes on from there",
-        options_.out.string(), entries_.size(), scene_.frames);
+  Expected<void> StoppedError() const {
+    return EnvironmentError("{}: stopped", options_.out.string());
   }
 
   Expected<void> Render() {
@@ -170,17 +177,10 @@ class Generator {
                   }));
     int greeted = 0;
     while (true) {
-      auto next = workers.Next();
-      if (!next) {
-        // A worker that was killed leaves sound frames behind; a scene that cannot be rendered
-        // none.
-        const bool died = next.error().message.starts_with("a worker process") ||
-                          next.error().message.starts_with("out of memory") ||
-                          next.error().kind == ErrorKind::kInternal;
-        if (died && greeted == jobs) staging_.Keep();
-        return tl::unexpected(next.error());
-      }
+      const auto next = workers.Next();
+      // A signal to the whole group ends the workers as well.
       if (Stopped()) return StoppedError();
+      if (!next) return tl::unexpected(next.error());
       if (!*next) {
         if (workers.running() == 0) break;
         continue;  // another signal
@@ -229,6 +229,7 @@ class Generator {
       TSDFPP_RETURN_IF_ERROR(staging_.Clear());
       TSDFPP_RETURN_IF_ERROR(journal_.WriteKey(key));
     }
+    begun_ = true;
     result_.resumed_frames = static_cast<int>(entries_.size());
     const int last = result_.info.first_index + result_.info.frame_count;
     for (int index = last - 1; index >= result_.info.first_index; --index) {
@@ -287,6 +288,7 @@ class Generator {
     for (const auto& [place, file] : input_files_) {
       TSDFPP_ASSIGN(files[place], ReadFile(file));
       if (HashText(files[place]) != input_hashes_[place]) {
+        TSDFPP_RETURN_IF_ERROR(staging_.Clear());
         return DataError("{}: was changed while the scene was rendered from it", file.string());
       }
     }
@@ -305,6 +307,7 @@ class Generator {
     if (Stopped()) return StoppedError();
     if (!result_.certificate.sound()) {
       const auto& findings = result_.certificate.findings;
+      TSDFPP_RETURN_IF_ERROR(staging_.Clear());
       return DataError(
           "{}: the sequence does not verify and is not kept; {} findings, the first: {}",
           options_.out.string(), findings.size(), FindingText(findings.front()));
@@ -325,6 +328,7 @@ class Generator {
   GenerateResult result_;
   std::map<int, JournalEntry> entries_;
   std::vector<int> missing_;  // the next at the back
+  bool begun_ = false;        // what an earlier run left is taken over or removed
 };
 
 }  // namespace

@@ -43,13 +43,15 @@ struct GenerateResult {
 // true, and what the sensor made of them lies beside them (sequence/cofusion_layout.h). The bytes
 // do not depend on `jobs`.
 //
-// Frames are made in a hidden folder beside `out`, which takes out's place in the end. It stays
-// there if the run is killed or stopped, or a worker dies; the next run of the same scene with the
-// same program and renderer keeps the frames whose files have the hashes that were noted, and makes
-// the others. Any other error removes it. Call it while the process has one thread.
+// Frames are made in a hidden folder beside `out`, which takes out's place in the end. Whatever
+// ends the run, it stays there as soon as it holds a whole frame; the next run of the same scene
+// with the same program and renderer keeps the frames whose files have the hashes that were noted,
+// and makes the others. A run of anything else removes it, once its renderer has begun. Call it
+// while the process has one thread.
 //
 // Errors: those of SimulatedSource::Open and of writing a set; kEnvironment where it was stopped or
-// a worker died; kData where the sequence does not verify: nothing is left of it.
+// a worker died; kData where the sequence does not verify, or a file that it is made of was changed
+// meanwhile: nothing is left of it.
 Expected<GenerateResult> GenerateSequence(const SceneConfig& scene, const std::string& version,
                                           const GenerateOptions& options);
 

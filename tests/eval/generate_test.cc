@@ -152,6 +152,58 @@ TEST_F(Generation, AStoppedRunGoesOnWhereItWas) {
   ExpectSameFiles(whole_, out_);
 }
 
+// Neither to one that could not begin, nor to one that failed on the way.
+TEST_F(Generation, FramesAreNotLostToALaterRun) {
+  const pid_t process = Start(out_);
+  ASSERT_TRUE(WaitForFrames(process, hidden_ / "notes", 3));
+  kill(-process, SIGKILL);
+  waitpid(process, nullptr, 0);
+  const auto output = RunTsdfpp({"generate", scene_, "--out", out_, "--share", "0"}, folder_.path(),
+                                {{"MUJOCO_GL", "nonsense"}});
+  EXPECT_NE(output.exit_code, 0);
+  EXPECT_NE(output.err.find("; the frames that an earlier run made are kept"), std::string::npos)
+      << output.err;
+  // In the place of the last frame's colour.
+  const fs::path in_the_way = hidden_ / fmt::format("set/colour/Color{:04d}.png/full", kFrames);
+  ASSERT_TRUE(WriteFile(in_the_way, "full").has_value());
+  const auto failed = Generate(out_);
+  EXPECT_EQ(failed.exit_code, 3) << failed.err;
+  EXPECT_NE(failed.err.find(fmt::format(" of {} frames are kept, from which the same", kFrames)),
+            std::string::npos)
+      << failed.err;
+  EXPECT_FALSE(fs::exists(out_));
+  fs::remove_all(in_the_way.parent_path());
+  const auto again = Generate(out_, {"--json"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_GE(nlohmann::json::parse(again.out)["resumed_frames"].get<int>(), 3);
+  EXPECT_FALSE(fs::exists(hidden_));
+}
+
+// As systemd and timeout send it: the workers end of it, which is no fault of theirs.
+TEST_F(Generation, ASignalToTheWholeGroupIsAStop) {
+  const pid_t process = fork();
+  if (process == 0) {
+    setpgid(0, 0);
+    signal(SIGTERM, SIG_IGN);
+    std::atomic<bool> stop = false;
+    GenerateOptions options;
+    options.out = out_;
+    options.ray_share = 0;
+    options.stop = &stop;
+    options.progress = [&](const std::string&, int, int, int) {
+      stop = true;
+      kill(0, SIGTERM);
+    };
+    const auto made = GenerateSequence(LoadSceneConfig(scene_).value(), "0", options);
+    const bool said = !made && made.error().message.starts_with(out_.string() + ": stopped");
+    _exit(said ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(process, &status, 0), process);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 TEST_F(Generation, AnotherSceneBeginsAnew) {
   const pid_t process = Start(out_);
   ASSERT_TRUE(WaitForFrames(process, hidden_ / "notes", 3));
