@@ -178,6 +178,17 @@ TomlReader& TomlReader::Get(std::string_view key, int& value, bool required) {
   return *this;
 }
 
+TomlReader& TomlReader::Get(std::string_view key, std::int64_t& value, bool required) {
+  if (const toml::node* node = Find(key, required)) {
+    if (node->is_integer()) {
+      value = node->as_integer()->get();
+    } else {
+      WrongType(key, *node, "a whole number");
+    }
+  }
+  return *this;
+}
+
 TomlReader& TomlReader::Get(std::string_view key, double& value, bool required) {
   if (const toml::node* node = Find(key, required)) {
     if (const auto number = Number(*node)) {

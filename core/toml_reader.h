@@ -5,6 +5,7 @@
 #include <toml++/toml.h>
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -33,6 +34,7 @@ class TomlReader {
 
   TomlReader& Get(std::string_view key, bool& value, bool required = false);
   TomlReader& Get(std::string_view key, int& value, bool required = false);
+  TomlReader& Get(std::string_view key, std::int64_t& value, bool required = false);
   TomlReader& Get(std::string_view key, double& value, bool required = false);
   TomlReader& Get(std::string_view key, std::string& value, bool required = false);
   TomlReader& Get(std::string_view key, Eigen::Vector3d& value, bool required = false);

@@ -66,10 +66,15 @@ void CheckValues(TomlReader& reader, const BenchSet& set) {
   }
 }
 
-// The scene's own, with which it was frozen. A scene's file holds none that a double does not.
-// Errors: those of LoadSceneConfig.
+// The scene's own, with which it was frozen. Errors: those of LoadSceneConfig; kUsage where an
+// experiment has no such seed.
 Expected<AxisValue> SeedOf(const BenchSet& set, const BenchSequence& sequence) {
-  TSDFPP_ASSIGN(const SceneConfig scene, LoadSceneConfig(set.file.parent_path() / sequence.scene));
+  const fs::path file = set.file.parent_path() / sequence.scene;
+  TSDFPP_ASSIGN(const SceneConfig scene, LoadSceneConfig(file));
+  if (scene.seed > kLargestSeed) {
+    return UsageError("{}: 'seed' is {}, expected 0 to {} in a scene of a benchmark", file.string(),
+                      scene.seed, kLargestSeed);
+  }
   return AxisValue(static_cast<double>(scene.seed));
 }
 

@@ -55,12 +55,9 @@ Expected<void> SetScene(Settings& settings, const AxisValue& value) {
   return {};
 }
 
-// Exact in a double, and in TOML.
-constexpr double kLargestSeed = 9007199254740992.0;
-
 Expected<void> SetSeed(Settings& settings, const AxisValue& value) {
   const auto* number = std::get_if<double>(&value);
-  if (number == nullptr || !(*number >= 0 && *number <= kLargestSeed) ||
+  if (number == nullptr || !(*number >= 0 && *number <= static_cast<double>(kLargestSeed)) ||
       std::floor(*number) != *number) {
     return Wrong(value, "a whole number from 0 to 2^53");
   }

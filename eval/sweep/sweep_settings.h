@@ -19,6 +19,10 @@ namespace tsdfpp {
 // this; its band follows, in voxels on both sides: "open3d/10".
 inline constexpr std::string_view kOpen3dMethod = "open3d/";
 
+// Of experiments, whose values are doubles: each whole number up to it is one. A scene's own seed
+// may be larger.
+inline constexpr std::uint64_t kLargestSeed = std::uint64_t{1} << 53;
+
 struct CellSettings {
   // What determines the frames.
   std::string scene;  // a scene file, relative to the experiment's folder

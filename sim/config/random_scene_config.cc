@@ -90,7 +90,7 @@ Expected<RandomSceneConfig> ReadRandomScene(const toml::table& root, const std::
   RandomSceneConfig config;
   reader.Get("name", config.name, true).Get("purpose", config.purpose, true);
   reader.Get("frames", config.frames, true).Get("rate_hz", config.rate_hz, true);
-  GetSeed(reader, root, "seed", config.seed);
+  GetSeed(reader, "seed", config.seed);
   CheckPlainName(reader, config.name);
   // A thing that is carried has four keys.
   CheckRange(reader, "frames", config.frames, 4, 100000);

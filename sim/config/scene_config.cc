@@ -50,7 +50,7 @@ Expected<TextureSpec> ReadTexture(const toml::table& table, const std::string& w
   TextureSpec spec;
   reader.Get("pattern", spec.pattern, true).Get("size_m", spec.size_m);
   reader.Get("side_px", spec.side_px);
-  GetSeed(reader, table, "seed", spec.seed);
+  GetSeed(reader, "seed", spec.seed);
   if (table.contains("first")) GetColour(reader, "first", spec.first);
   if (table.contains("second")) GetColour(reader, "second", spec.second);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
@@ -116,7 +116,7 @@ Expected<SceneConfig> ReadSceneConfig(const toml::table& root, const std::string
   SceneConfig config;
   reader.Get("name", config.name, true).Get("purpose", config.purpose, true);
   reader.Get("frames", config.frames, true).Get("rate_hz", config.rate_hz, true);
-  GetSeed(reader, root, "seed", config.seed);
+  GetSeed(reader, "seed", config.seed);
   if (seed) config.seed = *seed;
   CheckPlainName(reader, config.name);
   CheckRange(reader, "frames", config.frames, 1, kMaxFrames);

@@ -154,7 +154,7 @@ void ReadModel(TomlReader& reader, const toml::table& table, const SceneFolder& 
   std::string picture;
   reader.Get("model", name, true).Get("scale", model.scale).Get("material", model.material);
   reader.Get("up", model.up).Get("picture", picture);
-  GetSeed(reader, table, "texture_seed", model.seed);
+  GetSeed(reader, "texture_seed", model.seed);
   if (table.contains("paint")) GetColour(reader, "paint", model.paint.emplace());
   if (table.contains("size")) {
     reader.Get("size", model.size_m.emplace(Eigen::Vector3d::Zero()));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <limits>
 
 namespace tsdfpp {
 namespace {
@@ -22,22 +21,12 @@ void CheckPlainName(TomlReader& reader, std::string_view name) {
   }
 }
 
-void GetSeed(TomlReader& reader, const toml::table& table, std::string_view key,
-             std::uint64_t& seed) {
-  int ignored = 0;
-  const toml::node* node = table.get(key);
-  if (node == nullptr || !node->is_integer()) {
-    reader.Get(key, ignored);  // makes the key known, or says that it is no whole number
-    return;
-  }
-  const std::int64_t value = node->as_integer()->get();
+void GetSeed(TomlReader& reader, std::string_view key, std::uint64_t& seed) {
+  auto value = static_cast<std::int64_t>(seed);
+  reader.Get(key, value);
   if (value < 0) {
     reader.Fault(key, fmt::format("is {}, expected 0 or more", value));
-  } else if (value <= std::numeric_limits<int>::max()) {
-    reader.Get(key, ignored);
-  } else {
-    double wide = 0;
-    reader.Get(key, wide);
+    return;
   }
   seed = static_cast<std::uint64_t>(value);
 }

@@ -22,9 +22,8 @@ void CheckRange(TomlReader& reader, std::string_view key, T value, T low, T high
   }
 }
 
-// Reads a whole number of 64 bits and no sign.
-void GetSeed(TomlReader& reader, const toml::table& table, std::string_view key,
-             std::uint64_t& seed);
+// Reads a whole number from 0 to the largest that TOML has, 2^63 - 1.
+void GetSeed(TomlReader& reader, std::string_view key, std::uint64_t& seed);
 // Reads [red, green, blue], each 0 to 255.
 void GetColour(TomlReader& reader, std::string_view key, Colour& colour);
 // Reads a range [low, high], low <= high, within `least` and `most`.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 
@@ -14,6 +15,8 @@ namespace tsdfpp {
 namespace {
 
 constexpr int kTriesPerObject = 150;
+// TOML has no larger whole number, and a drawn scene is written as TOML.
+constexpr std::uint64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
 constexpr std::uint32_t kStream = 0x52440000;  // one stream a draw of the whole scene
 
 double Within(const Eigen::Vector2d& range, double share) {
@@ -163,7 +166,7 @@ Expected<Candidate> DrawModel(Draws& draws, const RandomSceneConfig& config, std
         Eigen::Vector3d{draws.In(config.size_m), draws.In(config.size_m), draws.In(config.size_m)};
   }
   const auto index = static_cast<std::uint64_t>(id);
-  object.model.seed = seed + index;
+  object.model.seed = (seed + index) & kLargestSeed;
   object.model.paint = DrawPaint(seed, index);
   if (draws.Chance(config.texture_share)) object.model.material = draws.Of(TexturePatternNames());
   TSDFPP_ASSIGN(const std::vector<ModelPart> parts, MakeModel(object.model));

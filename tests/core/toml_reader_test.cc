@@ -33,6 +33,7 @@ std::string SentenceOf(const std::string& text, bool required = false) {
 TEST(TomlReader, ReadsEveryType) {
   bool b = false;
   int i = 0;
+  std::int64_t wide = 0;
   double d = 0;
   double whole = 0;
   std::string s;
@@ -41,11 +42,13 @@ TEST(TomlReader, ReadsEveryType) {
   std::vector<std::string> strings;
   std::string sub;
   std::vector<std::string> many;
-  EXPECT_EQ(Sentence("b = true\ni = -3\nd = 1.5\nwhole = 2\ns = \"x\"\nv = [1, 2.5, -3]\n"
+  EXPECT_EQ(Sentence("b = true\ni = -3\nwide = 9007199254740993\nd = 1.5\nwhole = 2\ns = \"x\"\nv "
+                     "= [1, 2.5, -3]\n"
                      "numbers = [4]\nstrings = [\"p\", \"q\"]\n[t]\nk = \"in\"\n"
                      "[[m]]\nk = \"m0\"\n[[m]]\nk = \"m1\"\n",
                      [&](TomlReader& reader) {
-                       reader.Get("b", b).Get("i", i).Get("d", d).Get("whole", whole).Get("s", s);
+                       reader.Get("b", b).Get("i", i).Get("wide", wide).Get("d", d);
+                       reader.Get("whole", whole).Get("s", s);
                        reader.Get("v", v).Get("numbers", numbers).Get("strings", strings);
                        TomlReader(*reader.Table("t"), "s.toml", "t").Get("k", sub);
                        for (const toml::table* table : reader.Tables("m")) {
@@ -55,6 +58,7 @@ TEST(TomlReader, ReadsEveryType) {
             "");
   EXPECT_TRUE(b);
   EXPECT_EQ(i, -3);
+  EXPECT_EQ(wide, 9007199254740993) << "which no double holds";
   EXPECT_EQ(d, 1.5);
   EXPECT_EQ(whole, 2);
   EXPECT_EQ(s, "x");

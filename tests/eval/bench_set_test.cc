@@ -108,6 +108,14 @@ TEST_F(SmallSet, EachSceneHasItsOwnSeed) {
   ASSERT_EQ(cells.size(), 2U);
   EXPECT_EQ(cells[0].settings.seed, 1U);
   EXPECT_EQ(cells[1].settings.seed, 7U);
+  const fs::path file = folder_ / "sets/s/b.toml";
+  ASSERT_TRUE(WriteFile(file, "seed = 9007199254740993\n" + test::TinyScene(5)).has_value());
+  const auto large = ExperimentOf(set_, {"tsdf"});
+  ASSERT_FALSE(large.has_value());
+  EXPECT_EQ(large.error().message,
+            file.string() +
+                ": 'seed' is 9007199254740993, expected 0 to 9007199254740992 in a "
+                "scene of a benchmark");
 }
 
 TEST_F(SmallSet, ValuesThatNoMapHasAreRefused) {

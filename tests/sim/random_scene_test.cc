@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <map>
 #include <set>
 
@@ -108,7 +109,8 @@ TEST(RandomScene, ASeedIsAScene) {
 // What was drawn can be written as an ordinary scene, read, and moves the same.
 TEST(RandomScene, ADrawnSceneIsAnOrdinaryFile) {
   const RandomSceneConfig ranges = Ranges();
-  for (const std::uint64_t seed : {5, 6}) {
+  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  for (const std::uint64_t seed : {std::uint64_t{5}, std::uint64_t{6}, kLargest}) {
     const SceneConfig drawn = Draw(ranges, seed);
     const std::string text = SceneToToml(drawn);
     const auto read = ParseSceneConfig(text, "drawn.toml");

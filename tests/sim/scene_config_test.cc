@@ -205,6 +205,25 @@ TEST(SceneConfig, SaysWhatIsWrongWithMotions) {
   }
 }
 
+// Also those that no double holds, and the largest whole number of TOML.
+TEST(SceneConfig, SeedsComeBackToTheLastDigit) {
+  for (const std::uint64_t seed : {9007199254740993ULL, 9223372036854775807ULL}) {
+    const std::string text =
+        fmt::format("seed = {}\n", seed) +
+        With("x = -0.3\n", fmt::format("x = -0.3\ntexture_seed = {}\n", seed)) +
+        fmt::format("[room.table_texture]\npattern = \"planks\"\nseed = {}\n", seed);
+    const auto config = ParseSceneConfig(text, "s.toml");
+    ASSERT_TRUE(config.has_value()) << config.error().message;
+    const auto again = ParseSceneConfig(SceneToToml(*config), "again.toml");
+    ASSERT_TRUE(again.has_value()) << again.error().message;
+    for (const auto* scene : {&*config, &*again}) {
+      EXPECT_EQ(scene->seed, seed);
+      EXPECT_EQ(scene->objects[1].model.seed, seed);
+      EXPECT_EQ(scene->room.table_texture->seed, seed);
+    }
+  }
+}
+
 TEST(SceneConfig, SaysWhatIsWrongWithCamerasAndRooms) {
   const std::string arc =
       "target = [0, 0, 0.74]\nazimuth_deg = [-100, -80]\nradius_m = [1.2, 1.2]\n"
