@@ -25,9 +25,10 @@ constexpr const char* kNotes = "notes";
 constexpr const char* kNotesAside = "notes-aside";
 constexpr const char* kSet = "set";
 
-// An absolute path without a trailing slash has a file name and a folder it stands in.
+// An absolute path without a trailing slash has a file name and a folder it stands in. Where `out`
+// is a link it is the folder that the link leads to: that one is replaced, and the link stays.
 fs::path Normal(const fs::path& out) {
-  const fs::path folder = AbsolutePath(out).lexically_normal();
+  const fs::path folder = TruePath(out);
   return folder.has_filename() ? folder : folder.parent_path();
 }
 
@@ -62,7 +63,16 @@ bool IsFileOf(const fs::path& path, int descriptor) {
 Expected<void> CheckReplaceable(const fs::path& out, bool overwrite) {
   const fs::path folder = Normal(out);
   std::error_code code;
+  if (fs::is_symlink(folder, code)) {
+    return UsageError("{}: is a link that leads nowhere, expected a folder to make",
+                      folder.string());
+  }
   if (!fs::exists(folder, code)) return {};
+  // Who works in it would be left in a folder that is gone.
+  if (LiesIn(".", folder)) {
+    return UsageError("{}: is or holds the working folder, expected one that can be replaced",
+                      folder.string());
+  }
   if (!fs::is_directory(folder, code)) {
     return UsageError("{}: is a file, expected a folder to make", folder.string());
   }

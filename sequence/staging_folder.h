@@ -9,7 +9,8 @@
 namespace tsdfpp {
 
 // May a sequence be written to `out`? It must be absent, an empty folder or, with `overwrite`, an
-// earlier sequence of ours. Errors: kUsage, saying what is there.
+// earlier sequence of ours; a link is followed. The working folder is refused, and so is what it
+// lies in. Errors: kUsage, saying what is there.
 Expected<void> CheckReplaceable(const std::filesystem::path& out, bool overwrite);
 
 // The hidden folder. Removed again in the end, unless it took out's place or was kept.

@@ -150,6 +150,50 @@ TEST(StagingFolder, TheEarlierOneIsReplacedInOneStroke) {
   }
 }
 
+TEST(StagingFolder, ALinkStaysAndWhereItLeadsIsReplaced) {
+  for (const Kind kind : {Kind::kOwn, Kind::kShared}) {
+    const TempFolder folder;
+    fs::create_directories(folder / "elsewhere/real");
+    fs::create_directory_symlink(folder / "elsewhere/real", folder / "out");
+    ASSERT_TRUE(CheckReplaceable(folder / "out", false).has_value());
+    {
+      StagingFolder staging(folder / "out", kind);
+      ASSERT_TRUE(staging.Make().has_value());
+      ASSERT_TRUE(WriteFile(staging.path() / "file", "new").has_value());
+      ASSERT_TRUE(staging.TakeThePlace().has_value());
+    }
+    EXPECT_TRUE(fs::is_symlink(folder / "out"));
+    EXPECT_EQ(ReadFile(folder / "elsewhere/real/file"), "new");
+    EXPECT_EQ(Hidden(folder.path()), std::vector<std::string>{});
+    EXPECT_EQ(Hidden(folder / "elsewhere"), std::vector<std::string>{});
+    // What stands there is what the link leads to.
+    EXPECT_FALSE(CheckReplaceable(folder / "out", true).has_value());
+    fs::remove_all(folder / "elsewhere/real");
+    const auto nowhere = CheckReplaceable(folder / "out", true);
+    ASSERT_FALSE(nowhere.has_value());
+    EXPECT_NE(nowhere.error().message.find("is a link that leads nowhere"), std::string::npos)
+        << nowhere.error().message;
+  }
+}
+
+TEST(StagingFolder, TheWorkingFolderIsNotReplaced) {
+  const TempFolder folder;
+  fs::create_directories(folder / "out");
+  fs::create_directories(folder / "other");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder / "out");
+  for (const fs::path& path : {fs::path("."), folder / "out", fs::path("../out/")}) {
+    const auto refused = CheckReplaceable(path, true);
+    ASSERT_FALSE(refused.has_value()) << path;
+    EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
+    EXPECT_NE(refused.error().message.find("is or holds the working folder"), std::string::npos)
+        << refused.error().message;
+  }
+  EXPECT_TRUE(CheckReplaceable("../other", false).has_value());
+  EXPECT_TRUE(CheckReplaceable("new", false).has_value());
+  fs::current_path(before);
+}
+
 TEST(StagingFolder, AStoppedExportLeavesNothing) {
   const TempFolder folder;
   test::BoxSource source(5);
