@@ -25,6 +25,7 @@ struct GenerateArguments {
   bool list = false;
   std::uint64_t seed = 0;
   CLI::Option* seed_given = nullptr;
+  std::vector<const CLI::Option*> of_rendering;  // without effect beside --list and --page
   double scale = 1;
   GenerateOptions generate;
 };
@@ -72,8 +73,15 @@ std::string Summary(const GenerateArguments& options, const GenerateResult& made
 }
 
 Expected<CommandResult> RunGenerate(const GenerateArguments& options) {
+  const bool page = !options.page.empty();
+  for (const CLI::Option* option : options.of_rendering) {
+    if ((options.list || page) && option->count() > 0) {
+      return UsageError("{} has no effect beside {}, expected it with a SCENE", option->get_name(),
+                        page ? "--page" : "--list");
+    }
+  }
   if (options.list) return ListScenes(options);
-  if (!options.page.empty()) return WritePage(options);
+  if (page) return WritePage(options);
   if (options.scene.empty()) return UsageError("SCENE is required (see tsdfpp generate --help)");
   if (options.out.empty()) return UsageError("--out is required (see tsdfpp generate --help)");
   std::optional<std::uint64_t> seed;
@@ -134,28 +142,34 @@ Run AddGenerate(CLI::App& app, const CommonOptions&) {
   CLI::Option* scene = app.add_option("SCENE", options->scene, "Scene file (.toml)");
   CLI::Option* out = app.add_option("--out", options->out, "Folder of the new sequence")
                          ->check(NotEmpty("a folder"));
-  app.add_flag("--overwrite", options->generate.overwrite, "Replace an earlier sequence of ours");
-  app.add_option("--jobs", options->generate.jobs,
-                 "Processes that render; one a core by default. The bytes do not depend on it")
-      ->check(WholeBetween(1, 256));
+  CLI::Option* overwrite = app.add_flag("--overwrite", options->generate.overwrite,
+                                        "Replace an earlier sequence of ours");
+  CLI::Option* jobs =
+      app.add_option("--jobs", options->generate.jobs,
+                     "Processes that render; one a core by default. The bytes do not depend on it")
+          ->check(WholeBetween(1, 256));
   options->seed_given = app.add_option(
       "--seed", options->seed, "Replaces the scene's seed: of random scenes, jitter, sensor");
   // TOML's integers end there, and the seed is written into scene.toml.
   options->seed_given->check(WholeBetween(0, std::numeric_limits<std::int64_t>::max()));
-  app.add_option("--sensor", options->sensor,
-                 "Ready-made sensor in place of the scene's own, or several joined by '+' "
-                 "(docs/sensors.md)")
-      ->check(NotEmpty("the name of a sensor"));
-  app.add_option("--scale", options->scale, "Images this many times the scene's size")
-      ->check(Between(0.05, 4.0))
-      ->capture_default_str();
-  app.add_flag_callback(
+  CLI::Option* sensor =
+      app.add_option("--sensor", options->sensor,
+                     "Ready-made sensor in place of the scene's own, or several joined by '+' "
+                     "(docs/sensors.md)")
+          ->check(NotEmpty("the name of a sensor"));
+  CLI::Option* scale =
+      app.add_option("--scale", options->scale, "Images this many times the scene's size")
+          ->check(Between(0.05, 4.0))
+          ->capture_default_str();
+  CLI::Option* jagged = app.add_flag_callback(
       "--no-antialias", [options] { options->generate.render.antialias = false; },
       "Colour without multisampling: jagged edges, faster");
-  app.add_option("--share", options->generate.ray_share,
-                 "Share of the frames that are compared with rays before the sequence is published")
-      ->check(Between(0, 1))
-      ->capture_default_str();
+  CLI::Option* share = app.add_option("--share", options->generate.ray_share,
+                                      "Share of the frames that are compared with rays before the "
+                                      "sequence is published")
+                           ->check(Between(0, 1))
+                           ->capture_default_str();
+  options->of_rendering = {overwrite, jobs, options->seed_given, sensor, scale, jagged, share};
   CLI::Option* list =
       app.add_flag("--list", options->list, "List the scenes of --scenes and what they are for");
   CLI::Option* page =

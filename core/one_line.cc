@@ -105,6 +105,15 @@ std::string OneLine(std::string_view text, std::size_t most) {
   return line.substr(0, head) + std::string(kGap) + line.substr(tail);
 }
 
+std::string InMarkdown(std::string_view text) {
+  std::string escaped;
+  for (const char c : OneLine(text)) {
+    if (std::string_view("\\|<>[]`*&!").find(c) != std::string_view::npos) escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
+
 std::string_view WithoutTag(std::string_view words) {
   const std::size_t end = words.find("] ");
   return words.starts_with("[json.") && end != std::string_view::npos ? words.substr(end + 2)

@@ -28,6 +28,10 @@ bool IsShowable(std::string_view text);
 // characters stay whole. Text that is fine is returned as it is.
 std::string OneLine(std::string_view text, std::size_t most = kMostMessageBytes);
 
+// The text in one line, with nothing in it that Markdown or a browser would read as more than text:
+// for a table's cell.
+std::string InMarkdown(std::string_view text);
+
 // What nlohmann's exceptions say, without the name that they begin with: "[json.exception...] ".
 std::string_view WithoutTag(std::string_view words);
 

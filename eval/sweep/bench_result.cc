@@ -25,18 +25,6 @@ constexpr const char* kKind = "tsdfpp bench result";
 // More than any scene or machine can give, and so little that sums of them have an end.
 constexpr double kMostOfAny = 1e15;
 
-// A text of a result in a table's cell: one line, and nothing that Markdown or a browser would read
-// as more than text.
-std::string InMarkdown(std::string_view text) {
-  constexpr std::size_t kMostBytes = 200;
-  std::string escaped;
-  for (const char c : OneLine(text, kMostBytes)) {
-    if (std::string_view("\\|<>[]`*&!").find(c) != std::string_view::npos) escaped += '\\';
-    escaped += c;
-  }
-  return escaped;
-}
-
 std::string FirstLineWith(const char* file, const std::string& key) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {

@@ -185,6 +185,18 @@ TEST_F(CommandErrors, WhatGenerateWouldIgnoreOrCouldNotReadAgain) {
   ExpectError({"generate", scene_, "--out", out_, "--seed", "-1"}, 2, {"--seed", "-1"});
   ExpectError({"generate", "--list", scene_}, 2, {"--list"});
   ExpectError({"generate", "--list", "--page", out_}, 2, {"--list", "--page"});
+  const std::vector<std::vector<std::string>> of_rendering{
+      {"--seed", "1"}, {"--scale", "1"}, {"--sensor", "kinect"}, {"--share", "0"},
+      {"--jobs", "2"}, {"--overwrite"},  {"--no-antialias"}};
+  for (const auto& option : of_rendering) {
+    std::vector<std::string> list{"generate", "--list"};
+    list.insert(list.end(), option.begin(), option.end());
+    ExpectError(list, 2, {option.front() + " has no effect beside --list"});
+    std::vector<std::string> page{"generate", "--page", out_};
+    page.insert(page.end(), option.begin(), option.end());
+    ExpectError(page, 2, {option.front() + " has no effect beside --page"});
+    EXPECT_FALSE(std::filesystem::exists(out_)) << option.front();
+  }
 }
 
 TEST_F(CommandErrors, ASequenceIsNoPlaceForResults) {

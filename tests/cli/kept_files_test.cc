@@ -174,6 +174,31 @@ TEST_F(KeptFiles, OfABenchmarkAndItsResults) {
 }
 
 // Of somebody else's; what a run left it may replace.
+TEST_F(KeptFiles, OfThePlaceOfAPageOfScenes) {
+  ASSERT_TRUE(WriteFile(folder_ / "scenes/a.toml", test::TinyScene(3)).has_value());
+  const std::vector<std::string> make{"generate", "--page", "page", "--scenes", "scenes"};
+  Write("page/scenes.md");
+  ExpectRefused(make, "page/scenes.md: is no page of generate --page and would be replaced");
+  EXPECT_EQ(ReadFile(folder_ / "page/scenes.md"), "kept");
+  fs::remove(folder_ / "page/scenes.md");
+  fs::create_directories(folder_ / "elsewhere");
+  for (const char* link : {"page/pictures", "page/pictures/scenes"}) {
+    fs::create_directories((folder_ / link).parent_path());
+    fs::create_directory_symlink(folder_ / "elsewhere", folder_ / link);
+    ExpectRefused(make, std::string(link) + ": is a link, expected a folder or nothing");
+    EXPECT_TRUE(fs::is_empty(folder_ / "elsewhere"));
+    fs::remove(folder_ / link);
+  }
+  // Its own page is made anew.
+  for (int i = 0; i < 2; ++i) {
+    const CommandOutput run = test::RunTsdfpp(make, folder_.path());
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_TRUE(fs::exists(folder_ / "page/pictures/scenes/tiny.jpg"));
+  }
+  ASSERT_TRUE(WriteFile(folder_ / "scenes/b.toml", test::TinyScene(4)).has_value());
+  ExpectRefused(make, "scenes/b.toml: 'name' is 'tiny', as in scenes/a.toml, expected another");
+}
+
 TEST_F(KeptFiles, PicturesOfViews) {
   const fs::path recording = Export(DatasetFormat::kTum);
   for (const char* file : {"colour-1.png", "depth-1.exr", "normal-2.png", "id-2.png"}) {

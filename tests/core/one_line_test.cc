@@ -62,6 +62,11 @@ TEST(OneLine, ALibrarysTagIsLeftOut) {
   EXPECT_EQ(WithoutTag("[json."), "[json.");
 }
 
+TEST(OneLine, InMarkdownItIsTextAlone) {
+  EXPECT_EQ(InMarkdown("Toys, at up to 1 m/s."), "Toys, at up to 1 m/s.");
+  EXPECT_EQ(InMarkdown("a | b\n<script>"), "a \\| b \\<script\\>");
+}
+
 TEST(OneLine, MessagesStayUnderFiveHundredBytes) {
   EXPECT_LT(std::string("tsdfpp: ").size() + OneLine(std::string(1 << 20, '\x01')).size(), 500U);
 }
