@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "mapper/setting_order.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -74,7 +76,9 @@ Expected<void> MapConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("layers", layers, 0, kMaxLayers));
   TSDFPP_RETURN_IF_ERROR(InRange("weight_cap", weight_cap, 1, 255));
   TSDFPP_RETURN_IF_ERROR(InRange("confidence_cap", confidence_cap, 1, kMostConfidence));
-  TSDFPP_RETURN_IF_ERROR(InRange("moved_confidence", moved_confidence, 1, confidence_cap));
+  TSDFPP_RETURN_IF_ERROR(InRange("moved_confidence", moved_confidence, 1, kMostConfidence));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckOrder("map", "moved_confidence", moved_confidence, "confidence_cap", confidence_cap));
   return {};
 }
 

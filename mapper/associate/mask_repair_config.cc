@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "mapper/setting_order.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -39,7 +41,9 @@ Expected<void> CheckMaskRepair(Method method, MaskRepairMode mode) {
 
 Expected<void> MaskRepairConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckRepair("keep_voxels", keep_voxels, 0.01, 100));
-  TSDFPP_RETURN_IF_ERROR(CheckRepair("take_voxels", take_voxels, 0, keep_voxels));
+  TSDFPP_RETURN_IF_ERROR(CheckRepair("take_voxels", take_voxels, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckOrder("mask repair", "take_voxels", take_voxels, "keep_voxels", keep_voxels));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("sigma_voxels", sigma_voxels, 0.01, 100));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("own_factor", own_factor, 1, 1e6));
   TSDFPP_RETURN_IF_ERROR(CheckRepair("cell_voxels", cell_voxels, 1, 100));

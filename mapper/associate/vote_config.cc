@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "mapper/setting_order.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -17,13 +19,19 @@ Expected<void> VoteConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckVote("at_voxels", at_voxels, 0.5, 100));
   TSDFPP_RETURN_IF_ERROR(CheckVote("min_share", min_share, 0.01, 1));
   TSDFPP_RETURN_IF_ERROR(CheckVote("cut_share", cut_share, 0.01, 1));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("near_voxels", near_voxels, at_voxels, 100));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("near_voxels", near_voxels, 0.5, 100));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckOrder("association", "at_voxels", at_voxels, "near_voxels", near_voxels));
   TSDFPP_RETURN_IF_ERROR(CheckVote("near_share", near_share, 0.01, 1));
   TSDFPP_RETURN_IF_ERROR(CheckVote("recent_frames", recent_frames, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("max_points", max_points, 1, 1'000'000));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("min_points", min_points, 1, max_points));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("min_points", min_points, 1, 1'000'000));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckOrder("association", "min_points", min_points, "max_points", max_points));
   TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_frames", confirm_frames, 1, 1000));
-  TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_window", confirm_window, confirm_frames, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckVote("confirm_window", confirm_window, 1, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckOrder("association", "confirm_frames", confirm_frames,
+                                    "confirm_window", confirm_window));
   TSDFPP_RETURN_IF_ERROR(CheckVote("hold_frames", hold_frames, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(CheckVote("far_share", far_share, -1, 100));
   return {};

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "core/plain_name.h"
+#include "mapper/setting_order.h"
 
 namespace tsdfpp {
 namespace {
@@ -47,7 +48,8 @@ Expected<void> NetworkConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("most_overlap", most_overlap, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_share", mask_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("every", every, 1, 1000));
-  TSDFPP_RETURN_IF_ERROR(CheckNetwork("latency", latency, 0, every));
+  TSDFPP_RETURN_IF_ERROR(CheckNetwork("latency", latency, 0, 1000));
+  TSDFPP_RETURN_IF_ERROR(CheckOrder("network", "latency", latency, "every", every));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_overlap", join_overlap, 0.5, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("join_iou", join_iou, 0.5, 1));
   TSDFPP_RETURN_IF_ERROR(CheckNetwork("mask_score", mask_score, 0, 1));

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "core/pixel_ray.h"
+#include "mapper/setting_order.h"
 namespace tsdfpp {
 namespace {
 
@@ -139,7 +140,9 @@ Expected<void> IcpConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("settled_voxels", settled_voxels, 1e-6, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("mask_erosion_px", mask_erosion_px, 0, 50));
   TSDFPP_RETURN_IF_ERROR(InRange("max_points", max_points, 10, 1000000));
-  TSDFPP_RETURN_IF_ERROR(InRange("min_points", min_points, 6, max_points));
+  TSDFPP_RETURN_IF_ERROR(InRange("min_points", min_points, 6, 1000000));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckOrder("tracking", "min_points", min_points, "max_points", max_points));
   TSDFPP_RETURN_IF_ERROR(InRange("min_inlier_share", min_inlier_share, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("max_translation_voxels", max_translation_voxels, 0, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_rotation_rad", max_rotation_rad, 0, EIGEN_PI));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "mapper/setting_order.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -19,7 +21,9 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("mask_erosion_px", mask_erosion_px, 0, 50));
   TSDFPP_RETURN_IF_ERROR(InRange("max_step_voxels", max_step_voxels, 0.01, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("max_points", max_points, 10, 1000000));
-  TSDFPP_RETURN_IF_ERROR(InRange("min_points", min_points, 6, max_points));
+  TSDFPP_RETURN_IF_ERROR(InRange("min_points", min_points, 6, 1000000));
+  TSDFPP_RETURN_IF_ERROR(
+      CheckOrder("tracking", "min_points", min_points, "max_points", max_points));
   TSDFPP_RETURN_IF_ERROR(InRange("axial_m", axial_m, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("axial_growth", axial_growth, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("lateral_px", lateral_px, 0, 100));

@@ -442,10 +442,15 @@ TEST(MaskRepairConfig, ReadsWhatItWrites) {
 
 TEST(MaskRepairConfig, RefusesWhatItCannotDo) {
   const std::vector<std::pair<std::string, std::string>> wrong{
-      {"keep_voxels = 0", "keep_voxels"},           {"take_voxels = 1.1", "take_voxels"},
-      {"sigma_voxels = nan", "sigma_voxels"},       {"own_factor = 0.5", "own_factor"},
-      {"cell_voxels = 0", "cell_voxels"},           {"confirm_frames = 0", "confirm_frames"},
-      {"forget_frames = 0", "forget_frames"},       {"forget = 3", "forget"},
+      {"keep_voxels = 0", "keep_voxels"},
+      {"take_voxels = 1.1", "take_voxels"},
+      {"keep_voxels = 0.1", "expected at most 'keep_voxels', which is 0.1"},
+      {"sigma_voxels = nan", "sigma_voxels"},
+      {"own_factor = 0.5", "own_factor"},
+      {"cell_voxels = 0", "cell_voxels"},
+      {"confirm_frames = 0", "confirm_frames"},
+      {"forget_frames = 0", "forget_frames"},
+      {"forget = 3", "forget"},
       {"confirm_frames = 'four'", "confirm_frames"}};
   for (const auto& [text, named] : wrong) {
     const auto config = MaskRepairConfig::FromToml(toml::parse(text), "t.toml");

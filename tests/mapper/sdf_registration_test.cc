@@ -508,7 +508,10 @@ TEST(SdfTrackConfig, RoundTripsThroughToml) {
   const auto refused = config.Validate();
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
-  EXPECT_NE(refused.error().message.find("min_points"), std::string::npos);
+  EXPECT_EQ(refused.error().message,
+            fmt::format("tracking setting 'min_points' is {}, expected at most 'max_points', which "
+                        "is {}",
+                        config.min_points, config.max_points));
 }
 
 }  // namespace

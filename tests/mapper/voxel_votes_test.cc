@@ -425,15 +425,17 @@ TEST(VoteConfig, NamesWhatIsWrong) {
       {"at_voxels = 0.0", "'at_voxels' is 0, expected 0.5 to 100"},
       {"min_share = 0.0", "'min_share' is 0, expected 0.01 to 1"},
       {"cut_share = 2.0", "'cut_share' is 2, expected 0.01 to 1"},
-      {"near_voxels = 1.0", "'near_voxels' is 1, expected 1.5 to 100"},
+      {"near_voxels = 0.1", "'near_voxels' is 0.1, expected 0.5 to 100"},
+      {"near_voxels = 1.0", "'at_voxels' is 1.5, expected at most 'near_voxels', which is 1"},
       {"near_share = -1.0", "'near_share' is -1, expected 0.01 to 1"},
       {"recent_frames = -1", "'recent_frames' is -1, expected 0 to 1000"},
       {"max_points = 0", "'max_points' is 0, expected 1 to 1000000"},
-      {"min_points = 0", "'min_points' is 0, expected 1 to 2000"},
-      {"max_points = 40", "'min_points' is 50, expected 1 to 40"},
+      {"min_points = 0", "'min_points' is 0, expected 1 to 1000000"},
+      {"max_points = 40", "'min_points' is 50, expected at most 'max_points', which is 40"},
       {"far_share = -1.1", "'far_share' is -1.1, expected -1 to 100"},
       {"confirm_frames = 0", "'confirm_frames' is 0, expected 1 to 1000"},
-      {"confirm_window = 2", "'confirm_window' is 2, expected 3 to 1000"},
+      {"confirm_window = 2",
+       "'confirm_frames' is 3, expected at most 'confirm_window', which is 2"},
       {"votes = 2", "votes"}};
   for (const auto& [text, sentence] : cases) {
     SCOPED_TRACE(text);
