@@ -28,14 +28,13 @@ std::vector<std::string> Pipeline::Remarks() const {
   }
   if (config_.poses != PoseSource::kGiven && track_log_.frames() > 0 && track_log_.IsEmpty()) {
     const std::size_t seen = track_log_.objects().size();
-    const std::string_view which = tracked_.choice() == TrackChoice::kClassified
-                                       ? "that has a class"
-                                       : "beside the background";
+    const std::string_view which =
+        tracked_.choice() == TrackChoice::kClassified ? "with a class" : "beside the background";
     remarks.push_back(fmt::format(
         "objects were to be tracked (--poses {}) and none was: {}", PoseSourceName(config_.poses),
         seen == 0 ? fmt::format("no frame shows an object {}", which)
-                  : fmt::format("frames show {} objects {}, of which none could be registered",
-                                seen, which)));
+                  : fmt::format("frames show {} object{} {}, and none could be registered", seen,
+                                seen == 1 ? "" : "s", which)));
   }
   if (lost_ != nullptr && !lost_->empty()) {
     std::vector<std::string> names;

@@ -192,6 +192,20 @@ TEST(SdfTracker, TracksAllWhereNoClassIsKnownAndSaysWhereItTracksNothing) {
   EXPECT_NE(pipeline.Remarks()[0].find("--poses track"), std::string::npos);
 }
 
+// A single frame begins objects, and registers none.
+TEST(SdfTracker, SaysHowManyWereThereAndNotRegistered) {
+  std::vector<ObjectInfo> objects = Toys();
+  const auto remarks = [&] {
+    Pipeline pipeline(TrackConfig(), objects);
+    EXPECT_TRUE(pipeline.Process(MovingToys(1)));
+    return pipeline.Remarks();
+  };
+  const std::string begin = "objects were to be tracked (--poses track) and none was: frames show ";
+  EXPECT_EQ(remarks(), std::vector{begin + "2 objects with a class, and none could be registered"});
+  objects.back().semantic_class.clear();
+  EXPECT_EQ(remarks(), std::vector{begin + "1 object with a class, and none could be registered"});
+}
+
 // Each id there is, each all over the image: some minutes a frame where the image is looked at once
 // for each.
 TEST(ManyObjects, AreLookedAtTogether) {
