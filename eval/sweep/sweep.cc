@@ -187,11 +187,14 @@ Expected<void> RunTasks(const std::vector<Task>& tasks, const CellStore& store,
   };
   for (int i = 0; i < jobs; ++i) order(i);
   while (true) {
-    TSDFPP_ASSIGN(const auto message, workers.Next());
+    const auto next = workers.Next();
+    // A signal to the whole group ends the workers as well.
     if (options.stop != nullptr && *options.stop) {
       return EnvironmentError("{}: stopped; the same command goes on from there",
                               options.out.string());
     }
+    if (!next) return tl::unexpected(next.error());
+    const auto& message = *next;
     if (!message) {
       if (workers.running() == 0) return {};
       continue;  // another signal

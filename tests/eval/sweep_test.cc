@@ -249,13 +249,14 @@ TEST_F(Sweep, OneMapIsLookedAtInManyWays) {
 TEST_F(Sweep, AKilledRunLeavesNoHalfCellAndGoesOn) {
   const fs::path file =
       Experiment("method = [\"tsdf\", \"tsdf++\"]\nseed = [1, 2, 3]\nvoxel_m = 0.02", "");
-  for (const int signal : {SIGINT, SIGKILL}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGKILL}) {
     const std::string out = fmt::format("out{}", signal);
+    const std::string words = folder_ / (out + ".err");
     const pid_t process = fork();
     if (process == 0) {
-      const int nowhere = open("/dev/null", O_WRONLY);
-      dup2(nowhere, STDERR_FILENO);
-      dup2(nowhere, STDOUT_FILENO);
+      setpgid(0, 0);
+      dup2(open(words.c_str(), O_WRONLY | O_CREAT, 0600), STDERR_FILENO);
+      dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);
       execl(TSDFPP_COMMAND, TSDFPP_COMMAND, "sweep", file.c_str(), "--jobs", "1", "--out",
             (folder_ / out).c_str(), nullptr);
       _exit(127);
@@ -264,11 +265,17 @@ TEST_F(Sweep, AKilledRunLeavesNoHalfCellAndGoesOn) {
     while (CellFiles(out).size() < 2 && waitpid(process, nullptr, WNOHANG) == 0) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    kill(process, signal);
+    // As terminals, timeout and systemd do: to its workers, too.
+    kill(-process, signal);
     int status = 0;
     waitpid(process, &status, 0);
     EXPECT_TRUE(WIFSIGNALED(status));
     EXPECT_EQ(WTERMSIG(status), signal);
+    if (signal != SIGKILL) {
+      EXPECT_NE(Bytes(out + ".err").find("stopped; the same command goes on from there"),
+                std::string::npos)
+          << Bytes(out + ".err");
+    }
     // Its workers end a moment later, and hold the folder until then.
     for (int i = 0; i < 1000 && !FolderLock::Take(folder_ / out); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
