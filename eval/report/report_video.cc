@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <set>
 
+#include "core/data_folder.h"
 #include "core/decode_image.h"
 #include "core/files.h"
 #include "core/json_text.h"
@@ -87,6 +89,10 @@ Expected<cv::Mat> ReadStill(const std::filesystem::path& path) {
   return ReadImageFile(path, DecodeAs::kColour);
 }
 
+std::string StillFile(const std::string& what, int frame) {
+  return "record/stills/" + StillName(what, frame);
+}
+
 std::string FrameLine(int frame) { return fmt::format("frame {}", frame); }
 
 cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
@@ -95,11 +101,13 @@ cv::Mat Between(const cv::Mat& from, const cv::Mat& to, double share) {
   return mixed;
 }
 
-// Errors: kData, saying what to do, where the recording is of another run than the summary.
-Expected<void> CheckRecordedRun(const std::filesystem::path& run) {
+// Errors: kData, saying what to do, where files of the recording are of another run than the
+// summary.
+Expected<void> CheckRecordedRun(const std::filesystem::path& run,
+                                const std::set<std::string>& files) {
   const auto read = ReadJsonObject(run / kSummaryFile);
   const nlohmann::json summary = read ? *read : nlohmann::json();
-  return CheckOneRun(run, RunOfSummary(summary), {"record/record.json", "record/record.bin"});
+  return CheckOneRun(run, RunOfSummary(summary), files);
 }
 
 std::string TitleOf(const nlohmann::json& run) {
@@ -115,6 +123,17 @@ struct Footage {
   std::vector<int> stills;
   std::vector<Panel> panels;  // the camera's, then a map's each
 
+  // The files of the stills, by their paths in the run's folder.
+  std::set<std::string> StillFiles() const {
+    std::set<std::string> files;
+    for (const int frame : stills) {
+      for (const Panel& panel : panels) {
+        if (!panel.still.empty()) files.insert(StillFile(panel.still, frame));
+      }
+    }
+    return files;
+  }
+
   std::string Sequence() const { return recording.json.value("sequence", ""); }
 
   // An image a panel; an empty one for the free place.
@@ -123,8 +142,7 @@ struct Footage {
     for (const Panel& panel : panels) {
       images.emplace_back();
       if (panel.still.empty()) continue;
-      TSDFPP_ASSIGN(images.back(),
-                    ReadStill(run / "record" / "stills" / StillName(panel.still, frame)));
+      TSDFPP_ASSIGN(images.back(), ReadStill(run / StillFile(panel.still, frame)));
     }
     return images;
   }
@@ -152,8 +170,11 @@ struct Footage {
       const std::string_view encoded =
           std::string_view(recording.bytes)
               .substr(place[0].get<std::size_t>(), place[1].get<std::size_t>());
-      TSDFPP_ASSIGN(images[kColumns + r],
-                    DecodeImage(encoded, "a picture after the removal", DecodeAs::kColour));
+      const std::string where =
+          fmt::format("{}: the picture of map '{}' after the removal of frame {}",
+                      (run / "record" / "record.bin").string(), panels[kColumns + r].still,
+                      keys.back()["frame"].get<int>());
+      TSDFPP_ASSIGN(images[kColumns + r], DecodeImage(encoded, where, DecodeAs::kColour));
     }
     return images;
   }
@@ -161,7 +182,8 @@ struct Footage {
 
 // Errors: kData, the run has no recording with stills, or it is broken.
 Expected<Footage> ReadFootage(const std::filesystem::path& run) {
-  TSDFPP_RETURN_IF_ERROR(CheckRecordedRun(run));
+  TSDFPP_RETURN_IF_ERROR(CheckLinksBelow(run));
+  TSDFPP_RETURN_IF_ERROR(CheckRecordedRun(run, {"record/record.json", "record/record.bin"}));
   TSDFPP_ASSIGN(std::optional<Recording> recording, ReadRecording(run));
   if (!recording || !recording->json.contains("stills") || !recording->json["stills"].is_array() ||
       recording->json["stills"].empty()) {
@@ -183,6 +205,7 @@ Expected<Footage> ReadFootage(const std::filesystem::path& run) {
     TSDFPP_RETURN_IF_ERROR(CheckPlainName(footage.panels.back().still,
                                           fmt::format("'{}': a map's folder", run.string())));
   }
+  TSDFPP_RETURN_IF_ERROR(CheckRecordedRun(run, footage.StillFiles()));
   return footage;
 }
 

@@ -118,6 +118,31 @@ TEST(RecordedComparison, HoldsEachMapWithinItsTrianglesAndTheHoleOfTheScore) {
   EXPECT_EQ(frames, video->frames);
   constexpr double kCodecNoise = 2;  // grey values, mean over the picture
   EXPECT_GT(cv::norm(image, first, cv::NORM_L1) / static_cast<double>(image.total()), kCodecNoise);
+  // A still of somebody else's is none of the run.
+  const std::filesystem::path still = folder / "record" / "stills" / StillName("mask", 16);
+  const std::string own = ReadFile(still).value();
+  ASSERT_TRUE(WriteFile(still, own + "x").has_value());
+  const auto foreign = WriteReportVideo(folder.path(), folder / "other.mp4");
+  ASSERT_FALSE(foreign.has_value());
+  EXPECT_NE(foreign.error().message.find("record/stills/mask-000016.webp has"), std::string::npos)
+      << foreign.error().message;
+  ASSERT_TRUE(WriteFile(still, own).has_value());
+  // A picture that is none has a sentence with its file and map.
+  const std::filesystem::path pictures = folder / "record" / "record.bin";
+  const json& last_map = record.json["runs"].back();
+  const json& place = last_map["key_frames"].back()["picture_after"];
+  std::string spoilt = record.bytes;
+  spoilt.replace(place[0].get<std::size_t>(), place[1].get<std::size_t>(),
+                 std::string(place[1].get<std::size_t>(), '\0'));
+  ASSERT_TRUE(WriteFile(pictures, spoilt).has_value());
+  const auto no_picture = WriteReportVideo(folder.path(), folder / "other.mp4");
+  ASSERT_FALSE(no_picture.has_value());
+  EXPECT_NE(no_picture.error().message.find(
+                fmt::format("record.bin: the picture of map '{}' after the removal of frame 16",
+                            last_map["folder"].get<std::string>())),
+            std::string::npos)
+      << no_picture.error().message;
+  ASSERT_TRUE(WriteFile(pictures, record.bytes).has_value());
   // As long as the record says, were it believed.
   const std::string whole = ReadFile(folder / "record/record.json").value();
   const std::string note = ReadFile(folder / "run.json").value();
@@ -140,7 +165,7 @@ TEST(RecordedComparison, HoldsEachMapWithinItsTrianglesAndTheHoleOfTheScore) {
   }
   ASSERT_TRUE(WriteFile(folder / "record/record.json", whole).has_value());
   ASSERT_TRUE(WriteFile(folder / "run.json", note).has_value());
-  std::filesystem::remove(folder / "record" / "stills" / StillName("mask", 16));
+  std::filesystem::remove(still);
   const auto broken = WriteReportVideo(folder.path(), folder / "other.mp4");
   ASSERT_FALSE(broken.has_value());
   EXPECT_EQ(broken.error().kind, ErrorKind::kData);
