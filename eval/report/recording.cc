@@ -19,6 +19,22 @@ bool IsFrame(const json& number) {
   return WholeIn(number, 0, std::numeric_limits<int>::max()).has_value();
 }
 
+bool IsNumbers(const json& list) {
+  return list.is_array() &&
+         std::all_of(list.begin(), list.end(), [](const json& x) { return x.is_number(); });
+}
+
+bool NumbersOfLength(const json& list, std::size_t length) {
+  return list.size() == length && IsNumbers(list);
+}
+
+bool IsAboveZero(const json& number) { return number.is_number() && number.get<double>() > 0; }
+
+bool IsGrid(const json& grid) {
+  return grid.is_object() && NumbersOfLength(grid.value("origin_m", json()), 3) &&
+         IsAboveZero(grid.value("step_m", json()));
+}
+
 // Calls `visit` for each place [offset, length] in `bytes` that the recording names. False where a
 // part that should hold places has another form.
 bool ForEachPlace(json& recording, const std::function<bool(json&)>& visit) {
@@ -34,7 +50,8 @@ bool ForEachPlace(json& recording, const std::function<bool(json&)>& visit) {
     return places(part, {"vertex_bytes", "index_bytes"}) && part.contains("id") &&
            part["id"].is_number_unsigned() && part.contains("vertices") &&
            part["vertices"].is_number_unsigned() && part.contains("triangles") &&
-           part["triangles"].is_number_unsigned();
+           part["triangles"].is_number_unsigned() &&
+           (!part.contains("grid") || IsGrid(part["grid"]));
   };
   const auto chunk = [&](json& part) {
     return mesh(part) && part.contains("layer") && part["layer"].is_string();
@@ -65,11 +82,6 @@ std::optional<std::pair<std::size_t, std::size_t>> PlaceOf(const json& place) {
   return std::pair{place[0].get<std::size_t>(), place[1].get<std::size_t>()};
 }
 
-bool NumbersOfLength(const json& list, std::size_t length) {
-  return list.is_array() && list.size() == length &&
-         std::all_of(list.begin(), list.end(), [](const json& x) { return x.is_number(); });
-}
-
 // What the page reads besides the places.
 bool HasForm(const json& recording) {
   const auto number = [&](const char* name) {
@@ -87,16 +99,84 @@ bool HasForm(const json& recording) {
   const auto frame_has_form = [](const json& frame) {
     return frame.is_object() && IsFrame(frame.value("frame", json())) &&
            NumbersOfLength(frame.value("T_WC", json()), 7) &&
-           frame.value("T_WO", json()).is_object();
+           frame.value("T_WO", json()).is_object() &&
+           std::all_of(frame["T_WO"].begin(), frame["T_WO"].end(),
+                       [](const json& pose) { return NumbersOfLength(pose, 7); });
   };
   const json sequence = recording.value("sequence", json(""));
   return sequence.is_string() && CheckLabel(sequence.get<std::string>(), "sequence") &&
          number("error_step_m") && number("age_step_frames") && list("objects") && list("frames") &&
-         list("key_frames") && list("runs") && recording.contains("grid") &&
-         recording.contains("intrinsics") && recording.contains("truth") &&
+         list("key_frames") && list("runs") && recording.contains("truth") &&
          NumbersOfLength(recording.value("depth_range_m", json()), 2) &&
          std::all_of(recording["objects"].begin(), recording["objects"].end(), object_has_form) &&
          std::all_of(recording["frames"].begin(), recording["frames"].end(), frame_has_form);
+}
+
+// Lists of pairs, by object; null for one of which nothing is known.
+bool IsPositionErrors(const json& errors) {
+  const auto is_list = [](const json& list) {
+    if (list.is_null()) return true;
+    return list.is_array() && std::all_of(list.begin(), list.end(), [](const json& pair) {
+             return NumbersOfLength(pair, 2);
+           });
+  };
+  return errors.is_object() && std::all_of(errors.begin(), errors.end(), is_list);
+}
+
+// A map of a recording of which `recorded` are the key frames.
+Expected<void> CheckMap(const json& run, const std::set<int>& recorded, const std::string& file) {
+  const auto wrong = [&](const std::string& what) {
+    return DataError("{}: map '{}' has {}", file, run["folder"].get<std::string>(), what);
+  };
+  for (const char* name : {"memory_mb", "track_ms", "update_poses_ms", "fuse_ms"}) {
+    if (!IsNumbers(run.value(name, json()))) {
+      return wrong(fmt::format("no list of numbers '{}'", name));
+    }
+  }
+  if (!IsPositionErrors(run.value("position_error_mm", json::object()))) {
+    return wrong("a 'position_error_mm' of another form, expected pairs of numbers by object");
+  }
+  for (const json& key : run["key_frames"]) {
+    const int frame = key["frame"].get<int>();
+    if (!recorded.contains(frame)) {
+      return wrong(fmt::format("key frame {}, expected one that 'key_frames' has", frame));
+    }
+  }
+  return {};
+}
+
+// What the page looks up in a recording whose parts have their forms.
+Expected<void> CheckForPage(const json& recording, const std::string& file) {
+  const json grid = recording.value("grid", json());
+  if (!IsGrid(grid)) {
+    return DataError("{}: 'grid' is {}, expected origin_m, three numbers, and step_m, above 0",
+                     file, JsonShown(grid));
+  }
+  const json camera = recording.value("intrinsics", json());
+  const auto has = [&](const char* name, const auto& check) {
+    return camera.is_object() && check(camera.value(name, json()));
+  };
+  const auto is_number = [](const json& value) { return value.is_number(); };
+  const auto is_focal_length = [](const json& value) { return value.is_number() && value != 0; };
+  if (!has("width", IsAboveZero) || !has("height", IsAboveZero) || !has("fx", is_focal_length) ||
+      !has("fy", is_focal_length) || !has("cx", is_number) || !has("cy", is_number)) {
+    return DataError(
+        "{}: 'intrinsics' is {}, expected width and height, above 0, fx and fy, not 0, cx and cy",
+        file, JsonShown(camera));
+  }
+  std::set<int> recorded;
+  for (const json& key : recording["key_frames"]) {
+    const int frame = key["frame"].get<int>();
+    if (!recorded.empty() && frame <= *recorded.rbegin()) {
+      return DataError("{}: 'key_frames' has frame {} after {}, expected a greater one", file,
+                       frame, *recorded.rbegin());
+    }
+    recorded.insert(frame);
+  }
+  for (const json& run : recording["runs"]) {
+    TSDFPP_RETURN_IF_ERROR(CheckMap(run, recorded, file));
+  }
+  return {};
 }
 
 }  // namespace
@@ -174,6 +254,7 @@ Expected<std::optional<Recording>> ReadRecording(const std::filesystem::path& fo
   if (!complete) {
     return DataError("{} lacks something that docs/report.md names", path.string());
   }
+  TSDFPP_RETURN_IF_ERROR(CheckForPage(recording.json, path.string()));
   return recording;
 }
 

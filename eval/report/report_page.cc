@@ -9,6 +9,7 @@
 #include "core/folders.h"
 #include "core/json_text.h"
 #include "eval/report/recording.h"
+#include "eval/report/recording_bytes.h"
 #include "eval/report/report_gates.h"
 #include "eval/run/compare_names.h"
 #include "eval/run/run_folder.h"
@@ -244,6 +245,11 @@ Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& fo
     }
     made.remarks.push_back(fmt::format("key frame {} is left out to stay below {} MB", frame,
                                        largest_bytes / 1'000'000));
+  }
+  for (const Comparison& comparison : comparisons) {
+    if (!comparison.recording) continue;
+    TSDFPP_RETURN_IF_ERROR(CheckRecordedBytes(
+        *comparison.recording, (comparison.folder / "record" / "record.bin").string()));
   }
   return made;
 }

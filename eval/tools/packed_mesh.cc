@@ -185,4 +185,21 @@ PackedMesh Pack(const TriangleMesh& mesh, const VertexMeasures& measures,
   return packed;
 }
 
+bool IsPackedMesh(std::string_view vertex_bytes, std::size_t vertices, std::string_view index_bytes,
+                  std::size_t triangles) {
+  // Of an empty mesh nothing is packed.
+  if (triangles == 0) return vertices == 0 && vertex_bytes.empty() && index_bytes.empty();
+  // A triangle has a byte at least, and each vertex is one's: no number asks for more memory.
+  if (triangles > index_bytes.size() || vertices > 3 * triangles) return false;
+  const auto* vertex_data = reinterpret_cast<const unsigned char*>(vertex_bytes.data());
+  const auto* index_data = reinterpret_cast<const unsigned char*>(index_bytes.data());
+  std::vector<PackedVertex> unpacked(vertices);
+  std::vector<unsigned int> indices(3 * triangles);
+  return meshopt_decodeVertexBuffer(unpacked.data(), vertices, sizeof(PackedVertex), vertex_data,
+                                    vertex_bytes.size()) == 0 &&
+         meshopt_decodeIndexBuffer(indices.data(), indices.size(), sizeof(unsigned int), index_data,
+                                   index_bytes.size()) == 0 &&
+         std::all_of(indices.begin(), indices.end(), [&](unsigned int i) { return i < vertices; });
+}
+
 }  // namespace tsdfpp

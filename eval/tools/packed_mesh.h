@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/types.h"
@@ -63,5 +64,9 @@ TriangleMesh Decimate(const TriangleMesh& mesh, std::size_t triangles);
 
 // `measures` has an entry a vertex, or is empty. Positions outside of the grid go to its faces.
 PackedMesh Pack(const TriangleMesh& mesh, const VertexMeasures& measures, const PositionGrid& grid);
+
+// Whether these bytes are such a mesh, of so many vertices and triangles.
+bool IsPackedMesh(std::string_view vertex_bytes, std::size_t vertices, std::string_view index_bytes,
+                  std::size_t triangles);
 
 }  // namespace tsdfpp

@@ -111,6 +111,18 @@ TEST(PackedMesh, DecimationJoinsVerticesAndTakesTheEmptyMesh) {
   EXPECT_TRUE(Decimate(TriangleMesh{}, 10).triangles.empty());
 }
 
+TEST(PackedMesh, IsToldFromOtherBytes) {
+  const PackedMesh packed = Pack(Sheet(4, 0.1F, 0), {}, PositionGrid{});
+  const auto& [vertices, triangles, vertex_bytes, index_bytes] = packed;
+  EXPECT_TRUE(IsPackedMesh(vertex_bytes, vertices, index_bytes, triangles));
+  EXPECT_TRUE(IsPackedMesh("", 0, "", 0));
+  EXPECT_FALSE(IsPackedMesh(index_bytes, vertices, vertex_bytes, triangles));
+  EXPECT_FALSE(
+      IsPackedMesh(std::string(vertex_bytes.size(), '\0'), vertices, index_bytes, triangles));
+  EXPECT_FALSE(IsPackedMesh(vertex_bytes, vertices, index_bytes, std::size_t{1} << 60U));
+  EXPECT_FALSE(IsPackedMesh(vertex_bytes, std::size_t{1} << 60U, index_bytes, triangles));
+}
+
 // The scene has triangles 0-5 of the table and a car; without the car triangle 5 goes and 6, 7
 // come.
 TEST(PackedMesh, ARemovalIsCutIntoWhatStaysGoesAndComes) {

@@ -14,7 +14,7 @@
 #include "eval/sweep/sweep_metrics.h"
 #include "eval/tools/base64.h"
 #include "mapper/method_info.h"
-#include "tests/core/temp_folder.h"
+#include "tests/eval/tiny_run.h"
 #include "tests/needs.h"
 #include "viewer/report_template.h"
 
@@ -22,88 +22,9 @@ namespace tsdfpp {
 namespace {
 
 using nlohmann::json;
-using test::TempFolder;
-
-// What `tsdfpp compare --record` could have written, of two key frames whose bytes are no images.
-void WriteTinyRun(const std::filesystem::path& folder) {
-  const json run{{"title", "tsdf, paper, given poses"},
-                 {"folder", "tsdf_paper_gt"},
-                 {"method", "tsdf"},
-                 {"profile", "paper"},
-                 {"poses", "gt"}};
-  const json summary{{"schema", 1},
-                     {"generator", "tsdfpp"},
-                     {"version", "0.1.0"},
-                     {"command", "c"},
-                     {"sequence", "tiny"},
-                     {"first_frame", 1},
-                     {"last_frame", 16},
-                     {"every", 8},
-                     {"cores", 2},
-                     {"read_s", 1.5},
-                     {"total_s", 2.5},
-                     {"removed", {1}},
-                     {"reveal_frame", nullptr},
-                     {"runs", {run}}};
-  ASSERT_TRUE(WriteFile(folder / "summary.json", summary.dump()));
-  ASSERT_TRUE(
-      WriteFile(folder / "frames.csv", "frame,method,profile,poses,x\n8,tsdf,paper,gt,1\n"));
-  std::string bytes;
-  const auto place = [&](std::size_t length) {
-    json at = json::array({bytes.size(), length});
-    for (std::size_t i = 0; i < length; ++i) bytes += static_cast<char>(bytes.size() * 37 % 251);
-    return at;
-  };
-  const auto mesh = [&](const char* layer) {
-    return json{{"id", 0U},
-                {"vertices", 3U},
-                {"triangles", 1U},
-                {"layer", layer},
-                {"vertex_bytes", place(90)},
-                {"index_bytes", place(10)}};
-  };
-  json keys = json::array();
-  json run_keys = json::array();
-  json frames = json::array();
-  for (const int frame : {8, 16}) {
-    frames.push_back({{"frame", frame}, {"T_WC", {0, 0, 0, 0, 0, 0, 1}}, {"T_WO", json::object()}});
-    keys.push_back(
-        {{"frame", frame}, {"colour", place(3000)}, {"depth", place(2000)}, {"mask", place(500)}});
-    run_keys.push_back({{"frame", frame},
-                        {"picture", place(4000)},
-                        {"picture_after", place(4000)},
-                        {"chunks", {mesh("common"), mesh("hole")}}});
-  }
-  const json record{{"schema", 1},
-                    {"grid", {{"origin_m", {0, 0, 0}}, {"step_m", 0.001}}},
-                    {"intrinsics", json::object()},
-                    {"error_step_m", 0.0002},
-                    {"age_step_frames", 1},
-                    {"depth_range_m", {0.5, 3}},
-                    {"objects", {{{"id", 0U}, {"name", "background"}, {"colour", {1, 2, 3}}}}},
-                    {"frames", frames},
-                    {"truth", {mesh("truth")}},
-                    {"key_frames", keys},
-                    {"runs", {{{"folder", "tsdf_paper_gt"}, {"key_frames", run_keys}}}}};
-  ASSERT_TRUE(WriteFile(folder / "record" / "record.json", record.dump()));
-  ASSERT_TRUE(WriteFile(folder / "record" / "record.bin", bytes));
-}
-
-std::string Text(const std::filesystem::path& file) { return ReadFile(file).value_or(""); }
-
-class Report : public testing::Test {
- protected:
-  void SetUp() override { WriteTinyRun(Run()); }
-  std::filesystem::path Run() const { return folder_ / "run"; }
-  std::filesystem::path Copy(const std::string& name) const {
-    std::filesystem::path copy = folder_ / name;
-    std::filesystem::copy(Run(), copy, std::filesystem::copy_options::recursive);
-    return copy;
-  }
-
- private:
-  TempFolder folder_;
-};
+using test::Report;
+using test::Text;
+using test::WriteTinyRun;
 
 // A cache of the compiler's may know the page by its path alone.
 TEST(ReportTemplate, IsThePageThatWasBundledLast) {
@@ -206,27 +127,6 @@ TEST_F(Report, DroppingAKeyFrameKeepsTheBytesOfTheOthers) {
   EXPECT_EQ(bytes_of(record.json["runs"][0]["key_frames"][0]["picture"]), picture);
 }
 
-// Numbers that wrap would never be dropped; bytes that are named over and over fill all memory.
-TEST_F(Report, ARecordingNamesItsFramesAndBytesOnce) {
-  const auto refused = [&](const std::string& name, const std::function<void(json&)>& spoil) {
-    const std::filesystem::path run = Copy(name);
-    json record = json::parse(Text(run / "record" / "record.json"));
-    spoil(record);
-    EXPECT_TRUE(WriteFile(run / "record" / "record.json", record.dump()));
-    const auto recording = ReadRecording(run);
-    return recording ? std::string() : recording.error().message;
-  };
-  const auto wrapped = [](json& record) { record["key_frames"][0]["frame"] = 4294967304; };
-  EXPECT_NE(refused("wrapped", wrapped).find("lacks something"), std::string::npos);
-  const auto negative = [](json& record) { record["frames"][0]["frame"] = -1; };
-  EXPECT_NE(refused("negative", negative).find("lacks something"), std::string::npos);
-  const auto twice = [&](json& record) {
-    record["key_frames"][0]["colour"] = {0, Text(Run() / "record" / "record.bin").size()};
-  };
-  EXPECT_NE(refused("twice", twice).find("is no offset and length of its own"), std::string::npos);
-  EXPECT_EQ(refused("sound", [](json&) {}), "");
-}
-
 // A name can say what it likes: between its <script> tags the data has no '<' at all.
 TEST_F(Report, NothingInARunCanEndTheDataOfThePage) {
   TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
@@ -295,68 +195,6 @@ TEST_F(Report, AnInterruptedRunGetsASentence) {
   }
   ASSERT_TRUE(WriteFile(run / "run.json", note.dump()));
   expect(run, "record/record.bin is not of this run");
-}
-
-TEST_F(Report, SpoiltFilesGetASentence) {
-  struct Case {
-    const char* name;
-    std::function<void(const std::filesystem::path&)> spoil;
-    const char* says;
-  };
-  const auto edit = [](const std::filesystem::path& file,
-                       const std::function<void(json&)>& change) {
-    json value = json::parse(Text(file));
-    change(value);
-    ASSERT_TRUE(WriteFile(file, value.dump()));
-  };
-  const std::vector<Case> cases{
-      {"no-summary", [](const auto& run) { std::filesystem::remove(run / "summary.json"); },
-       "has no summary.json"},
-      {"no-json", [](const auto& run) { (void)WriteFile(run / "summary.json", "[1"); },
-       "not a JSON object"},
-      {"schema",
-       [&](const auto& run) { edit(run / "summary.json", [](json& s) { s["schema"] = 7; }); },
-       "schema is 7, expected 1"},
-      {"no-runs",
-       [&](const auto& run) { edit(run / "summary.json", [](json& s) { s["runs"] = 1; }); },
-       "'runs' is missing"},
-      {"no-csv", [](const auto& run) { std::filesystem::remove(run / "frames.csv"); },
-       "frames.csv"},
-      {"csv", [](const auto& run) { (void)WriteFile(run / "frames.csv", "a,b\n"); },
-       "does not begin with"},
-      {"short-bytes",
-       [](const auto& run) { std::filesystem::resize_file(run / "record" / "record.bin", 1000); },
-       "in the 1000 bytes of record.bin"},
-      {"no-bytes", [](const auto& run) { std::filesystem::remove(run / "record" / "record.bin"); },
-       "record.bin"},
-      {"place",
-       [&](const auto& run) {
-         edit(run / "record" / "record.json", [](json& r) {
-           r["key_frames"][0]["mask"] = {-1, 5};
-         });
-       },
-       "[-1,5] is no offset and length"},
-      {"pose",
-       [&](const auto& run) {
-         edit(run / "record" / "record.json", [](json& r) { r["frames"][0]["T_WC"] = {1, 2}; });
-       },
-       "lacks something"},
-      {"chunks",
-       [&](const auto& run) {
-         edit(run / "record" / "record.json",
-              [](json& r) { r["runs"][0]["key_frames"][0]["chunks"] = "all"; });
-       },
-       "lacks something"},
-  };
-  for (const Case& each : cases) {
-    const std::filesystem::path run = Copy(each.name);
-    each.spoil(run);
-    const auto page = MakeReportPage({run}, "c");
-    TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
-    ASSERT_FALSE(page.has_value()) << each.name;
-    EXPECT_EQ(page.error().kind, ErrorKind::kData) << each.name;
-    EXPECT_NE(page.error().message.find(each.says), std::string::npos) << page.error().message;
-  }
 }
 
 }  // namespace

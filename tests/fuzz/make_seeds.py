@@ -194,10 +194,13 @@ def recording():
                 for f in (1, 5, 9)]
     record = {
         "schema": 1, "sequence": "toys", "error_step_m": 0.001, "age_step_frames": 1, "depth_range_m": [0.5, 2.5],
-        "grid": {"origin_m": [0, 0, 0], "step_m": 0.001}, "intrinsics": {"width": 4, "height": 3},
+        "grid": {"origin_m": [0, 0, 0], "step_m": 0.001},
+        "intrinsics": {"width": 4, "height": 3, "fx": 4, "fy": 4, "cx": 2, "cy": 1.5},
         "objects": [{"id": 1, "name": "toy", "removed": True, "colour": [1, 2, 3]}],
         "frames": [{"frame": 1, "T_WC": [0, 0, 0, 0, 0, 0, 1], "T_WO": {"1": [0, 0, 0, 0, 0, 0, 1]}}],
-        "truth": [mesh()], "key_frames": keys, "stills": [1, 5], "runs": [{"folder": "tsdf", "key_frames": run_keys}]}
+        "truth": [mesh()], "key_frames": keys, "stills": [1, 5],
+        "runs": [{"folder": "tsdf", "memory_mb": [1], "track_ms": [1], "update_poses_ms": [1], "fuse_ms": [1],
+                  "position_error_mm": {"1": [[1, 0.5]]}, "key_frames": run_keys}]}
     return {"record/record.json": json.dumps(record), "record/record.bin": bytes(i % 256 for i in range(end))}
 
 
