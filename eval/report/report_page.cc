@@ -1,5 +1,7 @@
 #include "eval/report/report_page.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -193,6 +195,40 @@ std::string DataText(const std::vector<Comparison>& comparisons, const json& gat
          "</script>\n" + blocks;
 }
 
+// The frame that a comparison's figures are of: the page begins with it.
+int ExaminedFrame(const Comparison& comparison) {
+  const json reveal = comparison.summary.value("reveal_frame", json());
+  return (reveal.is_number_integer() ? reveal : comparison.summary["last_frame"]).get<int>();
+}
+
+// Takes the key frame out that would be missed least, and returns which of whom; nothing where each
+// recording has but one. The maps stand side by side at one frame, so it goes everywhere, but for
+// the recordings that are examined at it.
+std::string DropAKeyFrame(std::vector<Comparison>& comparisons) {
+  const auto count = [](const Comparison& comparison) {
+    return comparison.recording ? comparison.recording->KeyFrames().size() : 0;
+  };
+  const auto longest =
+      std::max_element(comparisons.begin(), comparisons.end(),
+                       [&](const auto& a, const auto& b) { return count(a) < count(b); });
+  if (count(*longest) <= 1) return "";
+  std::set<int> keep;
+  for (Comparison& comparison : comparisons) {
+    keep.insert(ExaminedFrame(comparison));
+    if (comparison.recording) keep.insert(comparison.recording->KeyFrames().back());
+  }
+  int frame = longest->recording->LeastKeyFrame(keep);
+  if (keep.contains(frame)) frame = longest->recording->LeastKeyFrame({ExaminedFrame(*longest)});
+  std::vector<std::string> dropped;
+  for (Comparison& comparison : comparisons) {
+    if (count(comparison) <= 1 || ExaminedFrame(comparison) == frame) continue;
+    const std::size_t before = count(comparison);
+    comparison.recording->DropKeyFrame(frame);
+    if (count(comparison) < before) dropped.push_back(NameOf(comparison.folder));
+  }
+  return fmt::format("key frame {} of {} is left out", frame, fmt::join(dropped, " and "));
+}
+
 }  // namespace
 
 Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& folders,
@@ -221,30 +257,13 @@ Expected<ReportPage> MakeReportPage(const std::vector<std::filesystem::path>& fo
                   std::string(page.substr(mark + kReportDataMark.size()));
       break;
     }
-    // The longest recording gives up a key frame.
-    const auto longest =
-        std::max_element(comparisons.begin(), comparisons.end(), [](const auto& a, const auto& b) {
-          return (a.recording ? a.recording->KeyFrames().size() : 0) <
-                 (b.recording ? b.recording->KeyFrames().size() : 0);
-        });
-    if (!longest->recording || longest->recording->KeyFrames().size() <= 1) {
+    const std::string remark = DropAKeyFrame(comparisons);
+    if (remark.empty()) {
       return DataError("the report would have {} bytes, expected at most {}",
                        page.size() + data.size(), largest_bytes);
     }
-    std::set<int> examined;
-    for (const Comparison& comparison : comparisons) {
-      const nlohmann::json& frame = comparison.summary["reveal_frame"];
-      if (frame.is_number_integer()) examined.insert(frame.get<int>());
-    }
-    const int frame = longest->recording->LeastKeyFrame(examined);
-    // The maps stand side by side at one frame, so it goes everywhere.
-    for (Comparison& comparison : comparisons) {
-      if (comparison.recording && comparison.recording->KeyFrames().size() > 1) {
-        comparison.recording->DropKeyFrame(frame);
-      }
-    }
-    made.remarks.push_back(fmt::format("key frame {} is left out to stay below {} MB", frame,
-                                       largest_bytes / 1'000'000));
+    made.remarks.push_back(
+        fmt::format("{} to stay below {} MB", remark, largest_bytes / 1'000'000));
   }
   for (const Comparison& comparison : comparisons) {
     if (!comparison.recording) continue;

@@ -107,6 +107,43 @@ TEST_F(Report, APageThatIsTooLargeLeavesOutKeyFramesAndSaysSo) {
   EXPECT_EQ(none.error().kind, ErrorKind::kData);
 }
 
+// Of a run that is examined at its last frame, beside a longer one with more bytes to give up.
+TEST_F(Report, TheExaminedFrameOfEachRunStays) {
+  TSDFPP_NEEDS(!ReportTemplate().empty(), "a build with the report's page");
+  const std::filesystem::path shorter = Run();
+  const std::filesystem::path longer = Run().parent_path() / "longer";
+  WriteTinyRun(longer, {8, 16, 24, 32, 40});
+  const auto frames_of = [](const json& report) {
+    std::vector<int> frames;
+    for (const json& key : report["record"]["key_frames"]) frames.push_back(key["frame"]);
+    return frames;
+  };
+  const auto whole = MakeReportPage({longer, shorter}, "c");
+  ASSERT_TRUE(whole.has_value()) << whole.error().message;
+  constexpr std::size_t kOfAKeyFrame_bytes = 14000;  // in base 64 they are more
+  std::size_t most = whole->html.size();
+  for (int left_out = 1; left_out <= 6; ++left_out) {
+    most -= kOfAKeyFrame_bytes;
+    const auto page = MakeReportPage({longer, shorter}, "c", most);
+    ASSERT_TRUE(page.has_value()) << left_out << ": " << page.error().message;
+    const json reports = DataOf(page->html)["reports"];
+    EXPECT_EQ(frames_of(reports[0]).back(), 40) << left_out;
+    EXPECT_EQ(frames_of(reports[1]).back(), 16) << left_out;
+    // A remark names the runs that lost the frame, and no other.
+    for (const std::string& remark : page->remarks) {
+      const int frame = std::stoi(remark.substr(std::string("key frame ").size()));
+      for (const std::size_t r : {0U, 1U}) {
+        const std::vector<int> kept = frames_of(reports[r]);
+        const bool is_gone = std::find(kept.begin(), kept.end(), frame) == kept.end();
+        const bool is_named =
+            remark.find(reports[r]["name"].get<std::string>()) != std::string::npos;
+        const bool was_there = r == 0 || frame <= 16;
+        EXPECT_EQ(is_named, is_gone && was_there) << remark;
+      }
+    }
+  }
+}
+
 TEST_F(Report, DroppingAKeyFrameKeepsTheBytesOfTheOthers) {
   Recording record = **ReadRecording(Run());
   const auto bytes_of = [&](const json& place) {
