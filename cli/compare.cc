@@ -177,31 +177,51 @@ Expected<void> CheckLists(const CompareArguments& options, const std::string& po
   return {};
 }
 
-// The command with what was given.
-std::string CommandText(const CompareArguments& options, const std::string& pose_names) {
-  const CompareConfig& config = options.config;
-  std::string command = fmt::format(
-      "tsdfpp compare {} --out {} --methods {} --profiles {} --poses {} --voxel {} --every {} "
-      "--until {}{}{}",
-      TextOf(options.source), options.out, options.methods, options.profiles, pose_names,
-      config.map.voxel_m, config.every, config.until, config.keep_meshes ? " --keep-meshes" : "",
-      config.record ? " --record" : "");
-  if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
-  if (!options.removed.empty()) command += " --removed " + options.removed;
+// The options that were given of how our maps are made, as on a command line, each with a space
+// before; those aside whose defaults depend on the source.
+std::string MapOptionsText(const CompareArguments& options) {
+  std::string text;
   if (options.camera != CameraSourceName(CameraSource::kGiven)) {
-    command += " --camera " + options.camera;
+    text += " --camera " + options.camera;
   }
   if (options.bleeding != BleedingPixelsName(BleedingPixels::kAuto)) {
-    command += " --bleeding " + options.bleeding;
+    text += " --bleeding " + options.bleeding;
   }
-  command += options.repair.Text() + options.tracking.Text();
+  text += options.repair.Text() + options.tracking.Text();
   if (const std::string& name = options.segmentation.segmentation;
       name != SegmentationName(Segmentation::kGiven)) {
-    command += " --segmentation " + name;
+    text += " --segmentation " + name;
   }
-  command += options.segmentation.Text();
-  if (!options.associate.empty()) command += " --associate " + options.associate;
-  if (!options.votes.empty()) command += " --vote-config " + options.votes;
+  text += options.segmentation.Text();
+  if (!options.associate.empty()) text += " --associate " + options.associate;
+  if (!options.votes.empty()) text += " --vote-config " + options.votes;
+  return text;
+}
+
+// With adapters alone there is no map of ours that options could be of.
+Expected<void> CheckAdaptersAlone(const CompareArguments& options, const CompareConfig& config) {
+  if (!config.methods.empty() || config.adapters.empty()) return {};
+  std::string text = MapOptionsText(options);
+  if (!options.poses.empty()) text += " --poses " + options.poses;
+  if (config.keep_meshes) text += " --keep-meshes";
+  if (config.record) text += " --record";
+  if (text.empty()) return {};
+  return UsageError("'{}' is of our own maps, and --methods names none of them", text.substr(1));
+}
+
+// The command with what was given.
+std::string CommandText(const CompareArguments& options, const CompareConfig& config,
+                        const std::string& pose_names) {
+  std::string command =
+      fmt::format("tsdfpp compare {} --out {} --methods {} --profiles {}", TextOf(options.source),
+                  options.out, options.methods.empty() ? "''" : options.methods, options.profiles);
+  if (!config.methods.empty()) command += " --poses " + pose_names;
+  command += fmt::format(" --voxel {} --every {} --until {}{}{}", config.map.voxel_m, config.every,
+                         config.until, config.keep_meshes ? " --keep-meshes" : "",
+                         config.record ? " --record" : "");
+  if (options.reveal >= 0) command += fmt::format(" --reveal {}", options.reveal);
+  if (!options.removed.empty()) command += " --removed " + options.removed;
+  command += MapOptionsText(options);
   for (const std::string& file : options.adapters) command += " --adapter " + file;
   return command;
 }
@@ -231,7 +251,7 @@ CommandResult ResultOf(const CompareResult& result, const std::string& out,
                             result.last_frame, out);
   }
   return {SummaryJson(result, command),
-          FrontTable(result) + "\n" + SummaryTable(result) +
+          FrontTable(result) + SummaryTable(result) +
               fmt::format("report: {}/report.html ({:.0f} s)\n", out, result.total_s),
           exit_code, complaint};
 }
@@ -245,8 +265,9 @@ Expected<void> ReadSegmentation(const CompareArguments& options, CompareConfig& 
 
 Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   CompareConfig config = options.config;
-  TSDFPP_RETURN_IF_ERROR(ReadSegmentation(options, config));
   TSDFPP_RETURN_IF_ERROR(ReadMappers(options, config));
+  TSDFPP_RETURN_IF_ERROR(CheckAdaptersAlone(options, config));
+  TSDFPP_RETURN_IF_ERROR(ReadSegmentation(options, config));
   config.profiles = SplitList(options.profiles);
   if (!options.associate.empty()) {
     TSDFPP_ASSIGN(config.associate, AssociationModeFromName(options.associate));
@@ -268,7 +289,7 @@ Expected<CommandResult> RunCompareCommand(const CompareArguments& options) {
   if (!opened.remark.empty()) {
     config.truth_note += (config.truth_note.empty() ? "" : " ") + opened.remark;
   }
-  const std::string command = CommandText(options, pose_names);
+  const std::string command = CommandText(options, config, pose_names);
   ProgressBar bar("compare");
   const auto show = [&](int done, int total) { bar.Show(done, total); };
   TSDFPP_ASSIGN(const CompareResult result,

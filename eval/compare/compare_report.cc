@@ -275,8 +275,7 @@ Expected<void> WriteSummary(const CompareResult& result, const std::string& comm
   TSDFPP_RETURN_IF_ERROR(
       WriteFile(out / "summary.json", JsonText(SummaryJson(result, command), 1) + "\n"));
   TSDFPP_RETURN_IF_ERROR(WriteFile(out / "frames.csv", Csv(result)));
-  return WriteFile(out / "table.txt",
-                   FrontTable(result) + "\n" + SummaryTable(result, Times::kLeftOut));
+  return WriteFile(out / "table.txt", FrontTable(result) + SummaryTable(result, Times::kLeftOut));
 }
 
 namespace {

@@ -148,6 +148,7 @@ std::vector<std::string> AdapterLines(const CompareResult& result) {
 }
 
 std::string FrontTable(const CompareResult& result) {
+  if (result.runs.empty()) return "";
   const std::vector<std::string>& profiles = result.config.profiles;
   std::vector<std::string> maps;  // titles, in the order of the runs
   for (const auto& run : result.runs) {
@@ -182,7 +183,7 @@ std::string FrontTable(const CompareResult& result) {
              "voxel\n",
              result.info.name, result.reveal_frame.value_or(result.last_frame),
              result.movers.size()) +
-         Aligned(rows);
+         Aligned(rows) + "\n";
 }
 
 std::string SummaryTable(const CompareResult& result, Times times) {

@@ -29,7 +29,8 @@ std::vector<std::string> FailureLines(const CompareResult& result);
 // A line an adapter: what it cost, or why it failed; and its remarks.
 std::vector<std::string> AdapterLines(const CompareResult& result);
 
-// The main figures: a row a method, the truncation profiles side by side. Adapters are not in it.
+// The main figures: a row a method, the truncation profiles side by side, and a blank line.
+// Adapters are not in it; nothing where there is nobody else.
 std::string FrontTable(const CompareResult& result);
 
 // TableRows; and AdapterLines, which say what an adapter took, where times are shown. Without times

@@ -59,8 +59,12 @@ Expected<void> CheckSummary(const json& summary, const std::filesystem::path& pa
       return DataError("{}: '{}' is missing or no number", path.string(), name);
     }
   }
-  if (!summary.contains("runs") || !summary["runs"].is_array() || summary["runs"].empty()) {
-    return DataError("{}: 'runs' is missing or names no map", path.string());
+  if (!summary.contains("runs") || !summary["runs"].is_array()) {
+    return DataError("{}: 'runs' is missing or no list", path.string());
+  }
+  if (summary["runs"].empty()) {
+    return DataError("{}: 'runs' names no map, expected one of ours: adapters' have no page",
+                     path.string());
   }
   for (const json& run : summary["runs"]) {
     for (const char* name : {"title", "folder", "method", "profile", "poses"}) {

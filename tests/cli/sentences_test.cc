@@ -34,6 +34,7 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
   const std::string sets = TSDFPP_SOURCE_DIR "/eval/bench-sets";
   ASSERT_TRUE(WriteFile(folder / "file", "x").has_value());
   ASSERT_TRUE(WriteFile(folder / "letters/letter.txt", "x").has_value());
+  ASSERT_TRUE(WriteFile(folder / "adapter.toml", "name = \"mine\"\ncommand = [\"true\"]\n"));
   fs::create_directories(folder / "empty");
   const auto see = [](const std::string& command) {
     return " (see tsdfpp " + command + " --help)";
@@ -110,6 +111,12 @@ TEST(Sentences, SayWhatWasFoundAndWhatWasExpected) {
       {{"evaluate", scene, "--meshes", "@/empty", "--at", "1", "--masks", "@/none"},
        "--masks @/none: no such folder"},
       {{"compare", scene, "--out", "@/o", "--adapter", "@/none.toml"}, "@/none.toml: no such file"},
+      {{"compare",   scene,    "--out",          "@/o",   "--adapter",     "@/adapter.toml",
+        "--methods", "",       "--camera",       "track", "--mask-repair", "on",
+        "--track",   "moving", "--segmentation", "depth", "--associate",   "votes",
+        "--poses",   "track",  "--record"},
+       "'--camera track --mask-repair on --track moving --segmentation depth --associate votes "
+       "--poses track --record' is of our own maps, and --methods names none of them"},
       {{"export", scene, "--to", "xyz", "--out", "@/o"},
        "--to: found 'xyz', expected one of tum, bop, klg, 7scenes" + see("export")},
       {{"export", scene, "--to", "tum"}, "--out is required" + see("export")},

@@ -340,6 +340,8 @@ TEST(BundledAdapters, MapTheStaticWorld) {
   const nlohmann::json summary = CompareMini(folder, python ? methods + ",open3d-python" : methods);
   ASSERT_FALSE(summary.is_discarded());
   ASSERT_EQ(summary.at("adapters").size(), python ? 4U : 3U);
+  // Without maps of ours the noted command has no option of theirs: it can be run again.
+  EXPECT_EQ(summary.at("command").get<std::string>().find("--poses"), std::string::npos);
   std::map<std::string, double> completion;
   for (const nlohmann::json& adapter : summary.at("adapters")) {
     ASSERT_TRUE(adapter.at("failure").is_null()) << adapter.at("failure");

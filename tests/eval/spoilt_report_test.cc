@@ -87,6 +87,11 @@ TEST_F(Report, SpoiltFilesGetASentence) {
       {"no-runs",
        [&](const auto& run) { edit(run / "summary.json", [](json& s) { s["runs"] = 1; }); },
        "'runs' is missing"},
+      {"adapters-alone",
+       [&](const auto& run) {
+         edit(run / "summary.json", [](json& s) { s["runs"] = json::array(); });
+       },
+       "'runs' names no map, expected one of ours"},
       {"no-csv", [](const auto& run) { std::filesystem::remove(run / "frames.csv"); },
        "frames.csv"},
       {"csv", [](const auto& run) { (void)WriteFile(run / "frames.csv", "a,b\n"); },
