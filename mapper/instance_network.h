@@ -15,7 +15,7 @@ namespace tsdfpp {
 // (.pb, with its .pbtxt). Each frame is found by itself; the same bytes for any number of threads.
 // The files are read by OpenCV, which checks less than we do: take them from whom you trust.
 // Errors: kData, naming the file and, where OpenCV does, the layer; kUsage where the config's
-// format is not the file's.
+// format is not the file's, or it sets something that the format has no use for.
 Expected<std::unique_ptr<InstanceFinder>> LoadInstanceNetwork(const std::filesystem::path& file,
                                                               const NetworkConfig& config);
 

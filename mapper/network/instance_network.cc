@@ -217,6 +217,30 @@ NetworkFormat FormatOfOutputs(const std::vector<std::string>& outputs) {
   return outputs.size() == 1 ? NetworkFormat::kCentres : NetworkFormat::kYolo;
 }
 
+// Whether the format has a use for all that was set. Errors: kUsage.
+Expected<void> CheckUse(NetworkFormat format, const NetworkConfig& config) {
+  const NetworkConfig usual;
+  const auto wrong = [&](const char* field, const char* of) {
+    return UsageError("network setting '{}' is one of format {}, and the network has format {}",
+                      field, of, NetworkFormatName(format));
+  };
+  const bool is_ours = format == NetworkFormat::kCentres;
+  if (format != NetworkFormat::kMaskRcnn && config.graph != usual.graph) {
+    return wrong("graph", "mask_rcnn");
+  }
+  if (format != NetworkFormat::kYolo && config.most_overlap != usual.most_overlap) {
+    return wrong("most_overlap", "yolo");
+  }
+  if (is_ours && config.mask_share != usual.mask_share)
+    return wrong("mask_share", "yolo or mask_rcnn");
+  if (is_ours && config.classes.size() > 1) {
+    return UsageError(
+        "network setting 'classes' has {} names, expected one of a network of format {}",
+        config.classes.size(), NetworkFormatName(format));
+  }
+  return {};
+}
+
 // Of an ONNX file that is loaded.
 Expected<std::unique_ptr<InstanceFinder>> MakeFinder(LoadedNet loaded, NetworkConfig config) {
   loaded.net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
@@ -230,6 +254,7 @@ Expected<std::unique_ptr<InstanceFinder>> MakeFinder(LoadedNet loaded, NetworkCo
                          name);
       }
     }
+    TSDFPP_RETURN_IF_ERROR(CheckUse(config.format, config));
     return std::make_unique<NetworkFinder>(std::move(loaded), config.format, std::move(config));
   }
   loaded.outputs = loaded.net.getUnconnectedOutLayersNames();
@@ -241,6 +266,7 @@ Expected<std::unique_ptr<InstanceFinder>> MakeFinder(LoadedNet loaded, NetworkCo
                      loaded.outputs.size(), fmt::join(loaded.outputs, ", "), expected,
                      NetworkFormatName(format));
   }
+  TSDFPP_RETURN_IF_ERROR(CheckUse(format, config));
   return std::make_unique<NetworkFinder>(std::move(loaded), format, std::move(config));
 }
 

@@ -27,13 +27,16 @@ inline constexpr int kMostNetworkSide_px = 4096;
 
 struct NetworkConfig {
   NetworkFormat format = NetworkFormat::kAuto;
-  std::vector<std::string> classes{};  // names by number; none: those of COCO, or "thing"
+  std::vector<std::string> classes{};  // names by number; none: those of COCO, or "thing"; of
+                                       // centres one
   std::string graph{};         // the .pbtxt of mask_rcnn; none: beside the network, with its name
   int width = 0;               // of the input, pixels; 0: the format's own
   int height = 0;              // 0: the format's own, or by the frame's shape
   double least_score = 0;      // what is less sure is no instance; 0: the format's own
-  double most_overlap = 0.45;  // of two boxes of a class that share more the less sure one goes
-  double mask_share = 0.5;     // a pixel with less of a mask is not the instance's
+  double most_overlap = 0.45;  // of yolo: of two boxes of a class that share more the less sure
+                               // one goes
+  double mask_share = 0.5;     // of yolo and mask_rcnn: a pixel with less of a mask is not the
+                               // instance's
   int every = 1;               // the network sees every n-th frame
   // Of kFull (mapper/segment/joined_segments.h):
   int latency = 0;  // frames after which instances are known, while the network runs beside them;

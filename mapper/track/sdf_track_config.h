@@ -9,6 +9,8 @@
 
 namespace tsdfpp {
 
+// A camera (CameraSource) is found with these settings, too, but for some that have no effect then,
+// or a bound (docs/tracking.md, "The camera").
 struct SdfTrackConfig {
   // The segment.
   int mask_erosion_px = 1;  // taken off its outline, where depth is mixed
@@ -22,6 +24,9 @@ struct SdfTrackConfig {
   // measured for Kinect (0.0012, 0.0019, 0.8), and `model_voxels` of the model's surface. The first
   // three are off because the points that they take weight from, at grazing incidence, are those
   // that hold an object along its length (docs/tracking.md).
+  // Weights are relative to that of a point seen head on from 0.4 m. So `axial_m` by itself takes
+  // no weight from any: it widens what is an edge or an inlier. `model_voxels` counts only beside
+  // `axial_growth` or `lateral_px`.
   double axial_m = 0;
   double axial_growth = 0;  // per metre
   double lateral_px = 0;
@@ -103,9 +108,9 @@ struct SdfTrackConfig {
   // it had so many frames ago, which is at most a voxel away. 0 switches this off.
   int rest_frames = 4;
 
-  // What waits for motion (TrackChoice::kMoving) has moved where so many frames in a row show a
-  // point of it this far from where it began, each with this evidence, as above, against its place
-  // there; with fewer points than these, so many times as much.
+  // Of TrackChoice::kMoving alone. What waits for motion has moved where so many frames in a row
+  // show a point of it this far from where it began, each with this evidence, as above, against its
+  // place there; with fewer points than these, so many times as much.
   double motion_voxels = 1;
   int motion_frames = 3;
   double motion_evidence = 6;

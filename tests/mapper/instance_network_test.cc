@@ -266,6 +266,33 @@ TEST(InstanceNetwork, ImagesOfExtremeShape) {
   }
 }
 
+// A setting without effect would be taken for one that was tried.
+TEST(InstanceNetwork, ASettingThatTheFormatHasNoUseForIsRefused) {
+  const auto complaint = [](const auto& finder) {
+    if (finder) return std::string();
+    EXPECT_EQ(finder.error().kind, ErrorKind::kUsage);
+    return finder.error().message;
+  };
+  const auto own = [&](const NetworkConfig& config) {
+    return complaint(OwnInstanceNetwork(config));
+  };
+  EXPECT_EQ(
+      own({.graph = "x.pbtxt"}),
+      "network setting 'graph' is one of format mask_rcnn, and the network has format centres");
+  EXPECT_EQ(own({.most_overlap = 0.6}),
+            "network setting 'most_overlap' is one of format yolo, and the network has format "
+            "centres");
+  EXPECT_EQ(own({.mask_share = 0.6}),
+            "network setting 'mask_share' is one of format yolo or mask_rcnn, and the network has "
+            "format centres");
+  EXPECT_EQ(own({.classes = {"cup", "car"}}),
+            "network setting 'classes' has 2 names, expected one of a network of format centres");
+  EXPECT_EQ(own({.classes = {"cup"}, .most_overlap = 0.45, .mask_share = 0.5}), "");
+  EXPECT_NE(complaint(LoadInstanceNetwork(NetworkFile("yolo_v8.onnx"), {.graph = "x.pbtxt"})), "");
+  EXPECT_NE(complaint(LoadInstanceNetwork(NetworkFile("mask_rcnn.pb"), {.most_overlap = 0.6})), "");
+  EXPECT_EQ(complaint(LoadInstanceNetwork(NetworkFile("mask_rcnn.pb"), {.mask_share = 0.6})), "");
+}
+
 // A class becomes the word of an object, and a saved map's.
 TEST(NetworkConfig, ClassesAreLabels) {
   for (const std::string& name : {std::string("a\0b", 3), std::string(101, 'x'), std::string()}) {
