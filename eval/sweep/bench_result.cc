@@ -80,10 +80,10 @@ Expected<Measured> ReadScore(const std::string& name, const json& value, const j
   };
   if (value.is_number()) {
     const SweepMetric* metric = FindMetric(name);
-    const std::optional<double> most = metric == nullptr ? std::nullopt : MostOf(*metric);
+    const double most = metric == nullptr ? kMostOfAny : MostOf(*metric).value_or(kMostOfAny);
     const auto number = value.get<double>();
-    if (!(number >= 0 && number <= most.value_or(kMostOfAny) + kShareRounding)) {
-      return wrong(fmt::format("0 to {}", most.value_or(kMostOfAny)));
+    if (!(number >= 0 && number <= most + kShareRounding)) {
+      return wrong(fmt::format("0 to {}", most));
     }
     return Measured::Of(number);
   }
