@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "mapper/setting_order.h"
+#include "core/setting_order.h"
 
 namespace tsdfpp {
 namespace {

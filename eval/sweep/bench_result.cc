@@ -83,7 +83,7 @@ Expected<Measured> ReadScore(const std::string& name, const json& value, const j
     const double most = metric == nullptr ? kMostOfAny : MostOf(*metric).value_or(kMostOfAny);
     const auto number = value.get<double>();
     if (!(number >= 0 && number <= most + kShareRounding)) {
-      return wrong(fmt::format("0 to {}", most));
+      return wrong(fmt::format("0 to {:g}", most));
     }
     return Measured::Of(number);
   }

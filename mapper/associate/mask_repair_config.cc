@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "mapper/setting_order.h"
+#include "core/setting_order.h"
 
 namespace tsdfpp {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "core/plain_name.h"
-#include "mapper/setting_order.h"
+#include "core/setting_order.h"
 
 namespace tsdfpp {
 namespace {

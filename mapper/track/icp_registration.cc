@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "core/pixel_ray.h"
-#include "mapper/setting_order.h"
+#include "core/setting_order.h"
 namespace tsdfpp {
 namespace {
 

@@ -46,6 +46,12 @@ constexpr double kKnownOtherwise_voxels = 0.05;
 // Along directions of which distances know a smaller share, what they know is for the most part
 // what is wrong with a model's rim. Other terms that know such a direction have that share of say.
 constexpr double kWeakOfDistances = 0.2;
+// The outline has a say along shifts of which distances know a smaller share than this, and has
+// them up to it. It is known to whole pixels, as an edge may run along one: better than a slip, but
+// not than distances that know a little more.
+constexpr double kWeakForOutline = 0.02;
+// The first brings the rims to the outline, the others tell how well they fit it.
+constexpr int kOutlineSteps = 3;
 
 Eigen::Matrix3d PriorOf(const Eigen::Vector3d& shares, const Eigen::Matrix3d& directions,
                         double weak_share) {
@@ -74,6 +80,12 @@ double HuberFor(double deviation_m, double voxel_m, const SdfTrackConfig& config
   return std::min(
       config.huber_voxels * voxel_m,
       config.huber_deviations * std::max(deviation_m, kLeastDeviation_voxels * voxel_m));
+}
+
+// None where the distances know all shifts.
+PointTerm* OutlineOf(const SdfRegistration& task, const KnownDirections& known) {
+  const bool is_weak = known.shift_shares.minCoeff() < kWeakForOutline;
+  return is_weak && task.outline ? task.outline() : nullptr;
 }
 
 // The distances and the other terms of a finer pass.
@@ -112,11 +124,12 @@ class AllTerms {
     return known;
   }
   // Along weak directions, from T_LC: what is expected and, as far as they know it, what the other
-  // terms say.
+  // terms and the outline say.
   MotionPrior PriorAt(const Pose& T_LC) const {
     const Matrix6 of_distances = distances_.Sums(T_LC).H;
     const KnownDirections known = DirectionsOf(of_distances);
-    if (task_->others.empty()) {
+    PointTerm* outline = OutlineOf(*task_, known);
+    if (task_->others.empty() && outline == nullptr) {
       return PriorFor(of_distances, known, task_->T_LC_expected, WeakShareNow());
     }
     const double weights = std::max(1.0, of_distances.topLeftCorner<3, 3>().trace());
@@ -127,16 +140,22 @@ class AllTerms {
     shares << known.shift_shares, known.turn_shares;
     const Vector6 trust = Trust(T_LC, known, of_distances);
     const Vector6 say = weights * (kWeakOfDistances - shares.array()).max(0) * trust.array();
-    const Vector6 pull = weights * (WeakShareNow() - shares.array()).max(0) * (1 - trust.array());
     const Vector6 said = directions.transpose() * SaidByOthers(T_LC, directions, say);
+    Answer seen;
+    if (outline != nullptr) seen = AnswerOf(*outline, T_LC, known);
+    const Vector6 say_seen = weights * (kWeakForOutline - shares.array()).max(0) *
+                             seen.trust.array() * (1 - trust.array());
+    const Vector6 pull = weights * (WeakShareNow() - shares.array()).max(0) * (1 - trust.array()) *
+                         (1 - seen.trust.array());
     const Vector6 expected =
         directions.transpose() * frame_->LengthsOf(task_->T_LC_expected * T_LC.inverse());
-    const Vector6 both = say + pull;
+    const Vector6 all = say + say_seen + pull;
     Vector6 target = Vector6::Zero();
     for (int i = 0; i < 6; ++i) {
-      if (both[i] > 0) target[i] = (say[i] * said[i] + pull[i] * expected[i]) / both[i];
+      if (!(all[i] > 0)) continue;
+      target[i] = (say[i] * said[i] + say_seen[i] * seen.way[i] + pull[i] * expected[i]) / all[i];
     }
-    return {directions * both.asDiagonal() * directions.transpose(),
+    return {directions * all.asDiagonal() * directions.transpose(),
             frame_->MotionOf(directions * target) * T_LC};
   }
   DistanceCounts Count(const Pose& T_LC) const { return distances_.Count(T_LC); }
@@ -152,6 +171,34 @@ class AllTerms {
       sums.cost += more.cost;
     }
     return sums;
+  }
+  // Along the known directions, shifts first: by how much the outline would have the object moved,
+  // and how well it knows that once it is there, 1 where to kKnownOtherwise_voxels. Of turns it
+  // says nothing: where an object is round, they move no outline.
+  struct Answer {
+    Vector6 way = Vector6::Zero();
+    Vector6 trust = Vector6::Zero();
+  };
+  Answer AnswerOf(PointTerm& outline, const Pose& T_LC, const KnownDirections& known) const {
+    Eigen::Matrix3d weak = known.shifts;
+    for (int i = 0; i < 3; ++i) {
+      if (known.shift_shares[i] >= kWeakForOutline) weak.col(i).setZero();
+    }
+    Answer answer;
+    for (int step = 0; step < kOutlineSteps; ++step) {
+      Vector6 moved = Vector6::Zero();
+      moved.head<3>() = weak * answer.way.head<3>();
+      const Pose there = frame_->MotionOf(moved) * T_LC;
+      outline.KeepAt(there, deviation_m_);
+      const NormalEquations sums = outline.Sums(there, *frame_);
+      const Eigen::Matrix3d H = weak.transpose() * sums.H.topLeftCorner<3, 3>() * weak;
+      const Eigen::Matrix3d floor = (1e-9 + kNoShare * H.trace()) * Eigen::Matrix3d::Identity();
+      const Eigen::Vector3d way = -(H + floor).ldlt().solve(weak.transpose() * sums.g.head<3>());
+      if (!way.allFinite()) return {};
+      answer.way.head<3>() += way;
+      answer.trust.head<3>() = (H.diagonal() / KnownAtLeast()).cwiseMin(1);
+    }
+    return answer;
   }
   // The motion from T_LC by which their errors are least, along those directions (columns) in which
   // they have a say.
@@ -173,11 +220,14 @@ class AllTerms {
     Matrix6 at_best = Matrix6::Zero();
     for (const auto& term : task_->others) at_best += term->Information(T_LC, *frame_);
     const AlongDirections along = Along(known, of_distances, at_best);
-    const double open_m = kKnownOtherwise_voxels * task_->voxel_m;
-    const double asked = deviation_m_ * deviation_m_ / (open_m * open_m);
     Vector6 trust;
     trust << along.shifts, along.turns;
-    return (trust / asked).cwiseMin(1);
+    return (trust / KnownAtLeast()).cwiseMin(1);
+  }
+  // Information of a direction that is known to kKnownOtherwise_voxels.
+  double KnownAtLeast() const {
+    const double open_m = kKnownOtherwise_voxels * task_->voxel_m;
+    return deviation_m_ * deviation_m_ / (open_m * open_m);
   }
 
   const SdfRegistration* task_;

@@ -2,6 +2,7 @@
 // Levenberg-Marquardt search over six numbers and without matching points (docs/tracking.md).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -27,8 +28,11 @@ struct SdfRegistration {
   bool is_near = false;
   // Terms beside the distances, of the finer passes.
   std::span<const std::unique_ptr<PointTerm>> others{};
-  // Where the model makes what is at T_LC seem to be: bias * T_LC. The other terms are made for
-  // what seems.
+  // Gives the term of the outline, or null; asked where the distances leave a shift weak. None
+  // where it is empty.
+  std::function<PointTerm*()> outline{};
+  // Where the model makes what is at T_LC seem to be: bias * T_LC. The other terms and the outline
+  // are made for what seems.
   Pose bias = Pose::Identity();
 };
 
@@ -58,8 +62,9 @@ double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& confi
 // and the other terms, from where the cost was least. Along directions of which less than
 // WeakShare() of the points' information speaks, a prior pulls towards the expected pose, up
 // to that share. Along directions of which the distances know less than a fifth it pulls, up to
-// that, to where the other terms would have the object, as far as they know the direction
-// (docs/tracking.md, "Terms of the image"). Points that are not finite, and a model or segment
+// that, to where the other terms would have the object, as far as they know the direction. Along
+// weak shifts the outline's answer is what is expected, as far as it knows them (docs/tracking.md,
+// "Terms of the image"). Points that are not finite, and a model or segment
 // without anything in it, give converged = false. Deterministic for any number of threads; `config`
 // must be valid.
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,

@@ -53,29 +53,30 @@ struct SdfTrackConfig {
   double weak_share = 0.02;
 
   // A segment is kept, at most keyframe_points of it, and registered along with each later one
-  // until the object has turned by so much before the camera, or by kMostViewTurn_rad where terms
-  // of the image compare it: what the model adds to both is taken off. 0 switches this off.
+  // until the object has turned by so much before the camera, or by kMostViewTurn_rad where the
+  // term of colour compares it: what the model adds to both is taken off. 0 switches this off.
   double keyframe_turn_rad = 0.15;
   // A second one is kept for longer, so that fewer take over each other's errors. It corrects along
   // the directions that are known as well as it was (calibration.h). 0, or no first one, switches
-  // this off; so do terms of the image that compare the first, since they may know what distances,
-  // by which alone it corrects, do not.
+  // this off; so does the term of colour, since it may know what distances, by which alone it
+  // corrects, do not.
   double anchor_turn_rad = 0.8;
   double AnchorTurn_rad() const {
-    return keyframe_turn_rad > 0 && !ComparesViews() ? anchor_turn_rad : 0;
+    return keyframe_turn_rad > 0 && colour_weight <= 0 ? anchor_turn_rad : 0;
   }
   int keyframe_points = 1500;
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
   // Terms of the image (view_terms.h): how much an error of theirs counts beside one of a distance,
-  // both in deviations; 0 switches one off. The last two need a keyframe.
+  // both in deviations; 0 switches one off. The last two compare the keyframe: without one there is
+  // no outline, and colour is refused. The outline has a say along weak shifts alone.
   double free_space_weight = 0;
   double outline_weight = 0;
   double colour_weight = 0;
   static constexpr double kMostViewTurn_rad = 0.15;
   bool ComparesViews() const { return outline_weight > 0 || colour_weight > 0; }
   double KeyframeTurn_rad() const {
-    return ComparesViews() ? std::min(keyframe_turn_rad, kMostViewTurn_rad) : keyframe_turn_rad;
+    return colour_weight > 0 ? std::min(keyframe_turn_rad, kMostViewTurn_rad) : keyframe_turn_rad;
   }
 
   // Gates; an object that fails one is frozen for the frame.

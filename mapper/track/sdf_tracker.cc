@@ -86,10 +86,13 @@ void SdfTracker::Take(const Frame& frame, const cv::Mat& labels, const MapRepres
   Sight sight{&frame, &labels, turn.id, &points, CentreOf(points)};
   sight.voxel_m = voxel_m;
   std::optional<SegmentView> view;
-  if (config_.ComparesViews()) {
-    view.emplace(frame, labels, turn.id, config_.max_step_voxels * voxel_m);
-    sight.view = &*view;
-  }
+  sight.view = [&]() -> const SegmentView& {
+    if (!view) {
+      view.emplace(frame, labels, turn.id, config_.max_step_voxels * voxel_m,
+                   config_.colour_weight > 0);
+    }
+    return *view;
+  };
   const auto known = before.find(turn.id);
   const std::optional<ObjectModel> model = models_(map, turn.id);
   // Its pixels may have waited until now, so that the map has nothing of it.
@@ -152,8 +155,20 @@ std::optional<SdfTracker::Registered> SdfTracker::Register(Sight sight, const Ob
   const std::optional<Calibration> far = Calibrate(sight, memory.anchor);
   SdfRegistration task = TaskOf(sight, memory);
   if (near) task.bias = near->correction_L.inverse();
-  const auto others = OthersOf(sight, memory, task.bias);
+  ViewTermParts parts = PartsOf(sight, memory, task.bias);
+  if (config_.colour_weight > 0) parts.view = &sight.view();
+  const auto others = ViewTermsOf(parts, config_);
   task.others = others;
+  std::optional<std::unique_ptr<PointTerm>> outline;
+  if (config_.outline_weight > 0) {
+    task.outline = [&] {
+      if (!outline) {
+        parts.view = &sight.view();
+        outline = OutlineTermOf(parts, config_);
+      }
+      return outline->get();
+    };
+  }
   SdfRegistrationResult found = RegisterToDistances(task, config_);
   const SdfRegistrationResult nearest = found;
   if (found.converged && near) {
@@ -205,18 +220,17 @@ std::optional<Calibration> SdfTracker::Calibrate(const Sight& sight,
   return Calibration{task.T_LC_expected * apparent.T_LC.inverse(), apparent.known};
 }
 
-std::vector<std::unique_ptr<PointTerm>> SdfTracker::OthersOf(const Sight& sight,
-                                                             const Memory& memory,
-                                                             const Pose& bias) const {
-  ViewTermParts parts{sight.frame, sight.view};
-  if (memory.keyframe && sight.view != nullptr) {
+ViewTermParts SdfTracker::PartsOf(const Sight& sight, const Memory& memory,
+                                  const Pose& bias) const {
+  ViewTermParts parts{sight.frame};
+  if (memory.keyframe && config_.ComparesViews()) {
     parts.key = &memory.keyframe->view;
     parts.T_LC_key = bias * sight.T_LO * memory.keyframe->T_OC;
   }
   parts.model = sight.grid;
   parts.reader = sight.model;
   parts.voxel_m = sight.voxel_m;
-  return ViewTermsOf(parts, config_);
+  return parts;
 }
 
 bool SdfTracker::PassesGates(const Sight& sight, const SdfRegistrationResult& found) const {
@@ -294,7 +308,7 @@ SdfTracker::Keyframe SdfTracker::KeyframeOf(const Sight& sight, const Pose& T_OC
   const std::size_t count =
       std::min(points.size(), static_cast<std::size_t>(config_.keyframe_points));
   Keyframe keyframe{{}, T_OC, camera, {}};
-  if (sight.view != nullptr) keyframe.view = KeyViewOf(*sight.view, points, camera, config_);
+  if (config_.ComparesViews()) keyframe.view = KeyViewOf(sight.view(), points, camera, config_);
   keyframe.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     keyframe.points.push_back(points[i * points.size() / count]);

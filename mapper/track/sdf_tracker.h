@@ -75,7 +75,7 @@ class SdfTracker : public Tracker {
     InstanceId id = kNoInstance;
     const std::vector<SegmentPoint>* points = nullptr;
     Eigen::Vector3d centre_C = Eigen::Vector3d::Zero();  // of the points
-    const SegmentView* view = nullptr;                   // none where no term asks for it
+    std::function<const SegmentView&()> view{};          // made where it is asked for
     const TsdfGrid* grid = nullptr;
     const SurfaceReader* model = nullptr;  // of the grid
     double voxel_m = 0;
@@ -135,9 +135,8 @@ class SdfTracker : public Tracker {
   // does not wait for ever, and then `found` is where it is at rest.
   bool Waits(const Sight& sight, const Rest& rest, Memory& memory,
              SdfRegistrationResult& found) const;
-  // The terms beside the distances that the config has; `bias` is SdfRegistration's.
-  std::vector<std::unique_ptr<PointTerm>> OthersOf(const Sight& sight, const Memory& memory,
-                                                   const Pose& bias) const;
+  // What the terms beside the distances are made of, but the view; `bias` is SdfRegistration's.
+  ViewTermParts PartsOf(const Sight& sight, const Memory& memory, const Pose& bias) const;
   // What a keyframe says that the model adds to places.
   std::optional<Calibration> Calibrate(const Sight& sight,
                                        const std::optional<Keyframe>& keyframe) const;

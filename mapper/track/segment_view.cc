@@ -13,6 +13,8 @@ constexpr int kMargin_px = 24;
 constexpr double kBeside_px = 2;
 // Between there and here it tells whether the surface turns away.
 constexpr double kInside_px = 6;
+// And so far along the outline, to both sides.
+constexpr int kAlong_px = 3;
 // Of the angle between a surface and the plane of the image: what turns away is steeper.
 constexpr double kSteepest = 1;
 // Grey values are smoothed, and nearer to the outline they are mixed with what is behind.
@@ -65,12 +67,13 @@ cv::Mat GreyOf(const cv::Mat& colour) {
 
 }  // namespace
 
-SegmentView::SegmentView(const Frame& frame, const cv::Mat& labels, InstanceId id, double step_m)
+SegmentView::SegmentView(const Frame& frame, const cv::Mat& labels, InstanceId id, double step_m,
+                         bool has_colour)
     : frame_(&frame),
       step_m_(step_m),
       window_(Around(labels == static_cast<double>(id))),
       outline_(OutlineOf(labels(window_), id)) {
-  if (frame.colour.size() == labels.size()) grey_ = GreyOf(frame.colour(window_));
+  if (has_colour && frame.colour.size() == labels.size()) grey_ = GreyOf(frame.colour(window_));
 }
 
 ImageValue SegmentView::ValueAt(const cv::Mat& image, const Eigen::Vector2d& pixel) const {
@@ -130,9 +133,41 @@ bool SegmentView::IsOutlineOf(const Eigen::Vector2d& pixel, double depth_m) cons
   return inside_m > 0 && std::abs(inside_m - depth_m) <= step_m_ && outside_m > inside_m + step_m_;
 }
 
+std::optional<double> SegmentView::RimDepth(const Eigen::Vector2d& pixel,
+                                            const Eigen::Vector2d& outwards) const {
+  const double beside_m = DepthAt(pixel - kBeside_px * outwards);
+  const double inside_m = DepthAt(pixel - kInside_px * outwards);
+  if (!(beside_m > 0) || !(inside_m > 0)) return std::nullopt;
+  // By the pixels along the outline, too: noise would make an edge of every tenth point of a ball.
+  const Eigen::Vector2d along(-outwards.y(), outwards.x());
+  double sum_m = 0;
+  int count = 0;
+  for (int step = -kAlong_px; step <= kAlong_px; ++step) {
+    const double near_m = DepthAt(pixel - kBeside_px * outwards + step * along);
+    const double far_m = DepthAt(pixel - kInside_px * outwards + step * along);
+    if (!(near_m > 0) || !(far_m > 0) || std::abs(near_m - beside_m) > step_m_ ||
+        std::abs(far_m - inside_m) > step_m_) {
+      continue;
+    }
+    sum_m += far_m - near_m;
+    ++count;
+  }
+  const double pixels_per_m = std::max(frame_->intrinsics.fx, frame_->intrinsics.fy);
+  const double run_m = (kInside_px - kBeside_px) * beside_m / pixels_per_m;
+  if (count == 0 || std::abs(sum_m) > kSteepest * run_m * count) return std::nullopt;
+  // Straight on up to the rim, as a plane goes on in inverse depth ...
+  const double steps = (kBeside_px + 0.5) / (kInside_px - kBeside_px);
+  const double plane_m = 1 / (1 / beside_m + steps * (1 / beside_m - 1 / inside_m));
+  // ... but an edge is round: what makes the outline lies farther back than that, and seen from
+  // another side it would be beside the outline.
+  const double last_m = DepthAt(pixel);
+  const double next_m = DepthAt(pixel - outwards);
+  if (!(last_m > 0) || !(next_m > 0) || std::abs(last_m - plane_m) > step_m_) return plane_m;
+  return last_m + 0.5 * std::max(0.0, last_m - next_m);
+}
+
 std::vector<RimPoint> SegmentView::Rim() const {
   std::vector<RimPoint> rim;
-  const double pixels_per_m = std::max(frame_->intrinsics.fx, frame_->intrinsics.fy);
   for (int v = 1; v < outline_.rows - 1; ++v) {
     const auto* row = outline_.ptr<float>(v);
     for (int u = 1; u < outline_.cols - 1; ++u) {
@@ -145,15 +180,9 @@ std::vector<RimPoint> SegmentView::Rim() const {
       const double length = slope.norm();
       if (!(length > 0.5)) continue;
       const Eigen::Vector2d outwards = slope / length;
-      const double beside_m = DepthAt(pixel - kBeside_px * outwards);
-      const double inside_m = DepthAt(pixel - kInside_px * outwards);
-      if (!(beside_m > 0) || !(inside_m > 0)) continue;
-      const double run_m = (kInside_px - kBeside_px) * beside_m / pixels_per_m;
-      if (std::abs(inside_m - beside_m) > kSteepest * run_m) continue;
-      // Straight on up to the rim, as a plane goes on in inverse depth.
-      const double steps = (kBeside_px + 0.5) / (kInside_px - kBeside_px);
-      const RimPoint point{pixel + 0.5 * outwards,
-                           1 / (1 / beside_m + steps * (1 / beside_m - 1 / inside_m))};
+      const auto depth_m = RimDepth(pixel, outwards);
+      if (!depth_m) continue;
+      const RimPoint point{pixel + 0.5 * outwards, *depth_m, outwards};
       if (IsOutlineOf(point.pixel, point.depth_m)) rim.push_back(point);
     }
   }

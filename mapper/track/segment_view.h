@@ -3,6 +3,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/types.h"
@@ -19,15 +20,18 @@ struct ImageValue {
 // A place on the outline of a segment, where what it is of ends before what is farther away.
 struct RimPoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  double depth_m = 0;  // of the segment there
+  double depth_m = 0;                                  // of the segment there
+  Eigen::Vector2d outwards = Eigen::Vector2d::Zero();  // across the outline, of length 1
 };
 
 class SegmentView {
  public:
   // Of the pixels of `id` in `labels` (CV_16UC1, of the frame's size), of which there is one at
   // least. Those of kNoInstance are of the segment where they are as near to it as to others. Steps
-  // of depth are more than `step_m`. The frame is read while the view lives.
-  SegmentView(const Frame& frame, const cv::Mat& labels, InstanceId id, double step_m);
+  // of depth are more than `step_m`. Colour may be left out, which takes time. The frame is read
+  // while the view lives.
+  SegmentView(const Frame& frame, const cv::Mat& labels, InstanceId id, double step_m,
+              bool has_colour = true);
 
   // The distance to the outline, pixels, negative inside; known up to some 20 pixels beside the
   // segment, where there is an outline in the picture.
@@ -45,12 +49,16 @@ class SegmentView {
   bool IsAtDepth(const Eigen::Vector2d& pixel, double depth_m) const;
 
   // Points of its own outline, where the surface runs up to it: where it turns away, as a ball's
-  // does, another part of it makes the outline as soon as it turns.
+  // does, another part of it makes the outline as soon as it turns. An edge that is rounded over a
+  // few pixels is one.
   std::vector<RimPoint> Rim() const;
 
  private:
   // Of the frame; 0 beyond it and where there is none.
   double DepthAt(const Eigen::Vector2d& pixel) const;
+  // Of a place half a pixel beyond the outermost pixel; nothing where the surface turns away.
+  std::optional<double> RimDepth(const Eigen::Vector2d& pixel,
+                                 const Eigen::Vector2d& outwards) const;
   ImageValue ValueAt(const cv::Mat& image, const Eigen::Vector2d& pixel) const;
 
   const Frame* frame_;

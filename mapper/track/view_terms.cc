@@ -24,6 +24,8 @@ constexpr double kLeastDeviation_px = 0.3;
 constexpr double kLeastDeviation_grey = 1.5;
 // Outlines further from a rim than this are not its.
 constexpr double kFarthestRim_px = 12;
+// A rim is seen from its own side where the sine of the way there is more than this.
+constexpr double kFarthestAside = 0.005;
 // Of the model's surface.
 constexpr std::size_t kFreeSpacePoints = 500;
 constexpr double kFreeSpaceMargin_voxels = 1;
@@ -70,11 +72,16 @@ class KeyTerm : public PointTerm {
 class OutlineTerm : public KeyTerm {
  public:
   OutlineTerm(const ViewTermParts& parts, double weight)
-      : KeyTerm(parts, parts.key->rim_C, weight) {}
+      : KeyTerm(parts, parts.key->rim_C, weight), key_(parts.key), T_LC_key_(parts.T_LC_key) {}
 
  private:
-  bool IsFit(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
-    return view().IsOutlineOf(PixelOf(camera(), p_C), p_C.z());
+  void Prepare(const Pose& T_LC) override {
+    camera_key_ = T_LC_key_.inverse() * T_LC.translation();
+  }
+  bool IsFit(std::size_t point, const Eigen::Vector3d& p_C) const override {
+    const Eigen::Vector3d to_camera = (camera_key_ - key_->rim_C[point]).normalized();
+    return to_camera.dot(key_->rim_side_C[point]) <= kFarthestAside &&
+           view().IsOutlineOf(PixelOf(camera(), p_C), p_C.z());
   }
   PointSight At(std::size_t /*point*/, const Eigen::Vector3d& p_C) const override {
     if (!(p_C.z() > 0)) return {};
@@ -83,6 +90,10 @@ class OutlineTerm : public KeyTerm {
     return {true, at.value, SlopeOverPoint(camera(), p_C, at.slope)};
   }
   double LeastDeviation(double /*distance_m*/) const override { return kLeastDeviation_px; }
+
+  const KeyView* key_;
+  Pose T_LC_key_;
+  Eigen::Vector3d camera_key_ = Eigen::Vector3d::Zero();  // now, in the keyframe's frame
 };
 
 // How grey a point of the object is beside what it was, but for one gain and offset of all.
@@ -215,7 +226,10 @@ KeyView KeyViewOf(const SegmentView& view, const std::vector<SegmentPoint>& poin
   KeyView key;
   if (config.outline_weight > 0) {
     for (const RimPoint& point : view.Rim()) {
-      key.rim_C.emplace_back(point.depth_m * PixelRay(camera, point.pixel.x(), point.pixel.y()));
+      const Eigen::Vector3d ray = PixelRay(camera, point.pixel.x(), point.pixel.y());
+      const Eigen::Vector3d aside(point.outwards.x(), point.outwards.y(), 0);
+      key.rim_C.emplace_back(point.depth_m * ray);
+      key.rim_side_C.emplace_back((aside - aside.dot(ray) / ray.squaredNorm() * ray).normalized());
     }
   }
   if (config.colour_weight <= 0 || !view.HasGrey()) return key;
@@ -253,15 +267,19 @@ std::vector<std::unique_ptr<PointTerm>> ViewTermsOf(const ViewTermParts& parts,
       terms.push_back(std::make_unique<FreeSpaceTerm>(parts, std::move(points_L), config));
     }
   }
-  if (parts.key == nullptr) return terms;
-  if (config.outline_weight > 0 && parts.key->rim_C.size() >= kLeastPoints) {
-    terms.push_back(std::make_unique<OutlineTerm>(parts, config.outline_weight));
-  }
-  if (config.colour_weight > 0 && parts.view->HasGrey() &&
+  if (parts.key != nullptr && config.colour_weight > 0 && parts.view->HasGrey() &&
       parts.key->patch_C.size() >= kLeastPoints) {
     terms.push_back(std::make_unique<ColourTerm>(parts, config.colour_weight));
   }
   return terms;
+}
+
+std::unique_ptr<PointTerm> OutlineTermOf(const ViewTermParts& parts, const SdfTrackConfig& config) {
+  if (config.outline_weight <= 0 || parts.key == nullptr ||
+      parts.key->rim_C.size() < kLeastPoints) {
+    return nullptr;
+  }
+  return std::make_unique<OutlineTerm>(parts, config.outline_weight);
 }
 
 }  // namespace tsdfpp

@@ -16,6 +16,7 @@ namespace tsdfpp {
 // What a keyframe keeps for the terms of later frames, in its camera's frame, metres.
 struct KeyView {
   std::vector<Eigen::Vector3d> rim_C;
+  std::vector<Eigen::Vector3d> rim_side_C;  // of each, across its ray: away from the object
   std::vector<Eigen::Vector3d> patch_C;
   std::vector<double> patch_grey;  // of each
 };
@@ -25,18 +26,24 @@ struct KeyView {
 KeyView KeyViewOf(const SegmentView& view, const std::vector<SegmentPoint>& points,
                   const Intrinsics& camera, const SdfTrackConfig& config);
 
-// The terms that have a weight and points, for a segment of a frame. `T_LC_key` is where the
-// keyframe's camera was in the lattice. What they are made of must live as long as they do.
+// What terms of a segment of a frame are made of. `T_LC_key` is where the keyframe's camera was in
+// the lattice. All of it must live as long as they do.
 struct ViewTermParts {
   const Frame* frame = nullptr;
-  const SegmentView* view = nullptr;  // of the frame
+  const SegmentView* view = nullptr;  // of the frame; for outline and colour
   const KeyView* key = nullptr;       // may be none
   Pose T_LC_key = Pose::Identity();
   const TsdfGrid* model = nullptr;
   const SurfaceReader* reader = nullptr;  // of the model
   double voxel_m = 0;
 };
+// Free space and colour, those of them that have a weight and points.
 std::vector<std::unique_ptr<PointTerm>> ViewTermsOf(const ViewTermParts& parts,
                                                     const SdfTrackConfig& config);
+
+// The outline; null where it has no weight or no rim. A rim counts while the camera looks at it
+// from no farther to its own side than the keyframe's did: from there something may be in sight
+// that was behind it, which then makes the outline.
+std::unique_ptr<PointTerm> OutlineTermOf(const ViewTermParts& parts, const SdfTrackConfig& config);
 
 }  // namespace tsdfpp

@@ -53,14 +53,14 @@ TEST(Keyframes, AnAnchorHoldsWhatTurns) {
   EXPECT_LT(with_keyframe, kShare * bare);
 }
 
-TEST(Keyframes, TermsThatCompareViewsHaveNoAnchor) {
+TEST(Keyframes, TheTermOfColourHasNoAnchor) {
   SdfTrackConfig track;
-  track.outline_weight = 1;
-  const double with_keyframe = TurnOff_rad(track, kTray);
+  const double anchored = TurnOff_rad(track, kTray);
+  track.colour_weight = 1;
+  const double with_colour = TurnOff_rad(track, kTray);
+  EXPECT_NE(with_colour, anchored);
   track.anchor_turn_rad = 0;
-  EXPECT_EQ(TurnOff_rad(track, kTray), with_keyframe);
-  track.outline_weight = 0;
-  EXPECT_NE(TurnOff_rad(track, kTray), with_keyframe) << "the outline says nothing";
+  EXPECT_EQ(TurnOff_rad(track, kTray), with_colour);
 }
 
 }  // namespace
