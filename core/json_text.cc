@@ -83,8 +83,9 @@ Expected<nlohmann::json> ParseWithinLimits(std::string_view text, std::string_vi
   TSDFPP_RETURN_IF_ERROR(
       CheckLimit(&Limits::nesting, DepthOf(text), where, "lists and objects within one another"));
   MemberNames names;
-  if (!nlohmann::json::sax_parse(text, &names))
+  if (!nlohmann::json::sax_parse(text, &names)) {
     return nlohmann::json(nlohmann::json::value_t::discarded);
+  }
   if (names.twice()) {
     return DataError("{}: an object has {} twice", where, Quoted(*names.twice()));
   }

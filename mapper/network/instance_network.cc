@@ -231,8 +231,9 @@ Expected<void> CheckUse(NetworkFormat format, const NetworkConfig& config) {
   if (format != NetworkFormat::kYolo && config.most_overlap != usual.most_overlap) {
     return wrong("most_overlap", "yolo");
   }
-  if (is_ours && config.mask_share != usual.mask_share)
+  if (is_ours && config.mask_share != usual.mask_share) {
     return wrong("mask_share", "yolo or mask_rcnn");
+  }
   if (is_ours && config.classes.size() > 1) {
     return UsageError(
         "network setting 'classes' has {} names, expected one of a network of format {}",

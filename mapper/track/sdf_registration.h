@@ -63,10 +63,10 @@ double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& confi
 // WeakShare() of the points' information speaks, a prior pulls towards the expected pose, up
 // to that share. Along directions of which the distances know less than a fifth it pulls, up to
 // that, to where the other terms would have the object, as far as they know the direction. Along
-// weak shifts the outline's answer is what is expected, as far as it knows them (docs/tracking.md,
-// "Terms of the image"). Points that are not finite, and a model or segment
-// without anything in it, give converged = false. Deterministic for any number of threads; `config`
-// must be valid.
+// shifts of which they know less than a fiftieth it pulls, up to that, to where the outline would
+// have it, as far as that knows them (docs/tracking.md, "Terms of the image"). Points that are not
+// finite, and a model or segment without anything in it, give converged = false. Deterministic for
+// any number of threads; `config` must be valid.
 SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config);
 

@@ -44,11 +44,13 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("outline_weight", outline_weight, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("colour_weight", colour_weight, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("colour_points", colour_points, 20, 1000000));
-  if (colour_weight > 0 && keyframe_turn_rad <= 0) {
+  for (const auto& [field, weight] :
+       {std::pair{"outline_weight", outline_weight}, std::pair{"colour_weight", colour_weight}}) {
+    if (weight == 0 || keyframe_turn_rad > 0) continue;
     return UsageError(
-        "tracking setting 'colour_weight' is {}, and there is no keyframe to compare with: "
-        "expected keyframe_turn_rad above 0",
-        colour_weight);
+        "tracking setting '{}' is {}, and there is no keyframe to compare with: expected "
+        "keyframe_turn_rad above 0",
+        field, weight);
   }
   TSDFPP_RETURN_IF_ERROR(InRange("inlier_voxels", inlier_voxels, 0.01, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("min_inlier_share", min_inlier_share, 0, 1));

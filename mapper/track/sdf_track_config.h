@@ -68,8 +68,8 @@ struct SdfTrackConfig {
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
   // Terms of the image (view_terms.h): how much an error of theirs counts beside one of a distance,
-  // both in deviations; 0 switches one off. The last two compare the keyframe: without one there is
-  // no outline, and colour is refused. The outline has a say along weak shifts alone.
+  // both in deviations; 0 switches one off. The last two need a keyframe. The outline has a say
+  // along weak shifts alone.
   double free_space_weight = 0;
   double outline_weight = 0;
   double colour_weight = 0;

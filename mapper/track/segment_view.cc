@@ -138,7 +138,7 @@ std::optional<double> SegmentView::RimDepth(const Eigen::Vector2d& pixel,
   const double beside_m = DepthAt(pixel - kBeside_px * outwards);
   const double inside_m = DepthAt(pixel - kInside_px * outwards);
   if (!(beside_m > 0) || !(inside_m > 0)) return std::nullopt;
-  // By the pixels along the outline, too: noise would make an edge of every tenth point of a ball.
+  // By the pixels along the outline, too: with noise single ones make edges of a ball.
   const Eigen::Vector2d along(-outwards.y(), outwards.x());
   double sum_m = 0;
   int count = 0;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kTriesPerObject = 150;
 // TOML has no larger whole number, and a drawn scene is written as TOML.
-constexpr std::uint64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
+constexpr std::uint64_t kLargestOfToml = std::numeric_limits<std::int64_t>::max();
 constexpr std::uint32_t kStream = 0x52440000;  // one stream a draw of the whole scene
 
 double Within(const Eigen::Vector2d& range, double share) {
@@ -166,7 +166,7 @@ Expected<Candidate> DrawModel(Draws& draws, const RandomSceneConfig& config, std
         Eigen::Vector3d{draws.In(config.size_m), draws.In(config.size_m), draws.In(config.size_m)};
   }
   const auto index = static_cast<std::uint64_t>(id);
-  object.model.seed = (seed + index) & kLargestSeed;
+  object.model.seed = (seed + index) & kLargestOfToml;
   object.model.paint = DrawPaint(seed, index);
   if (draws.Chance(config.texture_share)) object.model.material = draws.Of(TexturePatternNames());
   TSDFPP_ASSIGN(const std::vector<ModelPart> parts, MakeModel(object.model));

@@ -52,6 +52,22 @@ class SmallSet : public testing::Test {
     }
     ASSERT_TRUE(WriteFile(folder_ / "sets/s/set.toml", text).has_value());
   }
+  // Each with a part of set.toml, what is put in its place, and how the sentence begins then.
+  void ExpectRefused(const std::vector<std::array<std::string, 3>>& cases) {
+    const fs::path file = folder_ / "sets/s/set.toml";
+    const std::string good = ReadFile(file).value();
+    for (const auto& [old, text, sentence] : cases) {
+      std::string changed = good;
+      changed.replace(changed.find(old), old.size(), text);
+      ASSERT_TRUE(WriteFile(file, changed).has_value());
+      const auto set = BenchSet::Load(folder_ / "sets", "s");
+      ASSERT_FALSE(set.has_value()) << text;
+      EXPECT_EQ(set.error().kind, ErrorKind::kUsage);
+      EXPECT_NE(set.error().message.find("set.toml" + sentence), std::string::npos)
+          << set.error().message;
+    }
+    ASSERT_TRUE(WriteFile(file, good).has_value());
+  }
   json Result(const std::string& method, double a, double b) const {
     const auto entry = [](const char* sequence, double score) {
       return json{{"sequence", sequence},
@@ -119,48 +135,22 @@ TEST_F(SmallSet, EachSceneHasItsOwnSeed) {
 }
 
 TEST_F(SmallSet, ValuesThatNoMapHasAreRefused) {
-  const fs::path file = folder_ / "sets/s/set.toml";
-  const std::string good = ReadFile(file).value();
-  const std::vector<std::array<std::string, 3>> cases{
-      {"voxel_m = 0.02", "voxel_m = 5.0", ":3: 'voxel_m' holds 5, expected a number from 0.0005"},
-      {"voxel_m = 0.02", "voxel_m = 1e-9", ":3: 'voxel_m' holds 1e-09, expected a number"},
-      {"trunc_front = 10", "trunc_front = 0.5",
-       ":4: 'trunc_front' holds 0.5, expected a number from 1 to 100"},
-      {"trunc_back = 3", "trunc_back = 101", ":5: 'trunc_back' holds 101, expected a number"},
-      {"scale = 1", "scale = 0", ":2: 'scale' is 0, expected a number from 0.05 to 4"}};
-  for (const auto& [old, text, sentence] : cases) {
-    std::string changed = good;
-    changed.replace(changed.find(old), old.size(), text);
-    ASSERT_TRUE(WriteFile(file, changed).has_value());
-    const auto set = BenchSet::Load(folder_ / "sets", "s");
-    ASSERT_FALSE(set.has_value()) << text;
-    EXPECT_EQ(set.error().kind, ErrorKind::kUsage);
-    EXPECT_NE(set.error().message.find("set.toml" + sentence), std::string::npos)
-        << set.error().message;
-  }
+  ExpectRefused(
+      {{"voxel_m = 0.02", "voxel_m = 5.0", ":3: 'voxel_m' holds 5, expected a number from 0.0005"},
+       {"voxel_m = 0.02", "voxel_m = 1e-9", ":3: 'voxel_m' holds 1e-09, expected a number"},
+       {"trunc_front = 10", "trunc_front = 0.5",
+        ":4: 'trunc_front' holds 0.5, expected a number from 1 to 100"},
+       {"trunc_back = 3", "trunc_back = 101", ":5: 'trunc_back' holds 101, expected a number"},
+       {"scale = 1", "scale = 0", ":2: 'scale' is 0, expected a number from 0.05 to 4"}});
 }
 
 // What no result could be of is said before the hours that one takes.
 TEST_F(SmallSet, NamesAreThereOnceAndTheSetHasItsFoldersName) {
-  const fs::path file = folder_ / "sets/s/set.toml";
-  const std::string good = ReadFile(file).value();
-  const std::vector<std::array<std::string, 3>> cases{
-      {"name = \"b\"", "name = \"a\"", ":13: 'sequence.name' is 'a', a second time"},
-      {"\"ghost_area_cm2\"", "\"visible_completion\"",
-       ":6: 'metrics' holds 'visible_completion' twice"},
-      {"name = \"s\"", "name = \"v1\"",
-       ":1: 'name' is 'v1', expected 's', as the folder is called"}};
-  for (const auto& [old, text, sentence] : cases) {
-    std::string changed = good;
-    changed.replace(changed.find(old), old.size(), text);
-    ASSERT_TRUE(WriteFile(file, changed).has_value());
-    const auto set = BenchSet::Load(folder_ / "sets", "s");
-    ASSERT_FALSE(set.has_value()) << text;
-    EXPECT_EQ(set.error().kind, ErrorKind::kUsage);
-    EXPECT_NE(set.error().message.find("set.toml" + sentence), std::string::npos)
-        << set.error().message;
-  }
-  ASSERT_TRUE(WriteFile(file, good).has_value());
+  ExpectRefused({{"name = \"b\"", "name = \"a\"", ":13: 'sequence.name' is 'a', a second time"},
+                 {"\"ghost_area_cm2\"", "\"visible_completion\"",
+                  ":6: 'metrics' holds 'visible_completion' twice"},
+                 {"name = \"s\"", "name = \"v1\"",
+                  ":1: 'name' is 'v1', expected 's', as the folder is called"}});
   EXPECT_TRUE(BenchSet::Load(folder_ / "sets", "s/").has_value());
 }
 

@@ -116,7 +116,8 @@ TEST(ViewTerms, OutlineHoldsAPlateAgainstShifts) {
   // The turn is left, so that the rims do not fit, and what is expected has a little say.
   constexpr double kLeft = 0.25;
   EXPECT_LT(ShiftOff_m(found), kLeft * ShiftOff_m(alone));
-  EXPECT_NEAR(TurnOff_rad(found), 2 * kDegree, 1e-3) << "of turns it says nothing";
+  constexpr double kSame_rad = 1e-3;  // a fortieth of the turn: distances hold the plate's plane
+  EXPECT_NEAR(TurnOff_rad(found), 2 * kDegree, kSame_rad) << "of turns it says nothing";
   EXPECT_EQ(found.known.CountBelow(config.weak_share), 3) << "what distances know is what it was";
 }
 
@@ -148,13 +149,15 @@ TEST(ViewTerms, ARimCountsUntilItIsSeenFromItsOwnSide) {
     const Matrix6 H = term->Sums(T_CO.inverse(), frame).H;
     return std::pair{H(0, 0), H(1, 1)};
   };
+  // Shares: rims at the picture's other side are at other pixels, and a few are lost.
+  constexpr double kFew = 0.1;
   const auto [x, y] = known({0, 0, 0});
   const auto [x_aside, y_aside] = known({0.1, 0, 0});
-  EXPECT_NEAR(x_aside / x, 0.5, 0.05) << "the rim at the far side alone";
-  EXPECT_NEAR(y_aside / y, 1, 0.1) << "of those above and below, both";
+  EXPECT_NEAR(x_aside / x, 0.5, kFew) << "the rim at the far side alone";
+  EXPECT_NEAR(y_aside / y, 1, kFew) << "of those above and below, both";
   const auto [x_below, y_below] = known({0, 0.1, 0});
-  EXPECT_NEAR(x_below / x, 1, 0.1);
-  EXPECT_NEAR(y_below / y, 0.5, 0.05);
+  EXPECT_NEAR(x_below / x, 1, kFew);
+  EXPECT_NEAR(y_below / y, 0.5, kFew);
 }
 
 TEST(ViewTerms, ColourHoldsAPlateInItsPlaneWhateverTheLight) {
@@ -289,15 +292,14 @@ TEST(SegmentView, ARoundedEdgeIsWhereItsOutlineIs) {
   EXPECT_LT(middle_m, double{kRadius_m} + kMost_m);
 }
 
-TEST(SdfTrackConfig, ColourNeedsAKeyframe) {
-  SdfTrackConfig config = With(0, 1, 1);
-  EXPECT_TRUE(config.Validate());
-  config.keyframe_turn_rad = 0;
-  const auto refused = config.Validate();
-  ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().message.find("keyframe_turn_rad"), std::string::npos);
-  config.colour_weight = 0;
-  EXPECT_TRUE(config.Validate()) << "then there is no outline";
+TEST(SdfTrackConfig, ImageTermsNeedAKeyframe) {
+  for (SdfTrackConfig config : {With(0, 1, 0), With(0, 0, 1)}) {
+    EXPECT_TRUE(config.Validate());
+    config.keyframe_turn_rad = 0;
+    const auto refused = config.Validate();
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("keyframe_turn_rad"), std::string::npos);
+  }
 }
 
 }  // namespace
