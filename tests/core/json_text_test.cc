@@ -83,8 +83,7 @@ TEST(JsonText, DepthIsLimitedBeforeAnythingIsMade) {
   const auto deep = ParseJson(Nested(1000), "x");
   SetLimits({});
   ASSERT_TRUE(deep.has_value());
-  const json copy = *deep;
-  EXPECT_EQ(JsonText(copy).size(), 2000U);
+  EXPECT_EQ(JsonText(json(*deep)).size(), 2000U);
 }
 
 TEST(JsonText, SizeIsLimited) {

@@ -302,8 +302,9 @@ TEST_F(Generation, WhatTheSensorGaveComesBackFromDisk) {
 }
 
 TEST_F(Generation, ListsTheScenes) {
-  const auto output = RunTsdfpp(
-      {"generate", "--list", "--scenes", TSDFPP_SOURCE_DIR "/scenes", "--json"}, folder_.path());
+  const std::string scenes = TSDFPP_SOURCE_DIR "/scenes";
+  const auto output =
+      RunTsdfpp({"generate", "--list", "--scenes", scenes, "--json"}, folder_.path());
   ASSERT_EQ(output.exit_code, 0) << output.err;
   const auto json = nlohmann::json::parse(output.out, nullptr, false);
   ASSERT_TRUE(json.is_array());

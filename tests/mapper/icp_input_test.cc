@@ -43,8 +43,10 @@ TEST_F(SegmentPointsTest, LieOnTheSurfaceWhereTheirPixelsAre) {
   for (std::size_t i = 0; i < points_W.size(); ++i) {
     EXPECT_NEAR(points_W[i].z(), 0.3, kFloat_m);
     const Eigen::Vector3d p_C = frame_.T_WC.inverse() * points_W[i];
-    EXPECT_NEAR(camera.fx * p_C.x() / p_C.z() + camera.cx, 20 + static_cast<int>(i) % 30, 1e-6);
-    EXPECT_NEAR(camera.fy * p_C.y() / p_C.z() + camera.cy, 10 + static_cast<int>(i) / 30, 1e-6);
+    const int u = 20 + static_cast<int>(i) % 30;
+    const int v = 10 + static_cast<int>(i) / 30;
+    EXPECT_NEAR(camera.fx * p_C.x() / p_C.z() + camera.cx, u, 1e-6);
+    EXPECT_NEAR(camera.fy * p_C.y() / p_C.z() + camera.cy, v, 1e-6);
   }
 }
 

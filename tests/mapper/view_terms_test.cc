@@ -285,6 +285,7 @@ TEST(SegmentView, ARoundedEdgeIsWhereItsOutlineIs) {
   const auto rim = SegmentView(frame, frame.mask, drawn::kThing, 2 * kVoxel_m).Rim();
   ASSERT_GT(rim.size(), 200U);
   std::vector<double> behind_m;
+  behind_m.reserve(rim.size());
   for (const RimPoint& point : rim) behind_m.push_back(point.depth_m - 1);
   std::ranges::sort(behind_m);
   const double middle_m = behind_m[behind_m.size() / 2];
