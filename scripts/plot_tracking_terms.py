@@ -3,7 +3,7 @@
 
 Usage: plot_tracking_terms.py TABLES PICTURES
 A column is a shape. Lines are paints and depths; along them terms are added one by one, and the last points are the
-default and what may be added to it.
+distances with what is expected, and what is added to these: the outline, which is the default, colour, or both.
 """
 import sys
 

@@ -37,7 +37,7 @@ SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   // What stands in a room hides it.
   config.min_shown_share = 0;
   // Its floor is seen at grazing angles, and has no other side.
-  config.max_slope = 0;
+  config.max_slope = config.certain_slope = 0;
   config.keyframe_turn_rad = std::min(config.keyframe_turn_rad, kKeyframeTurn_rad);
   config.anchor_turn_rad = 0;
   // Where a camera was is no reason to think that it is there still; a given pose is one, each

@@ -43,7 +43,10 @@ double DistanceTerm::WeightOf(const SurfaceSample& at, const Eigen::Vector3d& p_
   const double lateral_squared =
       lateral_per_m_ * lateral_per_m_ * p_C.z() * p_C.z() * (1 - cosine * cosine);
   const double variance = model_m * model_m + axial * axial + lateral_squared;
-  return std::min(1.0, least_variance / variance) *
+  const double steep = at.slope > config_.certain_slope && config_.certain_slope > 0
+                           ? config_.certain_slope / double{at.slope}
+                           : 1;
+  return steep * std::min(1.0, least_variance / variance) *
          double{at.weight / (at.weight + kFewObservations)};
 }
 

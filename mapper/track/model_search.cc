@@ -240,7 +240,7 @@ class Search {
   std::vector<Place> Registered(const std::vector<Place>& seeds, bool is_rough) const {
     SdfTrackConfig config = config_;
     // What was measured at a grazing angle is seen from elsewhere now, and may fall along any ray.
-    config.max_slope = 0;
+    config.max_slope = config.certain_slope = 0;
     if (is_rough) {
       config.coarse_points = config.middle_points = static_cast<int>(kRoughPoints);
       config.max_iterations = kRoughIterations;

@@ -301,6 +301,14 @@ LeastSquaresResult RegisterFinely(const SdfRegistration& task, const SdfTrackCon
   return RunPasses(task, options, kLastPasses, all, result);
 }
 
+// The model is as much beside what is expected as beside what is found. An expectation that were
+// not would move an object by the bias, frame by frame, along directions that it alone knows.
+SdfRegistration AsItSeems(SdfRegistration task) {
+  task.T_LC_expected = task.bias * task.T_LC_expected;
+  for (Pose& seed : task.T_LC_seeds) seed = task.bias * seed;
+  return task;
+}
+
 }  // namespace
 
 double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& config) {
@@ -329,8 +337,9 @@ OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
   return other;
 }
 
-SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
+SdfRegistrationResult RegisterToDistances(const SdfRegistration& unbiased,
                                           const SdfTrackConfig& config) {
+  const SdfRegistration task = AsItSeems(unbiased);
   SdfRegistrationResult result;
   result.T_LC = task.T_LC_expected;
   if (task.points.empty()) return result;

@@ -32,12 +32,12 @@ struct SdfRegistration {
   // where it is empty.
   std::function<PointTerm*()> outline{};
   // Where the model makes what is at T_LC seem to be: bias * T_LC. The other terms and the outline
-  // are made for what seems.
+  // are made for what seems; what is expected and the seeds are not.
   Pose bias = Pose::Identity();
 };
 
 struct SdfRegistrationResult {
-  Pose T_LC = Pose::Identity();
+  Pose T_LC = Pose::Identity();  // where the segment seems to be
   // The last pass settled, or its last step moved no point by more than a tenth of a voxel.
   bool converged = false;
   int iterations = 0;  // of all passes
@@ -58,16 +58,17 @@ struct SdfRegistrationResult {
 // that is what is wrong with the model, by about as much as points differ from it.
 double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& config);
 
-// Registers in two passes: few points and a wide Huber function from every seed, then all points,
-// and the other terms, from where the cost was least. Along directions of which less than
-// WeakShare() of the points' information speaks, a prior pulls towards the expected pose, up
-// to that share. Along directions of which the distances know less than a fifth it pulls, up to
-// that, to where the other terms would have the object, as far as they know the direction. Along
-// shifts of which they know less than a fiftieth it pulls, up to that, to where the outline would
-// have it, as far as that knows them (docs/tracking.md, "Terms of the image"). Points that are not
-// finite, and a model or segment without anything in it, give converged = false. Deterministic for
-// any number of threads; `config` must be valid.
-SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
+// Registers to where the segment seems to be, in two passes: few points and a wide Huber function
+// from every seed, then all points, and the other terms, from where the cost was least. Along
+// directions of which less than WeakShare() of the points' information speaks, a prior pulls
+// towards where what is at the expected pose would seem to be, up to that share. Along directions
+// of which the distances know less than a fifth it pulls, up to that, to where the other terms
+// would have the object, as far as they know the direction. Along shifts of which they know less
+// than a fiftieth it pulls, up to that, to where the outline would have it, as far as that knows
+// them (docs/tracking.md, "Terms of the image"). Points that are not finite, and a model or segment
+// without anything in it, give converged = false. Deterministic for any number of threads; `config`
+// must be valid.
+SdfRegistrationResult RegisterToDistances(const SdfRegistration& unbiased,
                                           const SdfTrackConfig& config);
 
 // What the points say of a place T_LC, and how many times as much against it as against the one

@@ -30,6 +30,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("model_voxels", model_voxels, 0.001, 10));
   TSDFPP_RETURN_IF_ERROR(InRange("max_slope", max_slope, 0, 1e6));
   TSDFPP_RETURN_IF_ERROR(InRange("max_fall", max_fall, 0, 1e6));
+  TSDFPP_RETURN_IF_ERROR(InRange("certain_slope", certain_slope, 0, 1e6));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_voxels", huber_voxels, 0.001, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("huber_deviations", huber_deviations, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("coarse_points", coarse_points, 10, 1000000));
@@ -86,6 +87,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("curved", config.curved)
       .Get("max_slope", config.max_slope)
       .Get("max_fall", config.max_fall)
+      .Get("certain_slope", config.certain_slope)
       .Get("huber_voxels", config.huber_voxels)
       .Get("huber_deviations", config.huber_deviations)
       .Get("coarse_points", config.coarse_points)
@@ -134,6 +136,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"curved", curved},
                      {"max_slope", max_slope},
                      {"max_fall", max_fall},
+                     {"certain_slope", certain_slope},
                      {"huber_voxels", huber_voxels},
                      {"huber_deviations", huber_deviations},
                      {"coarse_points", coarse_points},

@@ -40,6 +40,10 @@ struct SdfTrackConfig {
   // distances), and a point there has none. A max_slope of 0 switches this off.
   double max_slope = 4;
   double max_fall = 1.5;
+  // Where a map's distance changes by more than this many metres a metre, it is of a side that was
+  // seen at a grazing angle, and wrong by tenths of a voxel: it counts in proportion less. 0
+  // switches this off.
+  double certain_slope = 2;
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
   int coarse_points = 400;        // of the first passes
@@ -68,10 +72,10 @@ struct SdfTrackConfig {
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
   // Terms of the image (view_terms.h): how much an error of theirs counts beside one of a distance,
-  // both in deviations; 0 switches one off. The last two need a keyframe. The outline has a say
-  // along weak shifts alone.
+  // both in deviations; 0 switches one off. The last two need a keyframe: without one the outline
+  // must be switched off as well. The outline has a say along weak shifts alone.
   double free_space_weight = 0;
-  double outline_weight = 0;
+  double outline_weight = 1;
   double colour_weight = 0;
   static constexpr double kMostViewTurn_rad = 0.15;
   bool ComparesViews() const { return outline_weight > 0 || colour_weight > 0; }

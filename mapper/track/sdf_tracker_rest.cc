@@ -12,9 +12,9 @@ namespace {
 
 // An object that moves less from frame to frame may be at rest.
 constexpr double kSlow_voxels = 0.1;
-// Where two frames find an object at rest beside its place, the later one farther than that, by
-// this much at least, and in the same direction by this cosine, noise is a worse reason than a
-// motion that begins, and this share of the evidence is enough.
+// Where two frames find an object at rest beside its place, the later one farther than the first by
+// kSlow_voxels and by this factor, and in the same direction by this cosine, noise is a worse
+// reason than a motion that begins, and this share of the evidence is enough.
 constexpr double kFartherBy = 1.3;
 constexpr double kSameWay = 0.7;
 constexpr double kShareGoingOn = 0.4;
@@ -28,7 +28,8 @@ constexpr double kNearAgain_voxels = 1;
 constexpr int kLongestWait_frames = 20;
 
 bool GoesOn(const Vector6& before, const Vector6& now, double voxel_m) {
-  return now.norm() > kSlow_voxels * voxel_m && now.norm() > kFartherBy * before.norm() &&
+  return now.norm() - before.norm() > kSlow_voxels * voxel_m &&
+         now.norm() > kFartherBy * before.norm() &&
          now.dot(before) > kSameWay * now.norm() * before.norm();
 }
 

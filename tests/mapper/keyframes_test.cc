@@ -44,6 +44,7 @@ TEST(Keyframes, AnAnchorHoldsWhatTurns) {
     track.anchor_turn_rad = 0;
     with_keyframe += TurnOff_rad(track, id);
     track.keyframe_turn_rad = 0;
+    track.outline_weight = 0;  // it needs a keyframe
     const double alone = TurnOff_rad(track, id);
     bare += alone;
     track.anchor_turn_rad = SdfTrackConfig{}.anchor_turn_rad;

@@ -259,6 +259,7 @@ TEST(SdfRegistration, IsNotDrawnToASideThatWasSeenGrazing) {
   const SurfaceReader model(grid, kVoxel_m);
   const auto points = InCamera(reference::VisiblePoints(box, kEye, 120));
   SdfTrackConfig config;
+  config.certain_slope = 0;  // steep distances count less by it, too
   const auto off = [&] {
     const auto found = RegisterToDistances(TaskFrom(model, points, Pose::Identity()), config);
     EXPECT_TRUE(found.converged);
@@ -414,6 +415,61 @@ TEST(SdfRegistration, DoesNotSlideAlongAPlane) {
   EXPECT_GT(found.known.turn_shares[1], SdfTrackConfig().weak_share);
 }
 
+// What the plane leaves free is as expected, and seems to be as far beside it as the rest of the
+// model does.
+TEST(SdfRegistration, WhatIsExpectedIsAsFarBesideItsPlace) {
+  const TsdfGrid grid = GridOf([](const Eigen::Vector3d& p) { return p.z() - 0.013; });
+  const SurfaceReader model(grid, kVoxel_m);
+  Points points_L;
+  for (int i = 0; i < 900; ++i) {
+    const int row = i / 30;
+    points_L.emplace_back(0.004 * (i % 30), 0.003 * row, 0.013);
+  }
+  const auto points = InCamera(points_L);
+  const Eigen::Vector3d shift(0.006, -0.004, 0.005);
+  const Eigen::Vector3d bias(-0.002, 0.003, 0.004);
+  SdfRegistration task = TaskFrom(model, points, Pose(Eigen::Translation3d(shift)));
+  task.bias = Eigen::Translation3d(bias);
+  const auto found = RegisterToDistances(task, {});
+  ASSERT_TRUE(found.converged);
+  const Pose off = found.T_LC * TrueLC().inverse();
+  const Eigen::Vector3d at(0.058, 0.0435, 0.013);  // the segment's middle
+  const Eigen::Vector3d free = (shift + bias).cwiseProduct(Eigen::Vector3d(1, 1, 0));
+  EXPECT_LT((off * at - at - free).norm(), kSmooth_voxels * kVoxel_m);
+}
+
+// Of two levels, the one of which distances change three metres a metre, the place is their mean,
+// with two thirds for its share.
+TEST(SdfRegistration, SteepDistancesCountLess) {
+  constexpr double kApart_m = 0.004;
+  constexpr double kHalf_m = 0.06;
+  const auto is_steep = [](const Eigen::Vector3d& p) { return std::abs(p.x()) < kHalf_m; };
+  const TsdfGrid grid = GridOf(
+      [&](const Eigen::Vector3d& p) { return is_steep(p) ? 3 * (p.z() - kApart_m) : p.z(); });
+  const SurfaceReader model(grid, kVoxel_m);
+  Points points_L;
+  constexpr double kBetween_m = 0.015;  // no cube of voxels has both
+  for (int i = 0; i < 2400; ++i) {
+    const int row = i / 60;
+    const Eigen::Vector3d p(0.004 * (i % 60) - 0.118, 0.004 * row - 0.078, 0);
+    if (std::abs(std::abs(p.x()) - kHalf_m) > kBetween_m) points_L.push_back(p);
+  }
+  const auto steep = static_cast<double>(std::ranges::count_if(points_L, is_steep));
+  const double other = static_cast<double>(points_L.size()) - steep;
+  const auto points = InCamera(points_L);
+  SdfTrackConfig config;
+  for (const double certain_slope : {0., 2.}) {
+    config.certain_slope = certain_slope;
+    const auto found = RegisterToDistances(TaskFrom(model, points, Pose::Identity()), config);
+    ASSERT_TRUE(found.converged);
+    const double weight = certain_slope > 0 ? certain_slope / 3 : 1;
+    const double mean_m = kApart_m * weight * steep / (weight * steep + other);
+    const Eigen::Vector3d middle(0, 0, 0);
+    const Eigen::Vector3d way = found.T_LC * TrueLC().inverse() * middle;
+    EXPECT_NEAR(way.z(), mean_m, kSmooth_voxels * kVoxel_m) << certain_slope;
+  }
+}
+
 // Over many draws of a camera's noise the squared errors are as large as the covariance says, along
 // the directions that the shape does not leave free; and it is said how many it does.
 TEST(SdfRegistration, KnowsHowWellItKnows) {
@@ -495,6 +551,7 @@ TEST(SdfTrackConfig, RoundTripsThroughToml) {
   config.curved = false;
   config.max_slope = 3;
   config.max_fall = 2;
+  config.certain_slope = 1.5;
   config.anchor_turn_rad = 0.5;
   config.weak_share = 0.03;
   config.keyframe_points = 77;

@@ -108,7 +108,7 @@ double TurnOff_rad(const SdfRegistrationResult& found) {
 TEST(ViewTerms, OutlineHoldsAPlateAgainstShifts) {
   const SdfTrackConfig config = With(0, 1, 0);
   const Slide slide(config, 1, 0);
-  const auto alone = Found(slide, SdfTrackConfig());
+  const auto alone = Found(slide, With(0, 0, 0));
   EXPECT_GT(ShiftOff_m(alone), 3 * kPixel_m) << "a plane's distances know nothing of it";
   EXPECT_EQ(alone.known.CountBelow(config.weak_share), 3);
   const auto found = Found(slide, config);
