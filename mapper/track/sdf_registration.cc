@@ -130,7 +130,7 @@ class AllTerms {
     const KnownDirections known = DirectionsOf(of_distances);
     PointTerm* outline = OutlineOf(*task_, known);
     if (task_->others.empty() && outline == nullptr) {
-      return PriorFor(of_distances, known, task_->T_LC_expected, WeakShareNow());
+      return PriorFor(of_distances, known, task_->BiasedExpectation(), WeakShareNow());
     }
     const double weights = std::max(1.0, of_distances.topLeftCorner<3, 3>().trace());
     Matrix6 directions = Matrix6::Zero();
@@ -148,7 +148,7 @@ class AllTerms {
     const Vector6 pull = weights * (WeakShareNow() - shares.array()).max(0) * (1 - trust.array()) *
                          (1 - seen.trust.array());
     const Vector6 expected =
-        directions.transpose() * frame_->LengthsOf(task_->T_LC_expected * T_LC.inverse());
+        directions.transpose() * frame_->LengthsOf(task_->BiasedExpectation() * T_LC.inverse());
     const Vector6 all = say + say_seen + pull;
     Vector6 target = Vector6::Zero();
     for (int i = 0; i < 6; ++i) {
@@ -256,7 +256,7 @@ void RegisterCoarsely(const SdfRegistration& task, const SdfTrackConfig& config,
       coarse.KeepAt(T_LC);
       const Matrix6 H = coarse.Sums(T_LC).H;
       const double weak_share = WeakShare(coarse.KeptDeviation_m(), task.voxel_m, config);
-      const MotionPrior prior = PriorFor(H, DirectionsOf(H), task.T_LC_expected, weak_share);
+      const MotionPrior prior = PriorFor(H, DirectionsOf(H), task.BiasedExpectation(), weak_share);
       const LeastSquaresResult found = MinimiseOverPose(sums, T_LC, result.frame, prior, options);
       result.iterations += found.iterations;
       T_LC = found.T;
@@ -301,14 +301,6 @@ LeastSquaresResult RegisterFinely(const SdfRegistration& task, const SdfTrackCon
   return RunPasses(task, options, kLastPasses, all, result);
 }
 
-// The model is as much beside what is expected as beside what is found. An expectation that were
-// not would move an object by the bias, frame by frame, along directions that it alone knows.
-SdfRegistration AsItSeems(SdfRegistration task) {
-  task.T_LC_expected = task.bias * task.T_LC_expected;
-  for (Pose& seed : task.T_LC_seeds) seed = task.bias * seed;
-  return task;
-}
-
 }  // namespace
 
 double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& config) {
@@ -317,7 +309,8 @@ double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& confi
 }
 
 OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
-                        const SdfRegistrationResult& found, const SdfTrackConfig& config) {
+                        const SdfRegistrationResult& found, const SdfTrackConfig& config,
+                        bool may_seem_biased) {
   DistanceTerm term = TermOf(task, found.frame, config, 1);
   term.SetHuber(HuberFor(found.counts.deviation_m, task.voxel_m, config));
   for (const auto& of : task.others) {
@@ -331,15 +324,17 @@ OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
     return cost;
   };
   const double cost_found = cost_at(found.T_LC, found.T_LC);
+  const Pose seen = task.bias * T_LC;
+  double cost = cost_at(T_LC, seen);
+  if (may_seem_biased) cost = std::min(cost, cost_at(seen, seen));
   OtherPlace other;
-  other.cost_ratio = cost_at(T_LC, task.bias * T_LC) / cost_found;
+  other.cost_ratio = cost / cost_found;
   other.counts = term.Count(T_LC);
   return other;
 }
 
-SdfRegistrationResult RegisterToDistances(const SdfRegistration& unbiased,
+SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config) {
-  const SdfRegistration task = AsItSeems(unbiased);
   SdfRegistrationResult result;
   result.T_LC = task.T_LC_expected;
   if (task.points.empty()) return result;

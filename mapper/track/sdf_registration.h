@@ -32,8 +32,11 @@ struct SdfRegistration {
   // where it is empty.
   std::function<PointTerm*()> outline{};
   // Where the model makes what is at T_LC seem to be: bias * T_LC. The other terms and the outline
-  // are made for what seems; what is expected and the seeds are not.
+  // are made for what seems.
   Pose bias = Pose::Identity();
+  // What is expected along directions that it alone knows. Without the bias it would move an object
+  // by that, frame by frame, once the bias is taken off what was found.
+  Pose BiasedExpectation() const { return bias * T_LC_expected; }
 };
 
 struct SdfRegistrationResult {
@@ -68,17 +71,20 @@ double WeakShare(double deviation_m, double voxel_m, const SdfTrackConfig& confi
 // them (docs/tracking.md, "Terms of the image"). Points that are not finite, and a model or segment
 // without anything in it, give converged = false. Deterministic for any number of threads; `config`
 // must be valid.
-SdfRegistrationResult RegisterToDistances(const SdfRegistration& unbiased,
+SdfRegistrationResult RegisterToDistances(const SdfRegistration& task,
                                           const SdfTrackConfig& config);
 
 // What the points say of a place T_LC, and how many times as much against it as against the one
 // found: the ratio of the two costs, robust squared distances, with the Huber width of the latter's
-// deviation.
+// deviation. An object at T_LC seems to be at bias * T_LC where the bias is right, and at T_LC
+// where it is not: with `may_seem_biased` the place costs what the cheaper of both does, else what
+// the latter does.
 struct OtherPlace {
   DistanceCounts counts;
   double cost_ratio = 1;
 };
 OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
-                        const SdfRegistrationResult& found, const SdfTrackConfig& config);
+                        const SdfRegistrationResult& found, const SdfTrackConfig& config,
+                        bool may_seem_biased);
 
 }  // namespace tsdfpp

@@ -68,6 +68,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("motion_voxels", motion_voxels, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_frames", motion_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_evidence", motion_evidence, 0, 100));
+  TSDFPP_RETURN_IF_ERROR(InRange("motion_evidence_sum", motion_evidence_sum, 0, 100000));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_points", motion_points, 1, 1000000));
   return {};
 }
@@ -116,6 +117,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("motion_voxels", config.motion_voxels)
       .Get("motion_frames", config.motion_frames)
       .Get("motion_evidence", config.motion_evidence)
+      .Get("motion_evidence_sum", config.motion_evidence_sum)
       .Get("motion_points", config.motion_points);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
   if (auto valid = config.Validate(); !valid) {
@@ -165,6 +167,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"motion_voxels", motion_voxels},
                      {"motion_frames", motion_frames},
                      {"motion_evidence", motion_evidence},
+                     {"motion_evidence_sum", motion_evidence_sum},
                      {"motion_points", motion_points}};
 }
 

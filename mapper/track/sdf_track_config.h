@@ -41,8 +41,7 @@ struct SdfTrackConfig {
   double max_slope = 4;
   double max_fall = 1.5;
   // Where a map's distance changes by more than this many metres a metre, it is of a side that was
-  // seen at a grazing angle, and wrong by tenths of a voxel: it counts in proportion less. 0
-  // switches this off.
+  // seen at a grazing angle, and less certain: it counts in proportion less. 0 switches this off.
   double certain_slope = 2;
   double huber_voxels = 1;  // beyond it a residual counts linearly while the pose is coarse ...
   double huber_deviations = 1.5;  // ... and at last, in robust standard deviations
@@ -115,10 +114,12 @@ struct SdfTrackConfig {
 
   // Of TrackChoice::kMoving alone. What waits for motion has moved where so many frames in a row
   // show a point of it this far from where it began, each with this evidence, as above, against its
-  // place there; with fewer points than these, so many times as much.
+  // place there, and all in a row with this sum; with fewer points than these, so many times as
+  // much.
   double motion_voxels = 1;
   int motion_frames = 3;
   double motion_evidence = 6;
+  double motion_evidence_sum = 36;
   int motion_points = 100;
 
   // Errors: kUsage, naming the field, what was found and what was expected.

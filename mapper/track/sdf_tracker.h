@@ -62,10 +62,11 @@ class SdfTracker : public Tracker {
     // Of one that waits for motion.
     std::optional<Pose> T_WO_begun;  // where it was when it was registered first
     bool has_moved = false;
-    bool is_placed = false;  // by Place(), since it was registered last
-    int turn_before = 0;     // the last in which it was registered, here or elsewhere
-    int turns_away = 0;      // of those, in a row, from where it began
-    int turns_waited = 0;    // of those, in a row, for more of a motion
+    bool is_placed = false;    // by Place(), since it was registered last
+    int turn_before = 0;       // the last in which it was registered, here or elsewhere
+    int turns_away = 0;        // of those, in a row, from where it began
+    double evidence_away = 0;  // of these turns, of each over what is asked of few points
+    int turns_waited = 0;      // of those, in a row, for more of a motion
   };
 
   // A frame's segment of an object, and the object as the map has it.

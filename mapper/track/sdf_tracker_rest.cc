@@ -33,9 +33,9 @@ bool GoesOn(const Vector6& before, const Vector6& now, double voxel_m) {
          now.dot(before) > kSameWay * now.norm() * before.norm();
 }
 
-// Few points can be off together.
-double LeastEvidence(int points, const SdfTrackConfig& config) {
-  return config.motion_evidence * std::max(1.0, double(config.motion_points) / std::max(points, 1));
+// How many times as much evidence is asked of few points, which can be off together.
+double TimesAsMuch(int points, const SdfTrackConfig& config) {
+  return std::max(1.0, double(config.motion_points) / std::max(points, 1));
 }
 
 // Against the place: (what it costs there / at the nearest place - 1) sqrt(n), n the number of
@@ -69,7 +69,8 @@ SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistratio
     return rest;
   }
   rest.T_LC = sight.T_LC_stay();
-  const OtherPlace there = ComparePlace(task, rest.T_LC, nearest, config_);
+  const OtherPlace there =
+      ComparePlace(task, rest.T_LC, nearest, config_, !waits_ || memory.has_moved);
   rest.counts = there.counts;
   const Vector6 leaning = found.frame.LengthsOf(sight.MotionTo(found.T_LC));
   rest.evidence = EvidenceAgainst(there, nearest);
@@ -90,7 +91,7 @@ bool SdfTracker::RestsAgain(const Sight& sight, const SdfRegistration& task,
   if (sight.passed != 1 || memory.T_WO_last.size() < frames) return false;
   const Pose T_LC = sight.T_LO * memory.T_WO_last.front().inverse() * sight.frame->T_WC;
   if (WayOfKnownTurns_m(found, T_LC, config_) > kNearAgain_voxels * sight.voxel_m) return false;
-  const OtherPlace there = ComparePlace(task, T_LC, nearest, config_);
+  const OtherPlace there = ComparePlace(task, T_LC, nearest, config_, true);
   if (EvidenceAgainst(there, nearest) >= kShareAgain * config_.rest_evidence) return false;
   found.T_LC = T_LC;
   found.counts = there.counts;
@@ -113,12 +114,18 @@ bool SdfTracker::Waits(const Sight& sight, const Rest& rest, Memory& memory,
     memory.has_moved = true;
     return false;
   }
-  if (memory.turn_before != turn_ - 1) memory.turns_away = memory.turns_waited = 0;
+  if (memory.turn_before != turn_ - 1) {
+    memory.turns_away = memory.turns_waited = 0;
+    memory.evidence_away = 0;
+  }
   memory.turn_before = turn_;
   const bool is_away = !rest.is_kept && away_voxels(found.T_LC) >= config_.motion_voxels;
-  const bool is_sure = rest.evidence >= LeastEvidence(found.counts.observed, config_);
-  memory.turns_away = is_away && is_sure ? memory.turns_away + 1 : 0;
-  memory.has_moved = memory.turns_away >= config_.motion_frames;
+  const double evidence = rest.evidence / TimesAsMuch(found.counts.observed, config_);
+  const bool is_sure = is_away && evidence >= config_.motion_evidence;
+  memory.turns_away = is_sure ? memory.turns_away + 1 : 0;
+  memory.evidence_away = is_sure ? memory.evidence_away + evidence : 0;
+  memory.has_moved = memory.turns_away >= config_.motion_frames &&
+                     memory.evidence_away >= config_.motion_evidence_sum;
   const bool is_beside =
       found.frame.LongestWay_m(sight.MotionTo(found.T_LC)) > kSlow_voxels * sight.voxel_m;
   if (memory.has_moved || rest.is_kept || !is_beside) {

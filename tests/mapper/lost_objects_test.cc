@@ -369,7 +369,7 @@ TEST(LostObjects, AreLookedForInKnownSegmentsFirst) {
 // A gate that says no in every frame does so in the pipeline.
 TEST(LostObjects, AreBegunAnewInThePipeline) {
   PipelineConfig config = TrackConfig(AssociationMode::kGiven);
-  config.track.min_observed_share = 0.9;
+  config.track.min_observed_share = 0.99;
   Pipeline pipeline(config, Toys());
   const int last = kReturns + config.track.return_frames;
   ASSERT_TRUE(pipeline.Process(Coming(1, 110 * kDegree)));

@@ -72,8 +72,10 @@ TEST(TrackerRest, LeavesAtRestWhatNothingSaysMoves) {
 TEST(TrackerRest, RestsAgainWhereItStops) {
   constexpr double kFast_m = 0.006;
   constexpr int kStop = kStart + 5;
-  constexpr int kSettled = kStop + 10;
-  constexpr int kLast = kSettled + 10;
+  // A place of rest_frames ago is one after the stop then, and may be as far off by noise as to be
+  // left once more.
+  const int kSettled = kStop + 2 * SdfTrackConfig{}.rest_frames;
+  const int kLast = kSettled + 10;
   // Of so few points that noise alone moves it by more than a tenth of a voxel a frame.
   constexpr Intrinsics kCoarse{192, 144, 160.0, 160.0, 95.5, 71.5};
   struct Case {
@@ -156,6 +158,21 @@ TEST(TrackerRest, WaitsForMotion) {
   EXPECT_LE(*objects.at(kBrick).moved, kStart + 1 + config.track.motion_frames);
   EXPECT_GE(VoxelsOf(pipeline.map()).ObservedVoxels(kBrick).size(), before);
   EXPECT_FALSE(objects.at(kTray).moved);
+}
+
+// Frames that each say that it moved do not make a motion before they say enough together.
+TEST(TrackerRest, WaitsForEvidenceInAll) {
+  constexpr double kSlide_m = 0.006;
+  constexpr double kNeverEnough = 1e5;
+  for (const double sum : {0.0, kNeverEnough}) {
+    PipelineConfig config = MovingConfig();
+    config.track.motion_evidence_sum = sum;
+    Pipeline pipeline(config, Toys());
+    for (int i = 1; i <= kEnd; ++i) {
+      ASSERT_TRUE(pipeline.Process(NoisyToys(i, kSlide_m * std::max(0, i - kStart))));
+    }
+    EXPECT_EQ(pipeline.track_log().objects().at(kBrick).moved.has_value(), sum == 0) << sum;
+  }
 }
 
 // A shift of less than a voxel is no motion yet. It is not waited for more of it for ever.

@@ -1,0 +1,37 @@
+// The settings of the tracker.
+#include "mapper/track/sdf_track_config.h"
+
+#include <gtest/gtest.h>
+
+#include "fmt/format.h"
+
+namespace tsdfpp {
+namespace {
+
+TEST(SdfTrackConfig, RoundTripsThroughToml) {
+  SdfTrackConfig config;
+  config.curved = false;
+  config.max_slope = 3;
+  config.max_fall = 2;
+  config.certain_slope = 1.5;
+  config.anchor_turn_rad = 0.5;
+  config.weak_share = 0.03;
+  config.keyframe_points = 77;
+  config.free_space_weight = 0.5;
+  config.outline_weight = 0.25;
+  config.colour_weight = 2;
+  config.colour_points = 88;
+  EXPECT_EQ(SdfTrackConfig::FromToml(config.ToToml(), "t").value(), config);
+  EXPECT_TRUE(SdfTrackConfig().Validate());
+  config.min_points = config.max_points + 1;
+  const auto refused = config.Validate();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
+  EXPECT_EQ(refused.error().message,
+            fmt::format("tracking setting 'min_points' is {}, expected at most 'max_points', which "
+                        "is {}",
+                        config.min_points, config.max_points));
+}
+
+}  // namespace
+}  // namespace tsdfpp
