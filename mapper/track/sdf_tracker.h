@@ -65,7 +65,7 @@ class SdfTracker : public Tracker {
     bool is_placed = false;    // by Place(), since it was registered last
     int turn_before = 0;       // the last in which it was registered, here or elsewhere
     int turns_away = 0;        // of those, in a row, from where it began
-    double evidence_away = 0;  // of these turns, of each over what is asked of few points
+    double evidence_away = 0;  // in all of these turns, of each over FewPointsFactor()
     int turns_waited = 0;      // of those, in a row, for more of a motion
   };
 

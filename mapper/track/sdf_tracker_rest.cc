@@ -34,7 +34,7 @@ bool GoesOn(const Vector6& before, const Vector6& now, double voxel_m) {
 }
 
 // How many times as much evidence is asked of few points, which can be off together.
-double TimesAsMuch(int points, const SdfTrackConfig& config) {
+double FewPointsFactor(int points, const SdfTrackConfig& config) {
   return std::max(1.0, double(config.motion_points) / std::max(points, 1));
 }
 
@@ -120,7 +120,7 @@ bool SdfTracker::Waits(const Sight& sight, const Rest& rest, Memory& memory,
   }
   memory.turn_before = turn_;
   const bool is_away = !rest.is_kept && away_voxels(found.T_LC) >= config_.motion_voxels;
-  const double evidence = rest.evidence / TimesAsMuch(found.counts.observed, config_);
+  const double evidence = rest.evidence / FewPointsFactor(found.counts.observed, config_);
   const bool is_sure = is_away && evidence >= config_.motion_evidence;
   memory.turns_away = is_sure ? memory.turns_away + 1 : 0;
   memory.evidence_away = is_sure ? memory.evidence_away + evidence : 0;

@@ -2,8 +2,6 @@
 // of registration.
 #pragma once
 
-#include <algorithm>
-#include <functional>
 #include <vector>
 
 #include "core/units.h"

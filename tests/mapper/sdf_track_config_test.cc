@@ -1,9 +1,8 @@
 // The settings of the tracker.
 #include "mapper/track/sdf_track_config.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
-
-#include "fmt/format.h"
 
 namespace tsdfpp {
 namespace {
@@ -21,6 +20,10 @@ TEST(SdfTrackConfig, RoundTripsThroughToml) {
   config.outline_weight = 0.25;
   config.colour_weight = 2;
   config.colour_points = 88;
+  config.motion_frames = 5;
+  config.motion_evidence = 7;
+  config.motion_evidence_sum = 50;
+  config.motion_points = 99;
   EXPECT_EQ(SdfTrackConfig::FromToml(config.ToToml(), "t").value(), config);
   EXPECT_TRUE(SdfTrackConfig().Validate());
   config.min_points = config.max_points + 1;
