@@ -56,20 +56,20 @@ bool DistanceTerm::IsOfTwoSurfaces(const SurfaceSample& at, const Eigen::Vector3
 }
 
 void DistanceTerm::KeepAt(const Pose& T_LC) {
-  kept_.assign(points_.size(), {});
-  cubes_.resize(points_.size());
+  last_.reset();
+  kept_.assign(Taken(), {});
+  cubes_.resize(Taken());
   const Eigen::Vector3d camera_L = T_LC.translation();
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, Taken(), kPointsPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
-        SurfaceReader::SagCache sags;
+        SurfaceReader::SagCache& sags = model_->CacheOfThread();
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
-          const std::size_t i = k * stride_;
-          const Eigen::Vector3d p_C = points_[i].p_C.cast<double>();
+          const Eigen::Vector3d p_C = points_[k * stride_].p_C.cast<double>();
           const Eigen::Vector3d y = T_LC * p_C;
-          Kept& kept = kept_[i];
-          if (config_.curved) kept.sag_m = model_->SagAt(y, sags);
-          const SurfaceSample at = model_->At(y, kept.sag_m, cubes_[i]);
+          Kept& kept = kept_[k];
+          if (config_.curved) kept.sag_m = model_->SagAt(y, sags, cubes_[k]);
+          const SurfaceSample at = model_->At(y, kept.sag_m, cubes_[k]);
           if (!at.has_slope || IsOfTwoSurfaces(at, y - camera_L)) continue;
           kept.per_slope = 1 / at.slope;
           kept.weight = static_cast<float>(WeightOf(at, p_C, y, camera_L));
@@ -106,15 +106,14 @@ void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end
   const double farthest_m = kFarthest_hubers * huber_m_;
   const double per_radius = 1 / frame_.radius_m;
   for (std::size_t k = begin; k < end; ++k) {
-    const std::size_t i = k * stride_;
-    const Kept& kept = kept_[i];
+    const Kept& kept = kept_[k];
     if (!(kept.per_slope > 0)) {
       sums.cost += huber_m_ * huber_m_ / 2;
       continue;
     }
-    const Eigen::Vector3d y = T_LC * points_[i].p_C.cast<double>();
+    const Eigen::Vector3d y = T_LC * points_[k * stride_].p_C.cast<double>();
     SurfaceReader::Linear at;
-    const bool is_observed = model_->LinearAt(y, kept.sag_m, cubes_[i], at);
+    const bool is_observed = model_->LinearAt(y, kept.sag_m, cubes_[k], at);
     const double weight = kept.weight;
     const double r = is_observed ? double{kept.per_slope * at.value_m} : kept.distance_m;
     const double size = std::min(std::abs(r), farthest_m);
@@ -140,11 +139,12 @@ void DistanceTerm::AddChunk(const Pose& T_LC, std::size_t begin, std::size_t end
 }
 
 NormalEquations DistanceTerm::Sums(const Pose& T_LC) const {
-  if (kept_.size() != points_.size()) std::abort();  // KeepAt() comes first
+  if (kept_.size() != Taken()) std::abort();  // KeepAt() comes first
+  if (last_ && SameNumbers(last_->T_LC, T_LC)) return last_->sums;
   const std::size_t count = Taken();
   const std::size_t chunks = (count + kPointsPerTask - 1) / kPointsPerTask;
   constexpr std::size_t kChunksAtOnce = 32;
-  NormalEquations sums;
+  NormalEquations& sums = last_.emplace(SumsAt{T_LC, {}}).sums;
   for (std::size_t first = 0; first < chunks; first += kChunksAtOnce) {
     std::array<NormalEquations, kChunksAtOnce> parts;
     const std::size_t last = std::min(chunks, first + kChunksAtOnce);
@@ -179,12 +179,11 @@ DistanceCounts DistanceTerm::Count(const Pose& T_LC) const {
       tbb::blocked_range<std::size_t>(0, found.size(), kPointsPerTask),
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
-          const std::size_t i = k * stride_;
-          const SurfaceSample at = SampleAt(T_LC, i);
+          const SurfaceSample at = SampleAt(T_LC, k);
           found[k].is_observed = at.is_observed;
           if (!at.has_slope) continue;
           found[k].size_m = std::abs(at.distance_m());
-          const double noise_m = config_.Axial_m(points_[i].p_C.z());
+          const double noise_m = config_.Axial_m(points_[k * stride_].p_C.z());
           found[k].is_inlier = found[k].size_m < inlier_m + kNoiseDeviations * noise_m;
         }
       },
@@ -206,8 +205,8 @@ DistanceCounts DistanceTerm::Count(const Pose& T_LC) const {
 double DistanceTerm::KeptDeviation_m() const {
   std::vector<float> sizes;
   sizes.reserve(Taken());
-  for (std::size_t i = 0; i < kept_.size(); i += stride_) {
-    if (kept_[i].per_slope > 0) sizes.push_back(std::abs(kept_[i].distance_m));
+  for (const Kept& kept : kept_) {
+    if (kept.per_slope > 0) sizes.push_back(std::abs(kept.distance_m));
   }
   return RobustDeviation(std::move(sizes));
 }

@@ -2,6 +2,7 @@
 // (docs/tracking.md; after Bylow et al., RSS 2013).
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,7 +31,10 @@ class DistanceTerm {
                const SdfTrackConfig& config, std::size_t stride = 1);
 
   // Beyond this a residual counts linearly, metres.
-  void SetHuber(double huber_m) { huber_m_ = huber_m; }
+  void SetHuber(double huber_m) {
+    huber_m_ = huber_m;
+    last_.reset();
+  }
 
   // Keeps from now on what belongs to the points y = T p: their weights, the lengths of the
   // gradients by which their distances are divided, and, where they are `curved`, their sags. These
@@ -60,9 +64,10 @@ class DistanceTerm {
     float weight = 0;
     float distance_m = 0;
   };
-  SurfaceSample SampleAt(const Pose& T_LC, std::size_t i) const {
-    const Eigen::Vector3d y = T_LC * points_[i].p_C.cast<double>();
-    return kept_.empty() ? model_->At(y) : model_->At(y, kept_[i].sag_m, cubes_[i]);
+  // Of the k-th that is taken.
+  SurfaceSample SampleAt(const Pose& T_LC, std::size_t k) const {
+    const Eigen::Vector3d y = T_LC * points_[k * stride_].p_C.cast<double>();
+    return kept_.empty() ? model_->At(y) : model_->At(y, kept_[k].sag_m, cubes_[k]);
   }
   // Whether the distance there lies between two surfaces (SdfTrackConfig::max_slope); `ray_L` is
   // the camera's, of any length.
@@ -79,8 +84,14 @@ class DistanceTerm {
   double lateral_per_m_;  // the deviation across the axis, by depth
   std::size_t stride_;
   double huber_m_;
-  std::vector<Kept> kept_;  // a point each, or empty
-  // A point each, once points were kept. A point is looked at by one thread at a time.
+  std::vector<Kept> kept_;  // a point each that is taken, or empty
+  // The last pose that was asked for: a search begins where it was asked what is known.
+  struct SumsAt {
+    Pose T_LC;
+    NormalEquations sums;
+  };
+  mutable std::optional<SumsAt> last_;
+  // The same, once points were kept. A point is looked at by one thread at a time.
   mutable std::vector<VoxelCube> cubes_;
 };
 

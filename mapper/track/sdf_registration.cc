@@ -326,7 +326,7 @@ OtherPlace ComparePlace(const SdfRegistration& task, const Pose& T_LC,
   const double cost_found = cost_at(found.T_LC, found.T_LC);
   const Pose seen = task.bias * T_LC;
   double cost = cost_at(T_LC, seen);
-  if (may_seem_biased) cost = std::min(cost, cost_at(seen, seen));
+  if (may_seem_biased && !SameNumbers(seen, T_LC)) cost = std::min(cost, cost_at(seen, seen));
   OtherPlace other;
   other.cost_ratio = cost / cost_found;
   other.counts = term.Count(T_LC);

@@ -33,8 +33,10 @@ class Neighbourhood {
     }
   }
 
-  CubeBends Bends() const {
-    CubeBends bends;
+  // `base` is that of the cube.
+  BentCube Bends(const Index3& base) const {
+    BentCube bends;
+    bends.cube.base = base;
     // What the lines need: the corners (1 and 2 along each axis), and one voxel more on each side
     // of one axis.
     std::array<float, 64> distance;
@@ -54,10 +56,17 @@ class Neighbourhood {
       weight[to] = block->weight[place];
       return weight[to] != 0;
     };
+    int least = 255;
     for (int i = 0; i < 8; ++i) {
-      if (!read(1 + (i & 1), 1 + ((i >> 1) & 1), 1 + (i >> 2))) return bends;
+      const int x = 1 + (i & 1);
+      const int y = 1 + ((i >> 1) & 1);
+      const int z = 1 + (i >> 2);
+      if (!read(x, y, z)) return bends;
+      const auto at = static_cast<std::size_t>(x + 4 * y + 16 * z);
+      bends.cube.distance[static_cast<std::size_t>(i)] = distance[at];
+      least = std::min<int>(least, weight[at]);
     }
-    bends.is_observed = true;
+    bends.cube.least_weight = least;
     for (int line = 0; line < 4; ++line) {
       const int second = 1 + (line & 1);
       const int third = 1 + (line >> 1);
@@ -96,8 +105,8 @@ class Neighbourhood {
 };
 
 // SurfaceReader::SagAt() of a point that lies so far between a cube's corners.
-float SagOf(const CubeBends& bends, const std::array<float, 3>& fraction) {
-  if (!bends.is_observed) return 0;
+float SagOf(const BentCube& bends, const std::array<float, 3>& fraction) {
+  if (bends.cube.least_weight == 0) return 0;
   float sag = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float second = fraction[(axis + 1) % 3];
@@ -154,15 +163,13 @@ SurfaceSample SurfaceReader::At(const Eigen::Vector3d& p_L, float sag_m) const {
   return At(p_L, sag_m, cube);
 }
 
-float SurfaceReader::SagAt(const Eigen::Vector3d& p_L, SagCache& cache) const {
+float SurfaceReader::SagAt(const Eigen::Vector3d& p_L, SagCache& cache, VoxelCube& cube) const {
   const Eigen::Vector3d q = p_L * per_voxel_;
   if (voxels_.empty() || !(q.cwiseAbs().maxCoeff() < kFurthestVoxel)) return 0;
   const Index3 base = FloorOf(q);
-  CubeBends& bends = cache.Of(base);
-  if (bends.base != base) {
-    bends = Neighbourhood(voxels_, base).Bends();
-    bends.base = base;
-  }
+  BentCube& bends = cache.Of(base);
+  if (bends.cube.base != base) bends = Neighbourhood(voxels_, base).Bends(base);
+  if (cube.base != base) cube = bends.cube;
   return SagOf(bends, {static_cast<float>(q.x() - base.x), static_cast<float>(q.y() - base.y),
                        static_cast<float>(q.z() - base.z)});
 }

@@ -1,6 +1,8 @@
 // An object's signed distances at points between its voxels.
 #pragma once
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -30,6 +32,14 @@ struct VoxelCube {
   Index3 base{std::numeric_limits<int>::max(), 0, 0};  // of none at first
   std::array<float, 8> distance{};                     // corner x + 2 y + 4 z
   int least_weight = 0;                                // 0 where one is unobserved
+};
+
+// A cube of voxels, and the second differences of the distances along the lines of voxels that pass
+// through its corners, four along each axis: 0 where a corner is unobserved.
+struct BentCube {
+  VoxelCube cube;
+  std::array<float, 12> low{};  // at the corner with the lower index
+  std::array<float, 12> high{};
 };
 
 // Further out no voxel is, and indices stay far from the ends of their 21 bits.
@@ -90,11 +100,23 @@ class SurfaceReader {
   // rays bend where a surface does, upwards over convex ones, and the more the flatter the rays
   // fall; without this the interpolated surface lies inside the object
   // (docs/tracking.md). Lines of voxels that go on on neither side count as straight. 0 where a
-  // corner is unobserved. Metres, of a point of the lattice's frame, metres. Points often lie close
-  // to those before, as an image's do: `cache`, which is this reader's, keeps what a cube of voxels
-  // has of it for the next point in it.
-  class SagCache;
-  float SagAt(const Eigen::Vector3d& p_L, SagCache& cache) const;
+  // corner is unobserved. Metres, of a point of the lattice's frame, metres. `cube`, which is this
+  // reader's, becomes that around the point. Points often lie close to those before, as an image's
+  // do: `cache`, which is this thread's, keeps what a cube of voxels has for the next point in it.
+  class SagCache {
+   public:
+    BentCube& Of(const Index3& base) {
+      const auto at = static_cast<unsigned>(base.x) * 73U + static_cast<unsigned>(base.y) * 19U +
+                      static_cast<unsigned>(base.z) * 5U;
+      return cubes_[at % kCubes];
+    }
+
+   private:
+    static constexpr std::size_t kCubes = 512;
+    std::array<BentCube, kCubes> cubes_{};
+  };
+  SagCache& CacheOfThread() const { return caches_.local(); }
+  float SagAt(const Eigen::Vector3d& p_L, SagCache& cache, VoxelCube& cube) const;
 
  private:
   void Read(const Index3& base, VoxelCube& cube) const;
@@ -102,28 +124,7 @@ class SurfaceReader {
   VoxelReader voxels_;
   double per_voxel_;
   float gradient_per_step_;  // 1 / voxel
-};
-
-// The second differences of the distances along the lines of voxels that pass through a cube's
-// corners, four along each axis.
-struct CubeBends {
-  Index3 base{std::numeric_limits<int>::max(), 0, 0};  // of none at first
-  bool is_observed = false;                            // all corners are
-  std::array<float, 12> low{};                         // at the corner with the lower index
-  std::array<float, 12> high{};
-};
-
-class SurfaceReader::SagCache {
- public:
-  CubeBends& Of(const Index3& base) {
-    const auto at = static_cast<unsigned>(base.x) * 73U + static_cast<unsigned>(base.y) * 19U +
-                    static_cast<unsigned>(base.z) * 5U;
-    return cubes_[at % kCubes];
-  }
-
- private:
-  static constexpr std::size_t kCubes = 128;
-  std::array<CubeBends, kCubes> cubes_{};
+  mutable tbb::enumerable_thread_specific<SagCache> caches_;
 };
 
 }  // namespace tsdfpp

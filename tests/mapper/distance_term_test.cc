@@ -30,14 +30,17 @@ TEST(SurfaceReader, KnowsTheSagOfAQuadraticFunction) {
   const SurfaceReader reader(grid, kVoxel_m);
   const VoxelReader voxels(grid);
   SurfaceReader::SagCache cache;  // of fewer cubes than there are
-  for (std::uint64_t i = 0; i < 400; ++i) {
-    const auto draw = UniformDraw(11, 0, i % 200);
+  VoxelCube cube;
+  for (std::uint64_t i = 0; i < 4000; ++i) {
+    const auto draw = UniformDraw(11, 0, i % 2000);
     const Eigen::Vector3d q = 12 * Eigen::Vector3d(draw[0], draw[1], draw[2]).array() - 6;
     const double trilinear = *DistanceAt(FindCorners(voxels, q));
     // Single precision, of values up to 0.5 and their differences.
-    EXPECT_NEAR(reader.SagAt(q * kVoxel_m, cache), trilinear - exact(q), 1e-6);
+    EXPECT_NEAR(reader.SagAt(q * kVoxel_m, cache, cube), trilinear - exact(q), 1e-6);
+    EXPECT_EQ(cube.base, FloorOf(q));
+    EXPECT_EQ(reader.At(q * kVoxel_m, 0, cube).value_m, reader.At(q * kVoxel_m).value_m);
   }
-  EXPECT_EQ(reader.SagAt(Eigen::Vector3d(5, 5, 5), cache), 0) << "nothing is there";
+  EXPECT_EQ(reader.SagAt(Eigen::Vector3d(5, 5, 5), cache, cube), 0) << "nothing is there";
 }
 
 // On a plane the distance is linear, so that Gauss and Newton's sums are the cost's derivatives.
