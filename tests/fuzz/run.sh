@@ -42,8 +42,20 @@ export UBSAN_OPTIONS=print_stacktrace=1
 symbolizer=$(command -v llvm-symbolizer-14 || command -v llvm-symbolizer || true)
 if [ -n "$symbolizer" ]; then export ASAN_SYMBOLIZER_PATH=$symbolizer; fi
 
-# How libFuzzer ends when it is told to, by SIGINT or SIGTERM.
+# How libFuzzer ends when it is told to, by SIGINT or SIGTERM; and after an input that took too long.
 interrupted=72
+too_long=70
+limits="-timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512"
+
+# Inputs that took long, of a target whose program stood still meanwhile, as it does where the machine is suspended: by
+# themselves they are done at once, and are no finds.
+forget_interruptions() {
+  local file
+  for file in "$1/crashes"/timeout-* "$1/crashes"/slow-unit-*; do
+    if [ -f "$file" ] && "$binary" $limits -timeout=10 "$file" >"$1/again.txt" 2>&1; then rm "$file"; fi
+  done
+  rm -f "$1/again.txt"
+}
 
 # Bytes of an input: sets of files are larger than single ones.
 most_bytes() {
@@ -57,7 +69,7 @@ most_bytes() {
 }
 
 fuzz() {
-  local target=$1 now left log status executions line used find cpu=0 tries=0 TIMEFORMAT='%U %S'
+  local target=$1 now left wall log status executions line used find cpu=0 waited=0 tries=0 TIMEFORMAT='%U %S'
   local to=$OUT/$target
   mkdir -p "$to/corpus" "$to/crashes"
   export TSDFPP_FUZZ_TARGET=$target
@@ -65,20 +77,27 @@ fuzz() {
   while [ $tries -lt 20 ]; do
     now=$(date +%s)
     left=$((seconds - cpu))
-    if [ $left -lt 1 ]; then break; fi
+    # Each run reads the whole corpus again, so a short one does nothing else.
+    if [ $left -lt 1 ] || [ $((8 * left)) -lt "$seconds" ]; then break; fi
+    # libFuzzer's limit is of time that goes by: longer where the machine was busy so far.
+    wall=$left
+    if [ $cpu -gt 0 ] && [ $waited -gt $cpu ]; then wall=$((left * waited / cpu)); fi
     log=$to/log-$now-$tries.txt
     status=0
-    { time "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$left" -max_len="$(most_bytes "$target")" \
-      -timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512 -use_value_profile=1 -reload=0 -print_final_stats=1 \
+    { time "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$wall" -max_len="$(most_bytes "$target")" \
+      $limits -use_value_profile=1 -reload=0 -print_final_stats=1 \
       -artifact_prefix="$to/crashes/" >"$log" 2>&1; } 2>"$to/time.txt" || status=$?
     # The last line: before it bash says of a program that a signal ended which one it was.
     used=$(tail -1 "$to/time.txt" | awk '{print int($1 + $2 + 0.5)}')
     cpu=$((cpu + used))
+    waited=$((waited + $(date +%s) - now))
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -1)
     line=$(grep -a ' cov: ' "$log" | tail -1 || true)
     edges=$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' <<<"$line")
     features=$(sed -n 's/.* ft: \([0-9]*\).*/\1/p' <<<"$line")
+    forget_interruptions "$to"
     find=$((status != 0 && status != interrupted))
+    if [ $status = $too_long ] && [ -z "$(find "$to/crashes" -name 'timeout-*')" ]; then find=0; fi
     printf '%s\t%s\t%s\t%s\t%s\t%s\n' "$now" "$used" "${executions:-0}" "${edges:-0}" \
       "${features:-0}" "$find" >>"$to/runs.tsv"
     # Only logs of finds are worth their place.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What tests/fuzz/run.sh writes down of a run, by how it ends: a run that was told to end (status 72) made no find, and is
-# not followed by another; one that failed made one, and is followed by another while there is time. And that it begins
-# with inputs: gather.sh copies all seeds, finds and corpora, and without any a run is refused.
+# not followed by another; one that failed made one, and is followed by another while there is time; an input that took
+# too long is one if it does so by itself as well. And that it begins with inputs: gather.sh copies all seeds, finds and corpora, and without any a run is refused.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 run=$here/run.sh
@@ -10,14 +10,15 @@ trap 'rm -rf "$folder"' EXIT
 mkdir -p "$folder/corpus/toy"
 echo seed >"$folder/corpus/toy/seed"
 
-# expect END ARTIFACT RUNS FINDS RC: how the fuzzer ends, whether it leaves a find, the lines of runs.tsv, those of
-# finds, how run.sh ends.
+# expect END ARTIFACT RUNS FINDS RC [AGAIN]: how the fuzzer ends, what find it leaves ("no": none), the lines of runs.tsv,
+# those of finds, how run.sh ends; how the fuzzer ends with the find alone.
 expect() {
   rm -rf "$folder/out"
   cat >"$folder/tsdfpp_fuzz" <<EOF
 #!/usr/bin/env bash
+case "\${!#}" in */crashes/?*) exit ${6:-1} ;; esac
 (ulimit -t 1; while :; do :; done) 2>/dev/null || true  # a second of a core
-if [ $2 = yes ]; then touch "\$TO_CRASHES/crash-\$\$"; fi
+if [ $2 != no ]; then touch "\$TO_CRASHES/$2-\$\$"; fi
 echo '#2 DONE   cov: 5 ft: 7 corp: 1/4b'
 echo 'stat::number_of_executed_units: 3'
 $1
@@ -35,8 +36,12 @@ EOF
 }
 expect "exit 0" no 2 0 0
 expect "exit 72" no 1 0 0
-expect "exit 77" yes 2 2 1
-expect "kill -ABRT \$\$" yes 2 2 1
+expect "exit 77" crash 2 2 1
+expect "kill -ABRT \$\$" crash 2 2 1
+expect "exit 70" timeout 2 2 1 70
+expect "exit 70" timeout 2 0 0 0
+expect "exit 0" slow-unit 2 0 1 70
+expect "exit 0" slow-unit 2 0 0 0
 
 rm "$folder/corpus/toy/seed"
 rc=0
