@@ -79,9 +79,11 @@ fuzz() {
     left=$((seconds - cpu))
     # Each run reads the whole corpus again, so a short one does nothing else.
     if [ $left -lt 1 ] || [ $((8 * left)) -lt "$seconds" ]; then break; fi
-    # libFuzzer's limit is of time that goes by: longer where the machine was busy so far.
+    # libFuzzer's limit is of time that goes by: longer where the machine was busy so far, though it may be no more.
     wall=$left
-    if [ $cpu -gt 0 ] && [ $waited -gt $cpu ]; then wall=$((left * waited / cpu)); fi
+    if [ $cpu -gt 0 ] && [ $waited -gt $cpu ]; then
+      wall=$((waited < 2 * cpu ? left * waited / cpu : 2 * left))
+    fi
     log=$to/log-$now-$tries.txt
     status=0
     { time "$binary" "$to/corpus" "$home/corpus/$target" -max_total_time="$wall" -max_len="$(most_bytes "$target")" \
