@@ -350,10 +350,14 @@ test('tables sort and leave as CSV', async (browser) => {
   const page = await open(browser, report('run'));
   const table = page.locator('[data-table="figures"]');
   const column = async () => (await table.locator('tbody tr td:nth-child(2)').allTextContents()).map(Number);
+  // A busy machine may take in a click after it was sent.
+  const sorted = (way) => table.locator(`th:nth-child(2)[aria-sort="${way}"]`).waitFor();
   await table.locator('thead button').nth(1).click();
+  await sorted('ascending');
   const up = await column();
   assert.deepEqual(up, [...up].sort((a, b) => a - b));
   await table.locator('thead button').nth(1).click();
+  await sorted('descending');
   assert.deepEqual(await column(), [...up].reverse());
   assert.equal(await table.locator('[aria-sort="descending"]').count(), 1);
   const [download] = await Promise.all([page.waitForEvent('download'), table.locator('.save').click()]);
