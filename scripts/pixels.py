@@ -12,28 +12,19 @@ rotation error of the objects that moved, in the frames in which the map had the
 pixels (docs/segmentation.md, Wrong masks), not the true ones.
 """
 import argparse
-import csv
-import json
 import pathlib
-import subprocess
 import sys
+
+import scene_tables
+from scene_tables import text, write
 
 SCENES = "contact,container,fast,handheld,occlusion,reentry,stack,thin,toycar3,tumble"
 SENSOR = "nguyen2012+colour_noise"
-LONG = 1_000_000  # frames between evaluations: the examined frame alone
 
 
 def compare(program, scene, out, options):
-    command = [program, "compare", f"scenes/{scene}.toml", "--sensor", SENSOR, "--methods", "tsdf++/anchored", "--profiles",
-               "close", "--poses", "track", "--every", str(LONG), "--out", str(out), *options]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    run = json.loads((out / "summary.json").read_text())["runs"][0]
-    with open(out / "frames.csv", newline="") as file:
-        return run, list(csv.DictReader(file))[-1]
-
-
-def text(value, digits):
-    return "-" if value in (None, "") else f"{float(value):.{digits}f}"
+    summary, frames = scene_tables.compare(program, scene, SENSOR, out, ["--poses", "track", *options])
+    return summary["runs"][0], frames[-1]
 
 
 def worst(run, key, factor, digits):
@@ -72,12 +63,7 @@ def main():
     for scene in options.scenes.split(","):
         rows.append(row_of(options.program, scene, options.out, options.mask_repair))
         print(", ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
-    part = options.out / "pixels.csv.part"
-    with open(part, "w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    part.rename(options.out / "pixels.csv")
+    write(rows, options.out / "pixels.csv")
 
 
 if __name__ == "__main__":

@@ -9,25 +9,20 @@ poses. Writes OUT/surfaces.csv, a row each, of the examined frame: the hidden ta
 distance error of the moving objects, the mean over them; and of the object that loses most, by how much tracked is worse.
 """
 import argparse
-import csv
-import json
 import pathlib
 import statistics
-import subprocess
 import sys
+
+import scene_tables
+from scene_tables import text, write
 
 SCENES = "toycar3,handheld,container,contact,fast,mini"
 SENSORS = {"exact": "exact", "noise": "nguyen2012"}
-LONG = 1_000_000  # frames between evaluations: the examined frame alone
 
 
 def compare(program, scene, sensor, out):
-    command = [program, "compare", f"scenes/{scene}.toml", "--sensor", sensor, "--methods", "tsdf++/anchored", "--profiles",
-               "close", "--poses", "gt,track", "--bleeding", "wait", "--every", str(LONG), "--out", str(out)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    summary = json.loads((out / "summary.json").read_text())
-    with open(out / "frames.csv", newline="") as file:
-        kept = {row["poses"]: row["table_preservation_behind_other"] for row in csv.DictReader(file)}
+    summary, frames = scene_tables.compare(program, scene, sensor, out, ["--poses", "gt,track", "--bleeding", "wait"])
+    kept = {row["poses"]: row["table_preservation_behind_other"] for row in frames}
     return summary["removed"], {run["poses"]: run["examined"] for run in summary["runs"]}, kept
 
 
@@ -39,22 +34,14 @@ def surfaces_of(examined, movers):
     return completion, [1e3 * value if isinstance(value, float) else None for value in error]
 
 
-def text(value, digits):
-    return "-" if value in (None, "") else f"{round(float(value), digits) + 0.0:.{digits}f}"  # no -0
-
-
 def mean(values):
     known = [value for value in values if value is not None]
     return statistics.fmean(known) if known else None
 
 
-def most(differences):
-    known = [value for value in differences if value is not None]
+def most_worse(given, tracked, sign):
+    known = [sign * (a - b) for a, b in zip(given, tracked) if a is not None and b is not None]
     return max(known) if known else None
-
-
-def less(given, tracked):
-    return None if given is None or tracked is None else given - tracked
 
 
 def row_of(program, scene, depth, out):
@@ -67,8 +54,7 @@ def row_of(program, scene, depth, out):
     for title, i, digits, sign in (("completion", 0, 3, 1), ("distance error, mm", 1, 2, -1)):
         row[f"{title}: given"] = text(mean(given[i]), digits)
         row[f"{title}: tracked"] = text(mean(tracked[i]), digits)
-        worse = most(None if (by := less(a, b)) is None else sign * by for a, b in zip(given[i], tracked[i]))
-        row[f"{title}: most worse"] = text(worse, digits)
+        row[f"{title}: most worse"] = text(most_worse(given[i], tracked[i], sign), digits)
     return row
 
 
@@ -84,12 +70,7 @@ def main():
         for depth in SENSORS:
             rows.append(row_of(options.program, scene, depth, options.out))
             print(", ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
-    part = options.out / "surfaces.csv.part"
-    with open(part, "w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    part.rename(options.out / "surfaces.csv")
+    write(rows, options.out / "surfaces.csv")
 
 
 if __name__ == "__main__":

@@ -48,7 +48,7 @@ too_long=70
 limits="-timeout=20 -rss_limit_mb=2048 -malloc_limit_mb=512"
 
 # Inputs that took long, of a target whose program stood still meanwhile, as it does where the machine is suspended: by
-# themselves they are done at once, and are no finds.
+# themselves they are done within the ten seconds from which on libFuzzer calls an input slow, and are no finds.
 forget_interruptions() {
   local file
   for file in "$1/crashes"/timeout-* "$1/crashes"/slow-unit-*; do

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # What tests/fuzz/run.sh writes down of a run, by how it ends: a run that was told to end (status 72) made no find, and is
 # not followed by another; one that failed made one, and is followed by another while there is time; an input that took
-# too long is one if it does so by itself as well. And that it begins with inputs: gather.sh copies all seeds, finds and corpora, and without any a run is refused.
+# too long is one if it does so by itself as well. And that it begins with inputs: gather.sh copies all seeds, finds and
+# corpora, and without any a run is refused.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 run=$here/run.sh
