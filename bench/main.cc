@@ -168,6 +168,7 @@ void AddTrack(CLI::App& app, Chosen& chosen) {
       ->capture_default_str();
   AddCount(command, "--seeds", options->seeds, "Draws of the noise", 1, 1000);
   command->add_option("--track-config", options->settings, "Settings of track and known, TOML");
+  command->add_option("--map-config", options->map, "Settings of the maps, TOML");
   AddCount(command, "--until", options->until, "The last frame", 1, 100000);
   command->callback([=, &chosen] { chosen = [=] { return RunTrackBench(*options); }; });
 }

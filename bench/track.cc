@@ -61,12 +61,13 @@ struct Plan {
   std::vector<std::string> depths;
   std::vector<RunPlan> runs;
   SdfTrackConfig settings;
+  MapConfig map;
   int until = 0;
   int seeds = 1;
 };
 
 Expected<Plan> PlanOf(const TrackBenchOptions& options) {
-  Plan plan{{}, options.depths, {}, {}, options.until, options.seeds};
+  Plan plan{{}, options.depths, {}, {}, {}, options.until, options.seeds};
   for (const std::string& name : options.runs) {
     TSDFPP_ASSIGN(RunPlan run, PlanOf(name));
     plan.runs.push_back(std::move(run));
@@ -74,6 +75,10 @@ Expected<Plan> PlanOf(const TrackBenchOptions& options) {
   if (!options.settings.empty()) {
     TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.settings));
     TSDFPP_ASSIGN(plan.settings, SdfTrackConfig::FromToml(table, options.settings));
+  }
+  if (!options.map.empty()) {
+    TSDFPP_ASSIGN(const toml::table table, ParseTomlFile(options.map));
+    TSDFPP_ASSIGN(plan.map, MapConfig::FromToml(table, options.map));
   }
   TSDFPP_ASSIGN(const std::vector<fs::path> files, ListFolder(options.scenes));
   const auto is_wanted = [&](const fs::path& file) {
@@ -109,7 +114,7 @@ double MedianMs(const TrackRun& run) {
 
 Expected<void> Feed(const Frame& frame, const KnownModels& known, const Plan& plan, Stage& stage) {
   for (const auto& run : stage.runs) TSDFPP_RETURN_IF_ERROR(run->Process(frame));
-  for (const auto& [id, shares] : KnownShares(frame, known, MapConfig{}.voxel_m, plan.settings)) {
+  for (const auto& [id, shares] : KnownShares(frame, known, plan.map.voxel_m, plan.settings)) {
     stage.shown[id].insert(frame.index);
     stage.shift_shares[id].push_back(shares.shift);
     stage.turn_shares[id].push_back(shares.turn);
@@ -151,7 +156,7 @@ Expected<std::vector<TrackRow>> RunScene(const fs::path& file, const Plan& plan)
   TSDFPP_ASSIGN(const SensorConfig noisy, SensorPresetNamed("nguyen2012"));
   TSDFPP_ASSIGN(const std::vector<TrueModel> models, source->Truth());
   const SequenceInfo& info = source->info();
-  const double voxel_m = MapConfig{}.voxel_m;
+  const double voxel_m = plan.map.voxel_m;
   const KnownModels known = KnownModelsOf(models, voxel_m);
   std::vector<Stage> stages;
   const auto add_stage = [&](const std::string& depth, std::uint64_t seed) {
@@ -159,6 +164,7 @@ Expected<std::vector<TrackRow>> RunScene(const fs::path& file, const Plan& plan)
     for (const RunPlan& run : plan.runs) {
       stage.runs.push_back(run.is_known ? MakeKnownRun(known, voxel_m, plan.settings)
                                         : MakeMapRun(info.objects, {.method = run.method,
+                                                                    .map = plan.map,
                                                                     .bleeding = run.bleeding,
                                                                     .poses = run.poses,
                                                                     .tracked = TrackChoice::kAll,

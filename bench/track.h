@@ -17,6 +17,7 @@ struct TrackBenchOptions {
   std::vector<std::string> runs = {"known", "track tsdf++/anchored", "track tsdf++"};
   int seeds = 1;         // draws of the noise: the scene's own seed and those that follow it
   std::string settings;  // a file of mapper/track/sdf_track_config.h; empty for the defaults
+  std::string map;       // one of mapper/map_config.h, likewise
   int until = 100000;    // the last frame
   std::string out;
 };

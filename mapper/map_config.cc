@@ -14,6 +14,23 @@ Expected<void> InRange(std::string_view field, double value, double lowest, doub
 
 }  // namespace
 
+std::string_view DistancesName(Distances distances) {
+  switch (distances) {
+    case Distances::kRay:
+      return "ray";
+    case Distances::kSurface:
+      return "surface";
+  }
+  std::abort();
+}
+
+Expected<Distances> DistancesFromName(std::string_view name) {
+  for (const Distances distances : {Distances::kRay, Distances::kSurface}) {
+    if (name == DistancesName(distances)) return distances;
+  }
+  return UsageError("distances '{}' is unknown, expected ray or surface", name);
+}
+
 std::string_view ResamplingName(Resampling resampling) {
   switch (resampling) {
     case Resampling::kAll:
@@ -93,6 +110,7 @@ Expected<void> MapConfig::SetProfile(std::string_view profile) {
 
 Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::string& where) {
   MapConfig config;
+  std::string distances(DistancesName(config.distances));
   std::string resampling(ResamplingName(config.resampling));
   std::string moved_voxels(MovedVoxelsName(config.moved_voxels));
   std::string removed_voxels(RemovedVoxelsName(config.removed_voxels));
@@ -108,11 +126,15 @@ Expected<MapConfig> MapConfig::FromToml(const toml::table& table, const std::str
       .Get("rims", config.rims)
       .Get("relist_on_removal", config.relist_on_removal)
       .Get("colour_whole_band", config.colour_whole_band)
+      .Get("distances", distances)
       .Get("resampling", resampling)
       .Get("moved_voxels", moved_voxels)
       .Get("removed_voxels", removed_voxels)
       .Get("vote_band_voxels", config.vote_band_voxels);
   TSDFPP_RETURN_IF_ERROR(reader.Finish());
+  const Expected<Distances> measured = DistancesFromName(distances);
+  if (!measured) return UsageError("{}: {}", where, measured.error().message);
+  config.distances = *measured;
   const Expected<Resampling> named = ResamplingFromName(resampling);
   if (!named) return UsageError("{}: {}", where, named.error().message);
   config.resampling = *named;
@@ -140,6 +162,7 @@ toml::table MapConfig::ToToml() const {
                      {"rims", rims},
                      {"relist_on_removal", relist_on_removal},
                      {"colour_whole_band", colour_whole_band},
+                     {"distances", DistancesName(distances)},
                      {"resampling", ResamplingName(resampling)},
                      {"moved_voxels", MovedVoxelsName(moved_voxels)},
                      {"removed_voxels", RemovedVoxelsName(removed_voxels)},

@@ -18,6 +18,12 @@ namespace tsdfpp {
 inline constexpr double kColourBand_voxels = 2;
 inline constexpr double kFirstColourBand_voxels = 3;
 
+// What a fused distance is (docs/map.md, "Distances from the surface").
+enum class Distances {
+  kRay,      // along the pixel's ray, as the paper has it
+  kSurface,  // of objects, where a pixel shows a plane: from that plane
+};
+
 // Which neighbours of its source point a moved voxel needs (docs/map.md, "Resampling").
 enum class Resampling {
   kAll,       // all eight observed
@@ -36,6 +42,11 @@ enum class RemovedVoxels {
   kFree,        // free space, seen once
   kUnobserved,  // unknown
 };
+
+// "ray", "surface".
+std::string_view DistancesName(Distances distances);
+// Errors: kUsage.
+Expected<Distances> DistancesFromName(std::string_view name);
 
 // "free", "unobserved".
 std::string_view RemovedVoxelsName(RemovedVoxels removed);
@@ -70,6 +81,7 @@ struct MapConfig {
   bool rims = true;           // object volumes: cubes at a mask's outline are completed
   bool relist_on_removal = false;  // tsdf++: a removal lists again what overflow had dropped
   bool colour_whole_band = false;  // colour far from the surface too, as one field always does
+  Distances distances = Distances::kRay;
   Resampling resampling = Resampling::kAll;  // of the methods that move values
   // Of the methods with one field:
   MovedVoxels moved_voxels = MovedVoxels::kAll;

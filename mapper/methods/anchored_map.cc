@@ -21,7 +21,7 @@ void AnchoredMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 
 void AnchoredMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   RequireReach(*this, frame, labels);
-  const FrameView view(frame, labels);
+  const FrameView view(frame, labels, config_.distances);
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_);
   index_.NoteFusion(fused, volumes_);

@@ -78,7 +78,9 @@ void FuseActive(const FrameView& frame, const MapConfig& config, const CameraFro
         const bool coloured =
             std::abs(s) <=
             (block->ColourCount(i) == 0 ? config.first_colour_band() : config.colour_band());
-        FuseVoxel(*block, i, s, coloured ? frame.kernel.colour + 3 * pixel : nullptr, weight_cap);
+        const float facing = frame.kernel.facing == nullptr ? 1 : frame.kernel.facing[pixel];
+        FuseVoxel(*block, i, s * facing, coloured ? frame.kernel.colour + 3 * pixel : nullptr,
+                  weight_cap);
         changed = true;
       } else if (frame.kernel.label[pixel] == id) {
         FuseVoxel(*block, i, config.front(), nullptr, weight_cap);

@@ -23,7 +23,7 @@ void LiteralMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   RequireReach(*this, frame, labels);
   const std::size_t blocks_before = index_.blocks().size();
   const std::vector<Index3> changed =
-      FuseIntoActive(FrameView(frame, labels), config_, index_, volumes_);
+      FuseIntoActive(FrameView(frame, labels, config_.distances), config_, index_, volumes_);
   field_.Note(changed, index_.blocks().size());
   // A frame empties no list; it may have made blocks in vain.
   index_.blocks().Erase(EmptyFrom(index_.blocks(), blocks_before,

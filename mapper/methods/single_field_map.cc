@@ -47,7 +47,8 @@ std::unique_ptr<MapRepresentation> SingleFieldMap::Clone() const {
 
 void SingleFieldMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   RequireReach(*this, frame, labels);
-  FuseIntoField(FrameView(frame, labels), config_, rule_ == FieldRule::kGuarded, field_);
+  const FrameView view(frame, labels, config_.distances);
+  FuseIntoField(view, config_, rule_ == FieldRule::kGuarded, field_);
   CheckInDebugBuilds(*this);
 }
 

@@ -28,7 +28,7 @@ void TsdfppMap::SetObjectPose(InstanceId id, const Pose& T_WO) {
 
 void TsdfppMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   RequireReach(*this, frame, labels);
-  const FrameView view(frame, labels);
+  const FrameView view(frame, labels, config_.distances);
   const FrameFreeing freeing(volumes_);
   BlockVotes votes;
   const std::vector<FusedBlock> fused = FuseIntoVolumes(view, config_, volumes_, &votes);

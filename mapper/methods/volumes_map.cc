@@ -23,7 +23,7 @@ void VolumesMap::Fuse(const Frame& frame, const cv::Mat& labels) {
   RequireReach(*this, frame, labels);
   const FrameFreeing freeing(volumes_);
   const std::vector<FusedBlock> fused =
-      FuseIntoVolumes(FrameView(frame, labels), config_, volumes_);
+      FuseIntoVolumes(FrameView(frame, labels, config_.distances), config_, volumes_);
   freeing.FreeEmpty(fused, volumes_);
   CheckInDebugBuilds(*this);
 }

@@ -39,10 +39,11 @@ SdfTrackConfig OfRoom(SdfTrackConfig config, CameraSource source) {
   // Its floor is seen at grazing angles, and has no other side.
   config.max_slope = config.certain_slope = 0;
   config.keyframe_turn_rad = std::min(config.keyframe_turn_rad, kKeyframeTurn_rad);
-  config.anchor_turn_rad = 0;
+  config.anchor_turn_rad = config.rest_turn_rad = 0;
   // Where a camera was is no reason to think that it is there still; a given pose is one, each
   // frame's own.
   config.rest_frames = 0;
+  config.rest_trend = 0;
   if (source == CameraSource::kTrack) config.rest_evidence = 0;
   config.settled_voxels = std::max(config.settled_voxels, kSettled_voxels);
   config.huber_voxels = std::max(config.huber_voxels, kHuber_voxels);

@@ -40,6 +40,7 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("weak_share", weak_share, 0, 0.1));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_turn_rad", keyframe_turn_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("anchor_turn_rad", anchor_turn_rad, 0, EIGEN_PI));
+  TSDFPP_RETURN_IF_ERROR(InRange("rest_turn_rad", rest_turn_rad, 0, EIGEN_PI));
   TSDFPP_RETURN_IF_ERROR(InRange("keyframe_points", keyframe_points, 10, 1000000));
   TSDFPP_RETURN_IF_ERROR(InRange("free_space_weight", free_space_weight, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("outline_weight", outline_weight, 0, 100));
@@ -65,6 +66,13 @@ Expected<void> SdfTrackConfig::Validate() const {
   TSDFPP_RETURN_IF_ERROR(InRange("rest_voxels", rest_voxels, 0, 1));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_evidence", rest_evidence, 0, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("rest_frames", rest_frames, 0, 1000));
+  TSDFPP_RETURN_IF_ERROR(InRange("rest_trend", rest_trend, 0, 1e6));
+  if (rest_trend > 0 && rest_frames < 2) {
+    return UsageError(
+        "tracking setting 'rest_trend' is {}, and {} frames have no trend: expected rest_frames of "
+        "at least 2",
+        rest_trend, rest_frames);
+  }
   TSDFPP_RETURN_IF_ERROR(InRange("motion_voxels", motion_voxels, 0.1, 100));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_frames", motion_frames, 1, 1000));
   TSDFPP_RETURN_IF_ERROR(InRange("motion_evidence", motion_evidence, 0, 100));
@@ -99,6 +107,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("keyframe_turn_rad", config.keyframe_turn_rad)
       .Get("keyframe_points", config.keyframe_points)
       .Get("anchor_turn_rad", config.anchor_turn_rad)
+      .Get("rest_turn_rad", config.rest_turn_rad)
       .Get("free_space_weight", config.free_space_weight)
       .Get("outline_weight", config.outline_weight)
       .Get("colour_weight", config.colour_weight)
@@ -114,6 +123,7 @@ Expected<SdfTrackConfig> SdfTrackConfig::FromToml(const toml::table& table,
       .Get("rest_voxels", config.rest_voxels)
       .Get("rest_evidence", config.rest_evidence)
       .Get("rest_frames", config.rest_frames)
+      .Get("rest_trend", config.rest_trend)
       .Get("motion_voxels", config.motion_voxels)
       .Get("motion_frames", config.motion_frames)
       .Get("motion_evidence", config.motion_evidence)
@@ -149,6 +159,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"keyframe_turn_rad", keyframe_turn_rad},
                      {"keyframe_points", keyframe_points},
                      {"anchor_turn_rad", anchor_turn_rad},
+                     {"rest_turn_rad", rest_turn_rad},
                      {"free_space_weight", free_space_weight},
                      {"outline_weight", outline_weight},
                      {"colour_weight", colour_weight},
@@ -164,6 +175,7 @@ toml::table SdfTrackConfig::ToToml() const {
                      {"rest_voxels", rest_voxels},
                      {"rest_evidence", rest_evidence},
                      {"rest_frames", rest_frames},
+                     {"rest_trend", rest_trend},
                      {"motion_voxels", motion_voxels},
                      {"motion_frames", motion_frames},
                      {"motion_evidence", motion_evidence},

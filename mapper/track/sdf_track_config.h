@@ -67,6 +67,10 @@ struct SdfTrackConfig {
   double AnchorTurn_rad() const {
     return keyframe_turn_rad > 0 && colour_weight <= 0 ? anchor_turn_rad : 0;
   }
+  // Until an object moves for the first time nothing was taken over: both are made anew once it is
+  // seen from so far another side, so that they are of about the view in which it begins to move.
+  // A motion is not noticed at once: they are those of some frames before. 0 switches this off.
+  double rest_turn_rad = 0;
   int keyframe_points = 1500;
   int colour_points = 600;  // of a keyframe, at most, for the term of colour
 
@@ -111,6 +115,9 @@ struct SdfTrackConfig {
   // One that moves rests again where the points say less than half of that against the place that
   // it had so many frames ago, which is at most a voxel away. 0 switches this off.
   int rest_frames = 4;
+  // None of both where its places in so many frames and this one go one way, and the slope of a
+  // line through them is more than so many times its standard error (trend.h). 0 switches this off.
+  double rest_trend = 0;
 
   // Of TrackChoice::kMoving alone. What waits for motion has moved where so many frames in a row
   // show a point of it this far from where it began, each with this evidence, as above, against its

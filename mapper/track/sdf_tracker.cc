@@ -19,6 +19,8 @@ constexpr double kSameSeed_voxels = 0.5;
 constexpr int kLongestExtrapolation_frames = 5;
 // Depth that is farther from a model's surface is not the surface's.
 constexpr double kOtherDepth_voxels = 2;
+// What was at rest so many frames later was so for sure: noise hides the first of a motion.
+constexpr std::int64_t kSurelyAtRest_frames = 10;
 // Numbers of frames may be any.
 constexpr std::int64_t kMostPassed = 1'000'000'000;
 
@@ -48,6 +50,10 @@ Pose KnownPart(const Pose& motion_L, const SdfRegistrationResult& found) {
   x.head<3>() = part(found.known.shift_shares, found.known.shifts, x.head<3>());
   x.tail<3>() = part(found.known.turn_shares, found.known.turns, x.tail<3>());
   return found.frame.MotionOf(x);
+}
+
+double TurnBetween_rad(const Pose& T_OC, const Pose& T_OC_other) {
+  return Eigen::AngleAxisd(T_OC.linear().transpose() * T_OC_other.linear()).angle();
 }
 
 }  // namespace
@@ -276,6 +282,8 @@ MotionUncertainty SdfTracker::Uncertainty(const Sight& sight, const SdfRegistrat
 void SdfTracker::Remember(const Sight& sight, const SdfRegistrationResult& found, const Rest& rest,
                           Memory& memory) const {
   const Pose T_OC = sight.T_LO.inverse() * found.T_LC;
+  memory.was_at_rest = memory.was_at_rest && rest.is_kept && !rest.is_back;
+  if (config_.rest_turn_rad > 0) RenewAtRest(sight, T_OC, memory);
   Renew(memory.keyframe, config_.KeyframeTurn_rad(), sight, T_OC);
   Renew(memory.anchor, config_.AnchorTurn_rad(), sight, T_OC);
   if (sight.passed != 1) memory.T_WO_last.clear();
@@ -296,10 +304,28 @@ void SdfTracker::Renew(std::optional<Keyframe>& keyframe, double turn_rad, const
                        const Pose& T_OC) const {
   if (turn_rad <= 0) return;
   if (keyframe) {
-    const Eigen::Matrix3d turn = keyframe->T_OC.linear().transpose() * T_OC.linear();
-    if (Eigen::AngleAxisd(turn).angle() <= turn_rad) return;
+    if (TurnBetween_rad(keyframe->T_OC, T_OC) <= turn_rad) return;
   }
   keyframe = KeyframeOf(sight, T_OC);
+}
+
+void SdfTracker::RenewAtRest(const Sight& sight, const Pose& T_OC, Memory& memory) const {
+  const std::int64_t frame = sight.frame->index;
+  if (!memory.was_at_rest || !memory.keyframe) {
+    memory.waiting.reset();
+    return;
+  }
+  if (memory.waiting && frame - memory.waiting_since < kSurelyAtRest_frames) return;
+  if (memory.waiting) {
+    const double waiting_rad = TurnBetween_rad(memory.waiting->T_OC, T_OC);
+    for (auto* kept : {&memory.keyframe, &memory.anchor}) {
+      if (!*kept) continue;
+      const double kept_rad = TurnBetween_rad((*kept)->T_OC, T_OC);
+      if (kept_rad > config_.rest_turn_rad && waiting_rad < kept_rad) *kept = memory.waiting;
+    }
+  }
+  memory.waiting = KeyframeOf(sight, T_OC);
+  memory.waiting_since = frame;
 }
 
 SdfTracker::Keyframe SdfTracker::KeyframeOf(const Sight& sight, const Pose& T_OC) const {

@@ -2,6 +2,7 @@
 // where its last motion would bring it, and freezes what it cannot register (docs/tracking.md).
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
@@ -56,6 +57,9 @@ class SdfTracker : public Tracker {
     std::optional<Eigen::Vector3d> centre_O;  // of its segment then
     std::optional<Keyframe> keyframe;
     std::optional<Keyframe> anchor;         // another, kept for longer
+    bool was_at_rest = true;                // in every frame so far
+    std::optional<Keyframe> waiting;        // to be both, while it is at rest
+    std::int64_t waiting_since = 0;         // frame
     std::optional<PlaceUncertainty> place;  // then
     std::optional<Vector6> leaning;         // of what was left at rest: to where it was found
     std::deque<Pose> T_WO_last;             // of the last rest_frames in a row, oldest first
@@ -128,6 +132,9 @@ class SdfTracker : public Tracker {
   Rest StayAtRest(const Sight& sight, const SdfRegistration& task,
                   const SdfRegistrationResult& nearest, Memory& memory,
                   SdfRegistrationResult& found) const;
+  // Whether its last places and the one found go one way (SdfTrackConfig::rest_trend).
+  bool GoesOneWay(const Sight& sight, const SdfRegistrationResult& found,
+                  const Memory& memory) const;
   // What moved, and may rest again. `found` is then where it was rest_frames frames ago.
   bool RestsAgain(const Sight& sight, const SdfRegistration& task,
                   const SdfRegistrationResult& nearest, const Memory& memory,
@@ -152,6 +159,8 @@ class SdfTracker : public Tracker {
   // Where there is none, or the object has turned so far since; `turn_rad` 0: keeps none.
   void Renew(std::optional<Keyframe>& keyframe, double turn_rad, const Sight& sight,
              const Pose& T_OC) const;
+  // Of what was at rest so far: both, seen from another side (SdfTrackConfig::rest_turn_rad).
+  void RenewAtRest(const Sight& sight, const Pose& T_OC, Memory& memory) const;
   // The segment, seen from there.
   Keyframe KeyframeOf(const Sight& sight, const Pose& T_OC) const;
 

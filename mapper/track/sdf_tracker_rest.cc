@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "mapper/track/sdf_tracker.h"
+#include "mapper/track/trend.h"
 
 namespace tsdfpp {
 namespace {
@@ -23,6 +25,8 @@ constexpr double kShareGoingOn = 0.4;
 // turn of which nothing is known is left out: noise makes it.
 constexpr double kShareAgain = 0.5;
 constexpr double kNearAgain_voxels = 1;
+// Whose places come less far than this from the first to the last goes nowhere.
+constexpr double kCreep_voxels = 0.05;
 // What seems to move for longer, and has not come as far as an object that moves, is something
 // else: its model is wrong there.
 constexpr int kLongestWait_frames = 20;
@@ -64,6 +68,7 @@ SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistratio
   const std::optional<Vector6> leant = std::exchange(memory.leaning, std::nullopt);
   Rest rest;
   if ((config_.rest_evidence <= 0 && !waits_) || nearest.counts.observed == 0) return rest;
+  if (GoesOneWay(sight, found, memory)) return rest;
   if (found.frame.LongestWay_m(memory.motion_L) > kSlow_voxels * sight.voxel_m) {
     rest.is_kept = rest.is_back = RestsAgain(sight, task, nearest, memory, found);
     return rest;
@@ -81,6 +86,21 @@ SdfTracker::Rest SdfTracker::StayAtRest(const Sight& sight, const SdfRegistratio
   found.T_LC = rest.T_LC;
   found.counts = rest.counts;
   return rest;
+}
+
+bool SdfTracker::GoesOneWay(const Sight& sight, const SdfRegistrationResult& found,
+                            const Memory& memory) const {
+  if (config_.rest_trend <= 0 || (waits_ && !memory.has_moved)) return false;
+  const auto frames = static_cast<std::size_t>(config_.rest_frames);
+  if (sight.passed != 1 || memory.T_WO_last.size() < frames) return false;
+  std::vector<Vector6> places;  // seen from the one found
+  for (const Pose& T_WO : memory.T_WO_last) {
+    const Pose T_LC = sight.T_LO * T_WO.inverse() * sight.frame->T_WC;
+    places.push_back(found.frame.LengthsOf(T_LC * found.T_LC.inverse()));
+  }
+  places.push_back(Vector6::Zero());
+  return TrendOf(places, found.known, config_.weak_share, kCreep_voxels * sight.voxel_m) >
+         config_.rest_trend;
 }
 
 bool SdfTracker::RestsAgain(const Sight& sight, const SdfRegistration& task,

@@ -20,6 +20,9 @@ struct KernelFrame {
   float width = 0;                       // pixels
   float height = 0;
   std::array<float, 4> intrinsics{};  // fx, fy, cx, cy
+  // By what distances in front of a pixel are multiplied (FacingOf()), or nullptr: by 1. That of
+  // the background's pixels is 1.
+  const float* facing = nullptr;
 };
 
 // What a frame says of the voxels of a block.

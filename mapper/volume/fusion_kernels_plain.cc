@@ -109,7 +109,8 @@ class Fusion {
     }
     const bool coloured = in_band && std::abs(s) <= ColourBandAt(i);
     const std::ptrdiff_t first_byte = 3 * static_cast<std::ptrdiff_t>(sight.pixel);
-    FuseVoxel(block_, static_cast<std::size_t>(i), in_band ? s : rule_.front,
+    const float facing = frame_.facing == nullptr ? 1 : frame_.facing[sight.pixel];
+    FuseVoxel(block_, static_cast<std::size_t>(i), std::min(s * facing, rule_.front),
               coloured ? frame_.colour + first_byte : nullptr, rule_.weight_cap);
     Changed(i);
   }

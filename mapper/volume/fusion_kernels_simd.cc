@@ -226,13 +226,10 @@ HWY_INLINE Wanted WhoTakes(const RuleLanes& rule, bool contradiction, const Stor
   return wanted;
 }
 
-// Whether all that is touched is free space seen once more, that no longer counts observations: it
-// stays what it is.
-HWY_INLINE bool AllSettled(const RuleLanes& rule, const Stored& stored, const Wanted& wanted,
-                           VF s) {
-  const auto settled =
-      hn::And(hn::Eq(stored.distance, rule.front), hn::And(stored.is_full, hn::Gt(s, rule.front)));
-  return hn::AllTrue(Floats(), hn::Or(hn::Not(wanted.touched), settled));
+// Lanes of free space seen once more, that no longer counts observations: they stay what they are.
+HWY_INLINE MF Settled(const RuleLanes& rule, const Stored& stored, VF s) {
+  return hn::And(hn::Eq(stored.distance, rule.front),
+                 hn::And(stored.is_full, hn::Gt(s, rule.front)));
 }
 
 // Marks the lanes of `near` that take a colour; these and the pixels' colours are fetched.
@@ -270,15 +267,17 @@ HWY_INLINE void StoreWeights(VF weight, MF full, std::size_t i, TsdfBlock& block
 
 // New distances and weights of the lanes, and the masks that follow from them.
 HWY_INLINE void StoreFused(const RuleLanes& rule, const Stored& stored, const Wanted& wanted,
-                           bool contradiction, VF s, std::size_t i, TsdfBlock& block,
-                           FusionMasks& masks) {
+                           bool contradiction, VF s, VF facing, MF settled, std::size_t i,
+                           TsdfBlock& block, FusionMasks& masks) {
   const Floats df;
   const auto one = hn::Set(df, 1.0F);
   const auto clamped = hn::Min(s, rule.front);
   const auto more = hn::Add(stored.weight, one);
   const auto share = stored.all_full ? rule.full_share : hn::Div(one, more);
-  const auto fused = hn::Add(stored.distance, hn::Mul(hn::Sub(clamped, stored.distance), share));
-  auto d = hn::IfThenElse(wanted.taken, RoundLanesToHalf(df, fused), stored.distance);
+  const auto seen = hn::Min(hn::Mul(s, facing), rule.front);
+  const auto fused = hn::Add(stored.distance, hn::Mul(hn::Sub(seen, stored.distance), share));
+  const auto changed = hn::AndNot(settled, wanted.taken);
+  auto d = hn::IfThenElse(changed, RoundLanesToHalf(df, fused), stored.distance);
   PutBits(df, wanted.taken, i, masks.taken.data());
   if (contradiction && !hn::AllFalse(df, wanted.against)) {
     const auto free = hn::And(wanted.against, hn::Gt(s, rule.voxel));
@@ -354,7 +353,15 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     label.fill(rule.id);
   }
 
+  // The background's distances stay along the rays.
+  const bool faces =
+      frame.facing != nullptr && (kLabels == Labels::kEvery || rule.id != kBackground);
+  HWY_ALIGN std::array<float, kBlockVoxels> facing;
+  if (faces) {
+    ReadPixels<kLanes>(frame.facing, projected.pixel, projected.look.data(), facing.data());
+  }
   const Floats df;
+  const auto one = hn::Set(df, 1.0F);
   const RuleLanes lanes(place, rule, votes);
   const bool contradiction = kLabels == Labels::kSome && rule.contradiction;
   FusionMasks masks(block);
@@ -367,8 +374,9 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
     const Wanted wanted = WhoTakes<kLabels>(lanes, contradiction, stored, s, label, i, votes);
     if (hn::AllFalse(df, wanted.touched)) continue;
     const auto near = hn::And(wanted.taken, hn::Le(s, lanes.front));
+    const auto settled = Settled(lanes, stored, s);
     if (hn::AllFalse(df, near)) {
-      if (AllSettled(lanes, stored, wanted, s)) continue;
+      if (hn::AllFalse(df, hn::AndNot(settled, wanted.touched))) continue;
     } else {
       PutBits(df, near, i, masks.in_band.data());
       if constexpr (kLabels == Labels::kEvery) {
@@ -380,7 +388,8 @@ FusionResult FuseWith(const KernelFrame& frame, const BlockPlace& place, const F
       ChooseColours(frame, block, lanes, projected, near, s, i, masks);
     }
     result.changed = true;
-    StoreFused(lanes, stored, wanted, contradiction, s, i, block, masks);
+    StoreFused(lanes, stored, wanted, contradiction, s, faces ? hn::Load(df, &facing[i]) : one,
+               settled, i, block, masks);
   }
   if (!result.changed) return result;
   FuseAllColours(frame, projected, masks, rule.weight_cap, block);

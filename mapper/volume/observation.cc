@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <limits>
 
+#include "mapper/volume/facing.h"
+
 namespace tsdfpp {
 namespace {
 
@@ -169,7 +171,7 @@ Verdict Judge(const FrameView& frame, const BlockCandidate& block, float voxel, 
 
 }  // namespace
 
-FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
+FrameView::FrameView(const Frame& frame, const cv::Mat& labels, Distances distances)
     : width(frame.intrinsics.width),
       height(frame.intrinsics.height),
       intrinsics(frame.intrinsics),
@@ -186,6 +188,10 @@ FrameView::FrameView(const Frame& frame, const cv::Mat& labels)
   kernel.depth = depth_.ptr<float>();
   kernel.label = label_.ptr<std::uint16_t>();
   kernel.colour = colour_.ptr<std::uint8_t>();
+  if (distances == Distances::kSurface) {
+    facing_ = FacingOf(frame, labels);
+    kernel.facing = facing_.ptr<float>();
+  }
   kernel.width = static_cast<float>(width);
   kernel.height = static_cast<float>(height);
   kernel.intrinsics = {static_cast<float>(intrinsics.fx), static_cast<float>(intrinsics.fy),

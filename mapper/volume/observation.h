@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/types.h"
+#include "mapper/map_config.h"
 #include "mapper/volume/frame_kernels.h"
 #include "mapper/volume/fusion_kernels.h"
 
@@ -17,7 +18,7 @@ namespace tsdfpp {
 class FrameView {
  public:
   // Aborts where the images' sizes or types are not those that core/types.h states.
-  FrameView(const Frame& frame, const cv::Mat& labels);
+  FrameView(const Frame& frame, const cv::Mat& labels, Distances distances = Distances::kRay);
 
   int width = 0;
   int height = 0;
@@ -35,6 +36,7 @@ class FrameView {
  private:
   cv::Mat depth_;  // continuous
   cv::Mat label_;
+  cv::Mat facing_;
   cv::Mat colour_;
 };
 

@@ -29,11 +29,15 @@ struct TwinFrame {
   std::vector<float> depth;
   std::vector<std::uint16_t> label;
   std::vector<std::uint8_t> colour;
+  std::vector<float> facing;
   float farthest = 0;
   KernelFrame kernel;
 
   TwinFrame(Dice& dice, Shown shown, bool with_holes)
-      : depth(kWidth * kHeight), label(kWidth * kHeight), colour(3 * kWidth * kHeight) {
+      : depth(kWidth * kHeight),
+        label(kWidth * kHeight),
+        colour(3 * kWidth * kHeight),
+        facing(kWidth * kHeight, 1) {
     const double middle = dice.Uniform(0.4, 0.9);
     const double slope = dice.Uniform(-0.004, 0.004);
     const double noise = dice.Whole(2) == 0 ? 0 : 0.04;
@@ -55,6 +59,12 @@ struct TwinFrame {
     }
     for (auto& level : colour) level = static_cast<std::uint8_t>(dice.Whole(256));
     kernel = {depth.data(), label.data(), colour.data(), kWidth, kHeight, {60, 61, 35.2F, 24.7F}};
+    if (dice.Whole(2) == 0) {
+      for (std::size_t i = 0; i < facing.size(); ++i) {
+        if (label[i] != kBackground) facing[i] = static_cast<float>(dice.Uniform(0.1, 1));
+      }
+      kernel.facing = facing.data();
+    }
     // Or so that lattices along the camera's axes meet the borders of pixels.
     if (dice.Whole(3) == 0) kernel.intrinsics = {60, 60, 35.5F, 24.5F};
   }

@@ -103,6 +103,7 @@ TEST(MapConfigTest, TomlRoundTrip) {
   config.rims = false;
   config.relist_on_removal = true;
   config.colour_whole_band = true;
+  config.distances = Distances::kSurface;
   config.resampling = Resampling::kObserved;
   config.moved_voxels = MovedVoxels::kNearSurface;
   config.removed_voxels = RemovedVoxels::kUnobserved;
@@ -141,6 +142,7 @@ TEST(MapConfigTest, TomlFaultsNameFileAndKey) {
       {"voxel_m", toml::table{{"voxel_m", -1.0}}},       // invalid
       {"confidence_cap", toml::table{{"confidence_cap", 0}}},
       {"layers", toml::table{{"layers", 9}}},
+      {"distances", toml::table{{"distances", "some"}}},
       {"resampling", toml::table{{"resampling", "some"}}},
       {"resampling", toml::table{{"resampling", true}}},
       {"moved_voxels", toml::table{{"moved_voxels", "some"}}},

@@ -14,6 +14,8 @@ TEST(SdfTrackConfig, RoundTripsThroughToml) {
   config.max_fall = 2;
   config.certain_slope = 1.5;
   config.anchor_turn_rad = 0.5;
+  config.rest_turn_rad = 0.06;
+  config.rest_trend = 4;
   config.weak_share = 0.03;
   config.keyframe_points = 77;
   config.free_space_weight = 0.5;
@@ -34,6 +36,15 @@ TEST(SdfTrackConfig, RoundTripsThroughToml) {
             fmt::format("tracking setting 'min_points' is {}, expected at most 'max_points', which "
                         "is {}",
                         config.min_points, config.max_points));
+  config = {};
+  config.rest_trend = 5;
+  EXPECT_TRUE(config.Validate());
+  config.rest_frames = 1;
+  const auto too_few = config.Validate();
+  ASSERT_FALSE(too_few);
+  EXPECT_EQ(too_few.error().message,
+            "tracking setting 'rest_trend' is 5, and 1 frames have no trend: expected rest_frames "
+            "of at least 2");
 }
 
 }  // namespace

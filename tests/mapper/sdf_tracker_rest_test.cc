@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "mapper/pipeline.h"
@@ -16,6 +17,8 @@ namespace {
 // A brick and a tray at rest until frame kStart, seen with noise by a camera that moves; then the
 // brick has slid so far.
 constexpr int kStart = 10;
+// SdfTrackConfig::rest_trend, where it is on.
+constexpr double kTrend = 5;
 Frame NoisyToys(int index, double slid_m, const Intrinsics& camera = FineCamera(),
                 double noise_m = 0.002) {
   reference::Scene scene = TableOnly();
@@ -89,9 +92,10 @@ TEST(TrackerRest, RestsAgainWhereItStops) {
   int moved_without = 0;
   for (const auto& [voxel_m, noise_m] : cases) {
     SCOPED_TRACE(fmt::format("voxels of {} m, noise of {} m", voxel_m, noise_m));
-    for (const int frames : {0, SdfTrackConfig{}.rest_frames}) {
+    for (const auto& [frames, trend] : {std::pair{0, 0.0}, {4, 0.0}, {4, kTrend}}) {
       PipelineConfig config = TrackConfig();
       config.track.rest_frames = frames;
+      config.track.rest_trend = trend;
       config.map.voxel_m = voxel_m;
       Pipeline pipeline(config, Toys());
       int moved = 0;
@@ -115,6 +119,31 @@ TEST(TrackerRest, RestsAgainWhereItStops) {
   }
   // Without this noise goes on moving it, as it moved before, in more than half of the frames.
   EXPECT_GT(2 * moved_without, static_cast<int>(cases.size()) * (kLast - kSettled));
+}
+
+// Where each slope counts, nothing that moved rests again: noise goes on moving it.
+TEST(TrackerRest, DoesNotRestWhileItGoesOneWay) {
+  constexpr Intrinsics kCoarse{192, 144, 160.0, 160.0, 95.5, 71.5};
+  constexpr int kStop = kStart + 5;
+  constexpr int kLast = kStop + 20;
+  const auto moved_with = [&](double trend) {
+    PipelineConfig config = TrackConfig();
+    config.track.rest_trend = trend;
+    config.map.voxel_m = kToyVoxel_m / 3;
+    Pipeline pipeline(config, Toys());
+    int moved = 0;
+    for (int i = 1; i <= kLast; ++i) {
+      const double slid_m = 0.006 * (std::clamp(i, kStart, kStop) - kStart);
+      EXPECT_TRUE(pipeline.Process(NoisyToys(i, slid_m, kCoarse, 0.004)));
+      if (i <= kStop) continue;
+      const auto& poses = pipeline.trajectories().at(kBrick);
+      moved += poses.at(i).matrix() == poses.at(i - 1).matrix() ? 0 : 1;
+    }
+    return moved;
+  };
+  const int moved = moved_with(0);
+  EXPECT_LE(moved, moved_with(kTrend));
+  EXPECT_GT(moved_with(1e-9), 2 * moved);
 }
 
 // What rests is no excuse for what is not there.
