@@ -53,11 +53,11 @@ class SdfTracker : public Tracker {
   // What is remembered of an object beside its pose.
   struct Memory {
     int frame = 0;                            // the last at which it was tracked
+    bool was_at_rest = true;                  // in every frame so far
     Pose motion_L = Pose::Identity();         // a frame: T_WL(before)^-1 * T_WL(after)
     std::optional<Eigen::Vector3d> centre_O;  // of its segment then
     std::optional<Keyframe> keyframe;
     std::optional<Keyframe> anchor;         // another, kept for longer
-    bool was_at_rest = true;                // in every frame so far
     std::optional<Keyframe> waiting;        // to be both, while it is at rest
     std::int64_t waiting_since = 0;         // frame
     std::optional<PlaceUncertainty> place;  // then

@@ -11,8 +11,8 @@ namespace tsdfpp {
 // greatest ratio of a slope to its standard error (Student's t) along the `known` directions, each
 // of a line through the places by least squares. Places are lengths of motions (MotionFrame) to one
 // of them, metres. Left out are turns of which less than `weak_share` is known, and lines along
-// which the places come no farther than `least_way_m` from the first frame to the last. 0 without others,
-// or with fewer than three places.
+// which the places come no farther than `least_way_m` from the first frame to the last. 0 without
+// others, or with fewer than three places.
 double TrendOf(std::span<const Vector6> places, const KnownDirections& known, double weak_share,
                double least_way_m);
 

@@ -11,7 +11,8 @@ namespace tsdfpp {
 // CV_32FC1 of the frame's size: what a distance along a pixel's ray, in front of what is seen
 // there, is multiplied by. With the cosine of the angle between the ray and the normal of the
 // surface it would be the distance from the surface's tangent plane. It is that cosine over the one
-// of 45 degrees, at most 1: what is seen less aslant keeps its distance along the ray. So 1 to 0.14.
+// of 45 degrees, at most 1: what is seen less aslant keeps its distance along the ray. So 1 to
+// 0.14.
 //
 // The normal is that of a plane. Inverse depths on a plane are linear in the picture; their slopes
 // are those of a least-squares fit over the pixels with the same label within 3 rows and columns,
