@@ -74,16 +74,16 @@ void FuseActive(const FrameView& frame, const MapConfig& config, const CameraFro
       const std::int32_t pixel = observation.pixel[i];
       if (pixel < 0 || task.lists->active[i].id != id) continue;
       const float s = observation.distance[i];
+      const float facing = frame.kernel.facing == nullptr ? 1 : frame.kernel.facing[pixel];
       if (s <= config.front()) {
         const bool coloured =
             std::abs(s) <=
             (block->ColourCount(i) == 0 ? config.first_colour_band() : config.colour_band());
-        const float facing = frame.kernel.facing == nullptr ? 1 : frame.kernel.facing[pixel];
         FuseVoxel(*block, i, s * facing, coloured ? frame.kernel.colour + 3 * pixel : nullptr,
                   weight_cap);
         changed = true;
       } else if (frame.kernel.label[pixel] == id) {
-        FuseVoxel(*block, i, config.front(), nullptr, weight_cap);
+        FuseVoxel(*block, i, std::min(s * facing, config.front()), nullptr, weight_cap);
         changed = true;
       }
     }

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "mapper/track/robust_deviation.h"
+#include "core/robust_deviation.h"
 
 namespace tsdfpp {
 namespace {

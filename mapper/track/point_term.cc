@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapper/track/robust_deviation.h"
+#include "core/robust_deviation.h"
 
 namespace tsdfpp {
 namespace {

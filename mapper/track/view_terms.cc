@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "core/pixel_ray.h"
+#include "core/robust_deviation.h"
 #include "mapper/track/model_sight.h"
-#include "mapper/track/robust_deviation.h"
 
 namespace tsdfpp {
 namespace {

@@ -3,18 +3,21 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
+
+#include "core/robust_deviation.h"
 
 namespace tsdfpp {
 namespace {
 
-// Rows and columns to each side over which a plane is fitted: its slope is then good to a tenth of
-// the ray's with the noise of a consumer's camera.
+// Rows and columns to each side over which a plane is fitted.
 constexpr int kReach_px = 3;
 // A surface at a steeper angle to the ray is a step.
 constexpr double kSteepest = 11.4;  // the tangent of 85 degrees
@@ -22,7 +25,6 @@ constexpr double kSteepest = 11.4;  // the tangent of 85 degrees
 constexpr double kNoiseDeviations = 4;
 // Of a second difference of three numbers with equal noise, to that of one.
 constexpr double kSecondDifference = 2.449489742783178;  // sqrt(1 + 4 + 1)
-constexpr double kMedianToDeviation = 1.4826;
 // Rows and columns of which the noise is found.
 constexpr int kNoiseStride_px = 7;
 constexpr int kFewestPixels = 9;
@@ -65,50 +67,11 @@ double RelativeNoiseOf(const cv::Mat& inverse, const cv::Mat& labels) {
       sizes.push_back(std::abs(w[u - 1] - 2 * w[u] + w[u + 1]) / w[u]);
     }
   }
-  if (sizes.empty()) return 0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return kMedianToDeviation * double{*middle} / kSecondDifference;
+  return RobustDeviation(std::move(sizes)) / kSecondDifference;
 }
 
-// Sums over pixels, of columns, rows and inverse depths, from a pixel on.
-struct PixelSums {
-  double n = 0;
-  double x = 0;
-  double y = 0;
-  double z = 0;
-  double xx = 0;
-  double xy = 0;
-  double yy = 0;
-  double xz = 0;
-  double yz = 0;
-  double zz = 0;
-
-  void Add(double dx, double dy, double dz) {
-    n += 1;
-    x += dx;
-    y += dy;
-    z += dz;
-    xx += dx * dx;
-    xy += dx * dy;
-    yy += dy * dy;
-    xz += dx * dz;
-    yz += dy * dz;
-    zz += dz * dz;
-  }
-  void Add(const PixelSums& o) {
-    n += o.n;
-    x += o.x;
-    y += o.y;
-    z += o.z;
-    xx += o.xx;
-    xy += o.xy;
-    yy += o.yy;
-    xz += o.xz;
-    yz += o.yz;
-    zz += o.zz;
-  }
-};
+// Sums over pixels of h h^T, h = (1, columns, rows, inverse depth) from one pixel on.
+using PixelSums = Eigen::Matrix4d;
 
 // A plane through some pixels around one.
 struct FittedPlane {
@@ -119,19 +82,22 @@ struct FittedPlane {
 
 // By least squares; nothing where the pixels are too few, or in a line.
 std::optional<FittedPlane> PlaneThrough(const PixelSums& s) {
-  if (s.n < kFewestPixels) return std::nullopt;
-  const double xx = s.xx - s.x * s.x / s.n;
-  const double xy = s.xy - s.x * s.y / s.n;
-  const double yy = s.yy - s.y * s.y / s.n;
-  const double xz = s.xz - s.x * s.z / s.n;
-  const double yz = s.yz - s.y * s.z / s.n;
-  const double zz = s.zz - s.z * s.z / s.n;
+  const double n = s(0, 0);
+  if (n < kFewestPixels) return std::nullopt;
+  const Eigen::Matrix3d about_mean =
+      s.bottomRightCorner<3, 3>() - s.bottomLeftCorner<3, 1>() * s.topRightCorner<1, 3>() / n;
+  const double xx = about_mean(0, 0);
+  const double xy = about_mean(0, 1);
+  const double yy = about_mean(1, 1);
+  const double xz = about_mean(0, 2);
+  const double yz = about_mean(1, 2);
+  const double zz = about_mean(2, 2);
   const double det = xx * yy - xy * xy;
   if (!(det > 0)) return std::nullopt;
   FittedPlane plane;
   plane.du = (xz * yy - yz * xy) / det;
   plane.dv = (yz * xx - xz * xy) / det;
-  plane.mean_square = std::max(0.0, zz - plane.du * xz - plane.dv * yz) / s.n;
+  plane.mean_square = std::max(0.0, zz - plane.du * xz - plane.dv * yz) / n;
   return plane;
 }
 
@@ -142,7 +108,8 @@ struct PlaneFit {
   using Parts = std::array<PixelSums, 9>;
 
   Parts Around(int v, int u) const {
-    Parts parts{};
+    Parts parts;
+    parts.fill(PixelSums::Zero());
     const float w = inverse.at<float>(v, u);
     const InstanceId id = labels.at<InstanceId>(v, u);
     for (int j = std::max(0, v - kReach_px); j <= std::min(inverse.rows - 1, v + kReach_px); ++j) {
@@ -156,7 +123,8 @@ struct PlaneFit {
         const double dz = row[i] - w;
         const int way = std::max(std::abs(i - u), std::abs(j - v));
         if (std::abs(dz) > double{w} * (step * way + kNoiseDeviations * noise)) continue;
-        parts[static_cast<std::size_t>(third + (i < u ? 0 : i == u ? 1 : 2))].Add(i - u, j - v, dz);
+        const Eigen::Vector4d h(1, i - u, j - v, dz);
+        parts[static_cast<std::size_t>(third + (i < u ? 0 : i == u ? 1 : 2))] += h * h.transpose();
       }
     }
     return parts;
@@ -167,7 +135,7 @@ struct PlaneFit {
     std::optional<FittedPlane> best;
     for (const std::size_t corner : {0U, 1U, 3U, 4U}) {
       PixelSums quarter = parts[corner];
-      for (const std::size_t next : {1U, 3U, 4U}) quarter.Add(parts[corner + next]);
+      for (const std::size_t next : {1U, 3U, 4U}) quarter += parts[corner + next];
       const std::optional<FittedPlane> plane = PlaneThrough(quarter);
       if (plane && (!best || plane->mean_square < best->mean_square)) best = plane;
     }
@@ -196,8 +164,8 @@ struct PlaneFit {
     const double w = inverse.at<float>(v, u);
     const double flat = w * (kFlatDeviations * noise + kFlat);
     const Parts parts = Around(v, u);
-    PixelSums all;
-    for (const PixelSums& part : parts) all.Add(part);
+    PixelSums all = PixelSums::Zero();
+    for (const PixelSums& part : parts) all += part;
     std::optional<FittedPlane> plane = PlaneThrough(all);
     if (plane && plane->mean_square > flat * flat) {
       const std::optional<FittedPlane> side = BestSide(parts);

@@ -25,6 +25,9 @@ Eigen::Vector3d RayOf(int v, int u) {
   return {(u - kWidth / 2.0) / kFocal_px, (v - kHeight / 2.0) / kFocal_px, 1};
 }
 
+// What a fit of 49 pixels leaves of the noise below, and a little for those at the picture's rim.
+constexpr double kNoisy = 0.12;
+
 // A frame whose depth along the ray of row v, column u is that.
 Frame FrameOf(const std::function<double(int v, int u)>& depth) {
   Frame frame;
@@ -84,7 +87,7 @@ TEST(Facing, IsThatOfPlanesInNoise) {
         squares += off * off;
       }
     }
-    EXPECT_LT(std::sqrt(squares / (kWidth * kHeight)), 0.12) << degrees;
+    EXPECT_LT(std::sqrt(squares / (kWidth * kHeight)), kNoisy) << degrees;
   }
 }
 
@@ -108,7 +111,7 @@ TEST(Facing, EndsAtAnEdge) {
         ASSERT_LT(off, kExact) << "row " << v << ", column " << u;
       } else {
         ASSERT_LE(facing.at<float>(v, u), 1);
-        ASSERT_GE(facing.at<float>(v, u), 0.4);
+        ASSERT_GE(facing.at<float>(v, u), right.FacingAt(v, u) - kExact);
       }
     }
   }
